@@ -1,4 +1,5 @@
-//! A network trained in PyTorch, through a safetensors file (`docs/training.md` has the layout).
+//! Imports a network trained in PyTorch from a safetensors file (`docs/training.md` has the
+//! layout).
 
 use std::fs;
 use std::path::Path;
@@ -9,26 +10,26 @@ use safetensors::tensor::{Dtype, TensorView};
 
 use crate::network::{Arithmetic, INPUTS, Layer, Meaning, Network, Standardization};
 
-/// The entry of the file's metadata that says what the outputs are.
+/// The entry of the file's metadata with the meaning of the outputs.
 const MEANING: &str = "meaning";
 
-/// Reads a network. Its hidden layers' maxima are not known yet: [`Network::activation_maxima`]
-/// takes them from data.
+/// Reads a network. The maxima of its hidden layers are still missing:
+/// [`Network::activation_maxima`] takes them from data.
 ///
 /// # Errors
-/// When the file cannot be read, is no safetensors file, or its tensors are no network with its
-/// scaling; names the tensor.
+/// When the file cannot be read or is not a safetensors file; when its tensors are not a network
+/// with its scaling. Names the tensor.
 pub fn load(path: &Path) -> Result<Network> {
     let bytes = fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
     parse(&bytes)
         .with_context(|| format!("{} is not a network that can be imported", path.display()))
 }
 
-/// The network in the bytes of a safetensors file.
+/// Parses the network in the bytes of a safetensors file.
 ///
 /// # Errors
-/// When they are no safetensors file, or its tensors are no network with its scaling; names the
-/// tensor.
+/// When they are not a safetensors file, or its tensors are not a network with its scaling; names
+/// the tensor.
 pub fn parse(bytes: &[u8]) -> Result<Network> {
     let tensors = SafeTensors::deserialize(bytes).context("not a safetensors file")?;
     let layers = layer_numbers(&tensors)?
@@ -65,7 +66,7 @@ fn meaning(bytes: &[u8]) -> Result<Meaning> {
         .with_context(|| format!("metadata `{MEANING}` is `{name}`"))
 }
 
-/// The numbers of the linear layers, in order: an `nn.Sequential` counts its ReLUs, too.
+/// Numbers of the linear layers, in order; an `nn.Sequential` also numbers its ReLUs.
 fn layer_numbers(tensors: &SafeTensors<'_>) -> Result<Vec<usize>> {
     let number = |name: &str| {
         name.strip_suffix(".weight")

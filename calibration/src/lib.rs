@@ -1,4 +1,4 @@
-//! From data to a model on the chip.
+//! Calibration: from data to a model on the chip.
 //!
 //! ```text
 //! data set → train → weights (JSON, floats) → quantize → model file (.hvtm, integers)
@@ -6,16 +6,17 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `data` | forces with what the sensor saw: rendered, or of a unit and a force gauge |
-//! | `evaluation` | how far a model's forces are from the truth |
+//! | `data` | forces together with what the sensor saw: rendered, or from a unit and a force gauge |
+//! | `evaluation` | errors of a model's forces |
 //! | `train`, `fit` | networks; from a data set to weights |
-//! | `forward` | the film run forwards, from what is known of a unit |
-//! | `loads` | the loads that a data set shows, and how well each is known |
+//! | `forward` | the film run forwards, from the known numbers of a unit |
+//! | `loads` | the loads of a data set, and their uncertainties |
+//! | `unit_fit` | a unit's film and camera, fitted to its loads |
 //! | `import` | networks trained in PyTorch |
 //! | `network`, `weights` | the network in floats, and its file |
 //! | `quantize` | weights to a model file, the same bytes on every machine |
-//! | `uncertainty` | what a model's errors say of its next ones |
-//! | `unit` | a person led through a unit's loads, to its own model |
+//! | `uncertainty` | a model's stated uncertainties, from its errors |
+//! | `unit` | guides a person through a unit's loads, to its own model |
 //! | `progress` | bars on the terminal |
 
 pub mod data;

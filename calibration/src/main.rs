@@ -50,7 +50,7 @@ enum Command {
 }
 
 fn main() -> Result<()> {
-    // Whoever reads the output may have enough of it.
+    // A reader of the output may close it early.
     sigpipe::reset();
     match Cli::parse().command {
         Command::Collect(command) => command.run(),

@@ -1,4 +1,4 @@
-//! A small fully connected network in plain floats: what training produces and what is quantized.
+//! A small fully connected network in floats: the result of training and the input of quantization.
 
 mod reach;
 
@@ -7,14 +7,14 @@ use anyhow::{Result, ensure};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
-/// Features that enter the network (`force::features`).
+/// Number of input features (`force::features`).
 pub const INPUTS: usize = 11;
-/// Numbers that leave it and say a force ([`Meaning`]).
+/// Number of outputs that give a force ([`Meaning`]).
 pub const OUTPUTS: usize = hivtac_sensor::force::model::OUTPUTS;
-/// Numbers that leave it after those and say where the tip is, if it tells that.
+/// Number of outputs after those that give the tip's place, in a network of places.
 pub const PLACE_OUTPUTS: usize = hivtac_sensor::force::model::PLACE_OUTPUTS;
 
-/// What the outputs are.
+/// Meaning of the outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Meaning {
@@ -23,8 +23,8 @@ pub enum Meaning {
     ForceVector,
     /// α and β in degrees, |F| in N (the paper's).
     AnglesMagnitude,
-    /// F_x, F_y, F_z in N, and p_x, p_y in mm: the point of the film that the tip is on, by where
-    /// it rests, film frame.
+    /// F_x, F_y, F_z in N, and p_x, p_y in mm: the film's point under the tip, by its rest
+    /// position, film frame.
     ForceAndPlace,
 }
 
@@ -34,18 +34,17 @@ impl Meaning {
         self == Meaning::ForceAndPlace
     }
 
-    /// Whether the force comes as a vector.
+    /// Whether the force is a vector.
     pub fn is_vector(self) -> bool {
         self != Meaning::AnglesMagnitude
     }
 
-    /// How many outputs there are.
+    /// Number of outputs.
     pub fn outputs(self) -> usize {
         self.chip_units().len()
     }
 
-    /// The outputs that mean this force (N), but for its place; a force without size has the
-    /// angles 0.
+    /// The outputs for this force (N), without a place; a zero force has the angles 0.
     pub fn of_force(self, force_n: [f64; 3]) -> [f64; OUTPUTS] {
         match self {
             Meaning::ForceVector | Meaning::ForceAndPlace => force_n,
@@ -53,7 +52,7 @@ impl Meaning {
         }
     }
 
-    /// The force (N) that these outputs mean.
+    /// The force (N) given by these outputs.
     pub fn to_force(self, outputs: [f64; OUTPUTS]) -> [f64; 3] {
         match self {
             Meaning::ForceVector | Meaning::ForceAndPlace => outputs,
@@ -61,7 +60,7 @@ impl Meaning {
         }
     }
 
-    /// The chip's steps (µN, m°, µm) in one unit of each output.
+    /// The chip's steps (µN, m°, µm) per unit of each output.
     pub fn chip_units(self) -> &'static [f64] {
         match self {
             Meaning::ForceVector => &[1e6; 3],
@@ -113,9 +112,9 @@ impl Layer {
     }
 }
 
-/// What is smaller is no deviation but the rounding of a mean.
+/// A smaller deviation is only the rounding of a mean.
 const NO_SIGMA: f64 = 1e-9;
-/// The σ of an answer that does not vary, in N or degrees: smaller than any use, and large enough
+/// The σ of a constant answer, in N or degrees: smaller than any relevant change, and large enough
 /// for the chip's numbers.
 pub(crate) const CONSTANT_ANSWER: f64 = 1e-5;
 
@@ -129,8 +128,8 @@ pub struct Standardization {
 }
 
 impl Standardization {
-    /// Means and population standard deviations of a network's inputs. A component that does not
-    /// vary gets σ = 1, so that it standardizes to zero instead of dividing by zero.
+    /// Means and population standard deviations of a network's inputs. A constant component gets σ
+    /// = 1, and thus standardizes to 0 without a division by 0.
     ///
     /// # Errors
     /// When `rows` is empty.
@@ -138,8 +137,8 @@ impl Standardization {
         Self::with(rows, 1.0)
     }
 
-    /// The same of its answers. One that does not vary gets next to no σ, so that whatever the
-    /// network makes of it comes out as the constant that it is.
+    /// The same for its answers. A constant one gets a tiny σ, so that any output of the network
+    /// results in that constant.
     ///
     /// # Errors
     /// When `rows` is empty.
@@ -189,7 +188,7 @@ impl Standardization {
 /// A network with its input and output scaling: features in pixels to a force in newtons.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Network {
-    /// What its outputs are.
+    /// Meaning of its outputs.
     #[serde(default)]
     pub meaning: Meaning,
     /// How the chip holds its weights.
@@ -201,8 +200,7 @@ pub struct Network {
     pub output: Standardization,
     /// For each hidden layer, the largest activation that the chip can carry (see `quantize`).
     pub activation_max: Vec<f64>,
-    /// Whether activations end there in floats, too, as units that were [split](Network::split)
-    /// need it.
+    /// Whether activations also end there in floats, as [split](Network::split) units require.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub saturates: bool,
     /// The layers, in order.
@@ -210,10 +208,10 @@ pub struct Network {
 }
 
 impl Network {
-    /// Checks that the parts fit each other and that every number is finite.
+    /// Checks that the parts match each other and that every number is finite.
     ///
     /// # Errors
-    /// Says which part does not fit.
+    /// Names the part that is wrong.
     pub fn validate(&self) -> Result<()> {
         let scaling = |s: &Standardization, n: usize| s.mean.len() == n && s.sigma.len() == n;
         ensure!(
@@ -276,7 +274,7 @@ impl Network {
         Ok(())
     }
 
-    /// What a hidden layer makes of its inputs.
+    /// The output of a hidden layer.
     fn activations(&self, layer: usize, x: &[f64]) -> Vec<f64> {
         let limit = match self.saturates {
             true => self.activation_max[layer],
@@ -291,14 +289,14 @@ impl Network {
         self.meaning.to_force(self.predict(features))
     }
 
-    /// The place (mm) of features (px, px²), if the network tells it.
+    /// The place (mm) for features (px, px²); `None` if the network gives no places.
     pub fn place_mm(&self, features: &[f64; INPUTS]) -> Option<[f64; PLACE_OUTPUTS]> {
         let outputs = self.outputs(features);
         let place = outputs.get(OUTPUTS..)?;
         place.try_into().ok()
     }
 
-    /// Features (px, px²) to the outputs that say a force, in the units of their meaning.
+    /// Features (px, px²) to the outputs of the force, in the units of their meaning.
     pub fn predict(&self, features: &[f64; INPUTS]) -> [f64; OUTPUTS] {
         let outputs = self.outputs(features);
         std::array::from_fn(|o| outputs[o])

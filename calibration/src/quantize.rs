@@ -1,9 +1,9 @@
-//! Floats to the chip's integers (`docs/architecture.md`, model file).
+//! Converts a network from floats to the chip's integers (`docs/architecture.md`, model file).
 //!
 //! Weights become integers with a scale for each output (int8 and activations of seven bits, or
-//! int16 and twelve; the first layer and the last are always int16), biases the accumulator's unit,
-//! and what is left a multiplier and a shift. Nothing here but +, −, ×, ÷ and rounding of `f64`, in
-//! a fixed order: the same weights give the same bytes on every machine.
+//! int16 and twelve; the first and the last layer are always int16). Biases take the accumulator's
+//! unit, and the remaining factor becomes a multiplier and a shift. Only +, −, ×, ÷ and rounding of
+//! `f64` are used, in a fixed order: the same weights give the same bytes on every machine.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::features::FEATURES;
@@ -19,7 +19,7 @@ use crate::forward::FilmModel;
 use crate::network::{Layer, Meaning, Network, Standardization};
 use crate::weights::{Uncertainty, Weights};
 
-/// Steps of the network's input in one standard deviation of a feature.
+/// Steps of the network's input per standard deviation of a feature.
 const INPUT_STEPS: f64 = 4096.0;
 /// A pixel in Q16.16.
 const PX: f64 = 65_536.0;
@@ -29,13 +29,13 @@ const LAYER_MULTIPLIER_BITS: u32 = 31;
 const LARGEST_SHIFT: u8 = 62;
 /// Largest |accumulator|.
 const LARGEST_SUM: f64 = i32::MAX as f64;
-/// Largest input of the first layer, and of any other after int8 and after int16 arithmetic. Twelve
-/// bits of activation leave as many to weights at 512 inputs.
+/// Largest input of the first layer, and of any other after int8 and after int16 arithmetic.
+/// Twelve-bit activations leave twelve bits for weights at 512 inputs.
 const LARGEST_INPUT: u16 = 1 << 15;
 const LARGEST_ACTIVATION8: u16 = MAX_ACTIVATION8;
 const LARGEST_ACTIVATION16: u16 = 4095;
 
-/// The model file of a weights file.
+/// The model file made from a weights file.
 ///
 /// # Errors
 /// When a number does not fit its field, or an accumulator could overflow.
@@ -45,7 +45,7 @@ pub fn export(weights: &Weights) -> Result<Vec<u8>> {
         .map_err(|error| anyhow::anyhow!("the network cannot be exported: {error}"))
 }
 
-/// What the model file of a weights file holds.
+/// The content of the model file made from a weights file.
 ///
 /// # Errors
 /// When a number does not fit its field.
@@ -117,12 +117,12 @@ pub(crate) fn input_scaling(input: &Standardization) -> Result<InputScaling> {
     })
 }
 
-/// A layer of integers, and what they stand for.
+/// A layer of integers, and their scales.
 pub(crate) struct QuantizedLayer {
     pub spec: LayerSpec,
-    /// What one step of a weight stands for, for each output.
+    /// The value of one step of a weight, for each output.
     pub scales: Vec<f64>,
-    /// What one step of the layer's input stands for.
+    /// The value of one step of the layer's input.
     pub step: f64,
 }
 
@@ -132,12 +132,12 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
     let mut form = Form {
         step: 1.0 / INPUT_STEPS,
         largest_input: LARGEST_INPUT,
-        // Its inputs have 16 bits, whatever the others have.
+        // Its inputs have 16 bits, whatever width the other layers have.
         width: WeightWidth::Int16,
     };
-    // What takes up a hidden layer, and its largest activation. The output layer has few rows only:
-    // int16 costs nothing there, and spares the last activations and the answer itself the coarse
-    // steps.
+    // Weight width after a hidden layer, and the layer's largest activation. The output layer has
+    // few rows: int16 costs hardly anything there, and avoids coarse steps in the last activations
+    // and in the answer.
     let held = |layer: usize| match network.is_coarse(layer) {
         true => (WeightWidth::Int8, LARGEST_ACTIVATION8),
         false => (WeightWidth::Int16, LARGEST_ACTIVATION16),
@@ -175,17 +175,17 @@ pub(crate) fn layers(network: &Network) -> Result<Vec<QuantizedLayer>> {
     Ok(layers)
 }
 
-/// How a layer is to be held.
+/// The format of a layer.
 #[derive(Clone, Copy)]
 struct Form {
-    /// What one step of the layer's input stands for.
+    /// The value of one step of the layer's input.
     step: f64,
     /// Its input's largest magnitude, in steps.
     largest_input: u16,
     width: WeightWidth,
 }
 
-/// What becomes of y = W·x + b: (y + offset)·factor.
+/// The scaling of a layer's output y = W·x + b: (y + offset)·factor.
 struct Output {
     factor: f64,
     offset: f64,
@@ -229,8 +229,8 @@ fn quantize_layer(
     Ok(QuantizedLayer { spec, scales, step })
 }
 
-/// What one step of a row's weights stands for: as little as the width of a weight and the proof
-/// that no sum can overflow allow, each weight being up to half a step larger than it should.
+/// The value of one step of a row's weights. It is as small as the weights' width and the proof
+/// against overflow allow; rounding may increase each weight by up to half a step.
 fn weight_scale(row: &[f32], bias: f64, form: &Form) -> f64 {
     let sizes = || row.iter().map(|&w| f64::from(w.abs()));
     let largest = sizes().fold(0.0, f64::max);
@@ -244,7 +244,7 @@ fn round_weight(weight: f32, scale: f64, limit: f64) -> i16 {
     (f64::from(weight) / scale).round().clamp(-limit, limit) as i16
 }
 
-/// m and s with m / 2^s nearest to `factor`, m as large as `bits` allow and s at most 62.
+/// m and s with m / 2^s nearest to `factor`; m as large as `bits` allows, and s at most 62.
 fn multiplier_and_shift(factor: f64, bits: u32) -> Result<(u32, u8)> {
     let limit = (1_u64 << bits) as f64;
     ensure!(
@@ -261,8 +261,7 @@ fn multiplier_and_shift(factor: f64, bits: u32) -> Result<(u32, u8)> {
         scaled *= 2.0;
         shift += 1;
     }
-    // What is too small even for 2^-62 rounds to nothing on the chip: the smallest multiplier does
-    // the same.
+    // A factor too small even for 2^-62 gives 0 on the chip; the smallest multiplier does the same.
     Ok((scaled.round().max(1.0) as u32, shift))
 }
 

@@ -1,10 +1,9 @@
-//! What a model's uncertainties are: from the errors that it makes on frames that it was not made
-//! from.
+//! Derives a model's uncertainties from its errors on frames that were not used to make it.
 //!
-//! Errors are larger for some forces than for others and have long tails: the noise of a centroid
-//! depends on its place in the pixel grid, and each session is a little wrong in its own way. So
-//! they are not averaged: over |F|, a table says below what some 96 of 100 errors lie, as the
-//! standard uncertainty of a normal distribution that has its 95 % bound there.
+//! Errors are larger for some forces than for others and have long tails. The noise of a centroid
+//! depends on its place in the pixel grid, and each session has an error of its own. So they are
+//! not averaged. Over |F|, a table holds the limit below which some 96 of 100 errors lie, as the
+//! standard uncertainty of a normal distribution with that 95 % bound.
 
 use anyhow::{Result, ensure};
 use hivtac_sensor::force::model::Uncertainty as ChipUncertainty;
@@ -14,25 +13,25 @@ use crate::data::loads::norm;
 use crate::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use crate::evaluation::errors::angle_deg;
 
-/// The part of the errors that the 95 % bounds hold on the rows that they are made from: a little
-/// more than they promise, for the sessions that come.
+/// The part of errors that the 95 % bounds must contain on the rows that they are made from. It is
+/// a little more than they promise, in view of future sessions.
 const COVERED: f64 = 0.965;
-/// Rows around a knot, by weight, at the least.
+/// The least weight of rows around a knot.
 const FEWEST: f64 = 60.0;
 
 const KNOTS: usize = ChipUncertainty::KNOTS;
 
-/// Standard uncertainties over |F|, as [`hivtac_sensor::force::model::Uncertainty`] has them.
+/// Standard uncertainties over |F|, as in [`hivtac_sensor::force::model::Uncertainty`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Uncertainty {
-    /// The distance of knots is 2 to the power of this, µN.
+    /// The distance between knots is 2 to the power of this, µN.
     pub step_bits: u8,
-    /// Of the force's part across itself at |F| = 0, one distance, two distances …, N.
+    /// Of the force's component across itself, at |F| = 0, one distance, two distances …, N.
     pub across_n: [f64; KNOTS],
-    /// Of |F| there, N.
+    /// Of |F| at the same knots, N.
     pub along_n: [f64; KNOTS],
-    /// Of each coordinate of the place there, mm; 0 in a model that does not tell places.
+    /// Of each coordinate of the place at the same knots, mm; 0 in a model without places.
     #[serde(default, skip_serializing_if = "tells_no_place")]
     pub place_mm: [f64; KNOTS],
 }
@@ -41,24 +40,24 @@ fn tells_no_place(place_mm: &[f64; KNOTS]) -> bool {
     *place_mm == [0.0; KNOTS]
 }
 
-/// What a force is off by.
+/// The error of a force and of its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Miss {
-    /// |F| as it was found, N.
+    /// F| found, N.
     pub found_n: f64,
-    /// The angle between found and true force (radians) times |F| as found, N.
+    /// The angle between found and true force (radians) times |F| found, N.
     pub across_n: f64,
-    /// |F| found less |F| true, without sign, N.
+    /// Absolute value of |F| found minus |F| true, N.
     pub along_n: f64,
-    /// How far the place as found is from the true one, mm; 0 where none is told.
+    /// Distance between the found and the true place, mm; 0 if the model gives none.
     pub place_mm: f64,
 }
 
 impl Miss {
-    /// Of a found and a true force, N.
+    /// From a found and a true force, N.
     pub fn of(found: [f64; 3], truth: [f64; 3]) -> Self {
         let found_n = norm(found);
-        // Where one of them has no size there is no direction to miss.
+        // If one of them has size 0, there is no direction error.
         let angle = angle_deg(found, truth).unwrap_or(0.0).to_radians();
         Self {
             found_n,
@@ -68,14 +67,14 @@ impl Miss {
         }
     }
 
-    /// With a place so far from the true one, mm.
+    /// With a place at this distance from the true one, mm.
     pub fn with_place_mm(self, place_mm: f64) -> Self {
         Self { place_mm, ..self }
     }
 }
 
 impl Uncertainty {
-    /// Of what a model is off by on rows that it was not made from, for forces up to `largest_n`.
+    /// From a model's errors on rows that were not used to make it, for forces up to `largest_n`.
     ///
     /// # Errors
     /// When there is no row.
@@ -100,8 +99,8 @@ impl Uncertainty {
     }
 }
 
-/// Below what [`COVERED`] of the errors near a force lie, rows weighted by how near they are; rows
-/// from farther away where there are few.
+/// The limit below which [`COVERED`] of the errors near a force lie, rows weighted by nearness.
+/// Includes rows from farther away where there are few.
 fn covering(misses: &[Miss], of: fn(&Miss) -> f64, force_n: f64, step_n: f64) -> f64 {
     let all = misses.len() as f64;
     let mut reach = step_n;
@@ -137,8 +136,8 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Errors whose spread changes with |F|, to all sides: across 1 mN at nothing and 3 mN at
-    /// 0.2 N, along a tenth of it.
+    /// Errors in all directions whose spread changes with |F|: across 1 mN at 0 and 3 mN at 0.2 N,
+    /// along a tenth of it.
     fn misses(count: usize) -> Vec<Miss> {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let mut miss = || {
@@ -148,7 +147,7 @@ mod tests {
             let across_n = sigma * rayleigh();
             // A component of a two-dimensional normal distribution of variance 1.
             let along_n = 0.1 * sigma * std::f64::consts::SQRT_2 * rayleigh();
-            // Millimetres of a place as many as millinewtons across.
+            // The place error in millimetres equals the error across in millinewtons.
             let place_mm = 1e3 * std::f64::consts::SQRT_2 * sigma * rayleigh();
             let turn: f64 = random.random_range(0.0..std::f64::consts::TAU);
             Miss {
@@ -165,7 +164,7 @@ mod tests {
     fn it_is_what_a_normal_distribution_with_that_bound_has() {
         let found = Uncertainty::of(&misses(200_000), 0.2).unwrap();
         assert_eq!(found.step_bits, 14, "15 · 16.4 mN are 246 mN");
-        // 96.5 of 100, where the bounds promise 95.
+        // 96.5 of 100, although the bounds promise 95.
         let wider = [
             (-(1.0 - COVERED).ln()).sqrt() / DIRECTION_BOUND,
             2.1084 / MAGNITUDE_BOUND,

@@ -1,5 +1,5 @@
-//! The weights file: a trained network in floats, with all that the exporter needs to make a model
-//! file of it.
+//! The weights file: a trained network in floats, with everything that the exporter needs for a
+//! model file.
 
 use std::{fs, path::Path};
 
@@ -13,26 +13,26 @@ use crate::forward::FilmModel;
 use crate::network::{INPUTS, Network};
 pub use crate::uncertainty::Uncertainty;
 
-/// What the file calls itself.
+/// The file's name of its format.
 const FORMAT: &str = "hivtac-weights 2";
 
-/// A weights file. JSON; its floats are written so that reading gives the same bits.
+/// A weights file: JSON whose floats are written exactly, so that reading gives the same bits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Weights {
     /// Name and version of the format.
     pub format: String,
-    /// What the network was trained for.
+    /// Conditions of the network's training data.
     pub conditions: Conditions,
-    /// The untouched film.
+    /// The rest position.
     pub rest: Rest,
-    /// The forces it was trained for.
+    /// The range of forces that it was trained for.
     pub range: Range,
-    /// How well the quantized network knows forces that it was not trained on.
+    /// Uncertainties of the quantized network on forces that it was not trained on.
     pub uncertainty: Uncertainty,
-    /// How it came to be, for the reader.
+    /// How it was trained, for the reader.
     pub training: Training,
-    /// The film run forwards, which betters the network's answer.
+    /// The film run forwards, which improves the network's answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmModel>,
     /// The network.
@@ -42,25 +42,25 @@ pub struct Weights {
 /// How a network was trained.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Training {
-    /// What the data shows, as its file says.
+    /// Description of the data, from its file.
     pub scene: String,
     /// Seed of the data.
     pub data_seed: u64,
     /// Rows trained on.
     pub rows: usize,
-    /// Seed of first weights, shuffling and the choice of what was held out.
+    /// Seed of first weights, shuffling and the choice of held-out rows.
     pub seed: u64,
     /// Passes over the data in floats.
     pub epochs: usize,
     /// Passes with the chip's rounding.
     pub rounded_epochs: usize,
-    /// What was held out together; `within-pose` for single rows.
+    /// The unit of the split; `within-pose` for single rows.
     #[serde(default)]
     pub split: String,
 }
 
 impl Weights {
-    /// The name that a file of this version carries.
+    /// The name of this version's format.
     pub fn format() -> String {
         FORMAT.into()
     }
@@ -68,8 +68,8 @@ impl Weights {
     /// Reads and checks a weights file.
     ///
     /// # Errors
-    /// When it cannot be read, is not a weights file of this version, or its parts do not fit each
-    /// other.
+    /// When it cannot be read, is not a weights file of this version, or its parts do not match
+    /// each other.
     pub fn load(path: &Path) -> Result<Self> {
         let text =
             fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
@@ -80,7 +80,7 @@ impl Weights {
     /// Reads and checks the text of a weights file.
     ///
     /// # Errors
-    /// When it is not a weights file of this version, or its parts do not fit each other.
+    /// When it is not a weights file of this version, or its parts do not match each other.
     pub fn parse(text: &str) -> Result<Self> {
         let weights: Self = serde_json::from_str(text)?;
         ensure!(
@@ -92,10 +92,10 @@ impl Weights {
         Ok(weights)
     }
 
-    /// Checks that the parts fit each other and that every number is in range.
+    /// Checks that the parts match each other and that every number is in range.
     ///
     /// # Errors
-    /// Says which part is wrong.
+    /// Names the part that is wrong.
     pub fn check(&self) -> Result<()> {
         self.network.validate()?;
         if let Some(film) = &self.film {
@@ -108,8 +108,8 @@ impl Weights {
         self.check_numbers()
     }
 
-    /// The force (N) of features (px) that were taken from the same rest position, without the
-    /// chip's rounding.
+    /// The force (N) for features (px) relative to the same rest position, without the chip's
+    /// rounding.
     pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
         self.network.force_n(features)
     }

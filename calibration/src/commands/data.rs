@@ -1,4 +1,4 @@
-//! Rendered data sets.
+//! The command that renders data sets.
 
 use std::path::PathBuf;
 
@@ -27,7 +27,7 @@ impl DatasetArgs {
     }
 }
 
-/// Renders a data set without a file.
+/// Renders a data set without writing a file.
 pub fn rendered(recipe: &Recipe) -> Result<Dataset> {
     let bar = bar("rendering", recipe.rows());
     let dataset = generate(recipe, || bar.inc(1))?;

@@ -1,4 +1,4 @@
-//! The model that firmware and host tool embed.
+//! The command that makes the model embedded in firmware and host tool.
 
 use std::path::PathBuf;
 
@@ -15,7 +15,7 @@ use super::data::rendered;
 use super::model::{CheckArgs, exported};
 use super::network::trained;
 
-/// Gauss–Newton steps.
+/// Number of Gauss–Newton steps.
 const STEPS: u8 = 1;
 
 /// Options of `default-model`.

@@ -1,4 +1,4 @@
-//! Model files: made, and judged.
+//! The commands that make and judge model files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,9 +12,9 @@ use hivtac_calibration::progress::bar;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 
-/// Frames that are checked.
+/// Number of frames in a check.
 const CHECKED: usize = 4000;
-/// Decides their loads and noise: no training data has it.
+/// Seed of their loads and noise; no training data uses it.
 const CHECK_SEED: u64 = 1_000_001;
 
 /// Options of `export`.
@@ -96,7 +96,7 @@ pub struct CheckArgs {
 }
 
 impl CheckArgs {
-    /// Of a model, with the usual number of frames.
+    /// The check of a model with the default number of frames.
     pub fn of(model: PathBuf) -> Self {
         Self {
             model,

@@ -1,4 +1,4 @@
-//! Weights files: a network, the film beside it, a unit's own.
+//! The commands that make weights files: a network, its film, a unit's own.
 
 use std::path::PathBuf;
 

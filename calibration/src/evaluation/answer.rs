@@ -1,4 +1,4 @@
-//! What the chip says of a row of a data set.
+//! Computes the chip's answer to a row of a data set.
 
 use anyhow::Result;
 use hivtac_sensor::force::features::Features;
@@ -46,7 +46,7 @@ impl<'m> Chip<'m> {
         self.areas_px
     }
 
-    /// The force that it says of what was seen, and how far to trust it.
+    /// The chip's force for an observation, and its status bits.
     ///
     /// # Errors
     /// When the features do not fit the chip's numbers.
@@ -55,7 +55,8 @@ impl<'m> Chip<'m> {
         Ok((force, status))
     }
 
-    /// The same, and how often the film was run forwards for it: 0 by a model that takes no steps.
+    /// The same, and the number of evaluations of the film model: 0 for a model without
+    /// Gauss–Newton steps.
     ///
     /// # Errors
     /// When the features do not fit the chip's numbers.

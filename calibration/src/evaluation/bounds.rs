@@ -1,4 +1,4 @@
-//! What standard uncertainties promise: 95 % bounds.
+//! Factors from standard uncertainties to 95 % bounds.
 
 /// The 95 % bound of a direction over its standard uncertainty: √(−ln 0.05), for a root mean square
 /// over two dimensions.

@@ -1,5 +1,5 @@
-//! A quick check of a model file: frames that no training saw, through the whole pipeline, against
-//! the truth.
+//! Quickly checks a model file: frames outside its training go through the whole pipeline and are
+//! compared with the truth.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -18,24 +18,24 @@ use crate::data::dataset::{Loads, Recipe, measure, reasons};
 use crate::data::range::Range;
 use crate::evaluation::errors::{Errors, WEAK_N};
 
-/// What a check found.
+/// The result of a check.
 #[derive(Clone, Debug)]
 pub struct Report {
-    /// The model: its widths and preset, and what its numbers mean.
+    /// The model: its widths and preset, and the meaning of its outputs.
     pub model: String,
-    /// What the frames' labels mean.
+    /// Meaning of the frames' labels.
     pub contact: Contact,
-    /// Errors of all frames that gave a force, those that carry a warning included.
+    /// Errors of all frames with a force, including those with a warning.
     pub errors: Errors,
-    /// Frames that gave no force, by status.
+    /// Frames without a force, by status.
     pub rejected: BTreeMap<String, usize>,
 }
 
-/// Renders `samples` frames of random loads inside the model's calibrated range and lets the
+/// Renders `samples` frames of random loads inside the model's calibrated range, and lets the
 /// pipeline measure them.
 ///
 /// # Errors
-/// When the bytes are no model, or the model is for conditions that cannot be rendered.
+/// When the bytes are not a model, or its conditions cannot be rendered.
 pub fn check(
     model: &[u8],
     samples: usize,
@@ -69,7 +69,7 @@ pub fn check(
         match found {
             Ok(found) => {
                 report.errors.add(vector_n(found), truth.vector_n());
-                // A weak press has no place worth telling.
+                // The place of a weak press is too uncertain to count.
                 let place = found.place.filter(|_| truth.magnitude_n() >= WEAK_N);
                 if let Some(place) = place {
                     let found_mm = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
@@ -82,10 +82,10 @@ pub fn check(
     Ok(report)
 }
 
-/// Random loads inside what the model says it can do.
+/// Random loads inside the model's calibrated range.
 ///
 /// # Errors
-/// When the model does not hold all that its frames depend on.
+/// When the model lacks some of the conditions that its frames depend on.
 pub fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
     let geometry = model.conditions.geometry;
     let range = Range {
@@ -117,10 +117,10 @@ pub fn recipe(model: &Model<'_>, samples: usize, seed: u64) -> Result<Recipe> {
     })
 }
 
-/// A sensor with a model, for frames as they are rendered.
+/// A sensor with a model, for rendered frames.
 ///
 /// # Errors
-/// When the model is none for this sensing.
+/// When the model is invalid for this sensing.
 pub fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
     let mut sensor = Box::new(Sensor::new());
     let settings = model.conditions.settings(ByteOrder::Native);
@@ -130,7 +130,7 @@ pub fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
     Ok(sensor)
 }
 
-/// The force's vector in N, rebuilt from its angles: this holds for every contact reading.
+/// The force's vector in N, computed from its angles: valid for every contact reading.
 pub fn vector_n(force: Force) -> [f64; 3] {
     let degrees = |angle: i32| (f64::from(angle) / 1e3).to_radians();
     let (sin_a, cos_a) = degrees(force.alpha.0).sin_cos();

@@ -1,4 +1,4 @@
-//! Whether the uncertainties that come with every force are honest.
+//! Checks whether the stated uncertainties of forces hold.
 
 use super::Judged;
 use crate::data::loads::norm;
@@ -17,10 +17,10 @@ pub struct Coverage {
     pub magnitude: Covered,
 }
 
-/// How stated bounds and errors compare.
+/// Comparison of stated bounds and errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Covered {
-    /// Part of the frames whose error is no larger than the 95 % bound that was stated for it.
+    /// Part of the frames whose error does not exceed its stated 95 % bound.
     pub within: f64,
     /// Median of the stated bounds.
     pub bound: f64,
@@ -28,8 +28,8 @@ pub struct Covered {
     pub error: f64,
 }
 
-/// The coverage of each tenth of the frames, from the weakest forces to the strongest; none when
-/// there are fewer than ten.
+/// The coverage of each tenth of the frames, from the weakest forces to the strongest; empty for
+/// fewer than ten frames.
 pub fn coverage(frames: &[Judged]) -> Vec<Coverage> {
     let mut sorted: Vec<&Judged> = frames.iter().collect();
     sorted.sort_by(|a, b| norm(a.truth).total_cmp(&norm(b.truth)));
@@ -54,7 +54,7 @@ fn of_part(frames: &[&Judged]) -> Option<Coverage> {
     })
 }
 
-/// Of errors and their bounds.
+/// From pairs of error and bound.
 fn covered(errors: impl ExactSizeIterator<Item = (f64, f64)> + Clone) -> Covered {
     let count = errors.len() as f64;
     let within = errors
@@ -80,7 +80,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Errors that are as large as stated, to all sides: 95 of 100 lie within.
+    /// Errors as large as stated, in all directions: 95 of 100 lie within their bounds.
     #[test]
     fn an_honest_bound_holds_for_95_of_100() {
         let mut random = ChaCha8Rng::seed_from_u64(4);
@@ -113,7 +113,7 @@ mod tests {
             for covered in [part.direction, part.magnitude] {
                 assert!((0.935..0.965).contains(&covered.within), "{part:?}");
             }
-            // For the medians: √(ln 20 / ln 2), and 1.960 / 0.674.
+            // Expected ratio of the medians: √(ln 20 / ln 2), and 1.960 / 0.674.
             let ratio = |covered: Covered| covered.bound / covered.error;
             assert!((1.8..2.4).contains(&ratio(part.direction)), "{part:?}");
             assert!((2.6..3.3).contains(&ratio(part.magnitude)), "{part:?}");

@@ -1,12 +1,11 @@
-//! How far forces are from the truth.
+//! Sums up errors of forces and places.
 
 use crate::data::loads::norm;
 
-/// Below this |F| the direction of a force is told separately (N; the paper's Section 7 does the
-/// same).
+/// Below this |F|, N, direction errors are reported separately, as in the paper's Section 7.
 pub const WEAK_N: f64 = 0.05;
 
-/// Sums of errors; forces in N, film frame.
+/// Collected errors; forces in N, film frame.
 #[derive(Clone, Debug, Default)]
 pub struct Errors {
     directions_deg: Vec<f64>,
@@ -39,7 +38,8 @@ impl MeanSquare {
 }
 
 impl Errors {
-    /// Takes one force with its truth. A force without size has no direction and counts for none.
+    /// Adds a force with its truth. A force of size 0 has no direction, and adds no direction
+    /// error.
     pub fn add(&mut self, found: [f64; 3], truth: [f64; 3]) {
         self.magnitude.add(norm(found) - norm(truth));
         self.lateral.add(found[0] - truth[0]);
@@ -53,24 +53,24 @@ impl Errors {
         }
     }
 
-    /// Takes a place with its truth, mm; both coordinates count.
+    /// Adds a place with its truth, mm; both coordinates count.
     pub fn add_place(&mut self, found_mm: [f64; 2], truth_mm: [f64; 2]) {
         for (found, truth) in found_mm.iter().zip(truth_mm) {
             self.place.add(found - truth);
         }
     }
 
-    /// Root mean square error of a place's coordinates, mm; `None` when no place was taken.
+    /// Root mean square error of a place's coordinates, mm; `None` without places.
     pub fn place_rmse_mm(&self) -> Option<f64> {
         (self.place.count > 0).then(|| self.place.root())
     }
 
-    /// How many forces were taken.
+    /// Number of forces.
     pub fn count(&self) -> usize {
         self.normal.count
     }
 
-    /// Mean angle between found and true force, degrees; not a number when there is none.
+    /// Mean angle between found and true force, degrees; NaN without one.
     pub fn mean_direction_deg(&self) -> f64 {
         mean(self.directions_deg.iter().copied())
     }
@@ -80,7 +80,7 @@ impl Errors {
         mean(self.strong_directions_deg.iter().copied())
     }
 
-    /// How many true forces were at least [`WEAK_N`].
+    /// Number of true forces of at least [`WEAK_N`].
     pub fn strong_count(&self) -> usize {
         self.strong_directions_deg.len()
     }
@@ -101,13 +101,13 @@ impl Errors {
     }
 }
 
-/// The mean of some values; not a number when there is none.
+/// The mean of some values; NaN without values.
 pub fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (sum, count) = values.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
     sum / count
 }
 
-/// The angle between two forces in degrees, exact for small ones too; `None` when one has no size.
+/// The angle between two forces in degrees, exact for small ones as well; `None` if one has size 0.
 pub fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
     let cross = [
         a[1] * b[2] - a[2] * b[1],

@@ -1,4 +1,4 @@
-//! The paper's figures 11 to 13 as SVG.
+//! Draws the paper's figures 11 to 13 as SVG.
 
 use std::collections::BTreeMap;
 
@@ -9,11 +9,11 @@ use crate::evaluation::plot::{Axis, COLOURS, Plot, Scale};
 
 /// The most points of a scatter plot.
 const MOST_POINTS: usize = 2500;
-/// What is drawn: name, unit, and how many of that unit are in a degree or newton.
+/// The drawn quantities: name, unit, and that unit's number per degree or newton.
 const QUANTITIES: [(&str, &str, f64); 3] = [("α", "°", 1.0), ("β", "°", 1.0), ("|F|", "mN", 1e3)];
 const BARS: usize = 41;
 
-/// Every so many frames, so that few enough are drawn.
+/// Every n-th frame, so that at most [`MOST_POINTS`] are drawn.
 fn thinned<'a>(frames: &[&'a Judged]) -> Vec<&'a Judged> {
     let step = frames.len().div_ceil(MOST_POINTS).max(1);
     frames.iter().step_by(step).copied().collect()
@@ -27,7 +27,7 @@ pub(super) fn found_against_true(frames: &[Judged]) -> Vec<String> {
             .iter()
             .map(|f| (scale * f.truth_polar[i], scale * f.found_polar[i]))
             .collect();
-        // Weak forces have wild angles: the axes are those of the truth, a little wider.
+        // Weak forces have wildly varying angles: the axes cover the truth with a small margin.
         let axis = |label: &str| {
             let mut axis = Axis::over(label, points.iter().map(|p| p.0), Scale::Linear);
             let margin = 0.1 * (axis.range[1] - axis.range[0]);
@@ -79,7 +79,7 @@ pub(super) fn pose_maps(averages: &BTreeMap<usize, [f64; 3]>) -> Vec<String> {
     QUANTITIES.iter().enumerate().map(one).collect()
 }
 
-/// White for nothing, red for 1, blue for −1.
+/// White for 0, red for 1, blue for −1.
 fn colour(part: f64) -> String {
     let pale = |to: f64| (255.0 + part.abs().min(1.0) * (to - 255.0)).round() as u8;
     let [r, g, b] = if part > 0.0 {
@@ -90,13 +90,12 @@ fn colour(part: f64) -> String {
     format!("#{:02x}{:02x}{:02x}", pale(r), pale(g), pale(b))
 }
 
-/// Figure 12 d–f: how often which average error of a pose is found, or without poses which error of
-/// a frame.
+/// Figure 12 d–f: histograms of each pose's average error, or of each frame's error without poses.
 pub(super) fn histograms(values: &[[f64; 3]], of: &str) -> Vec<String> {
     let one = |(i, (name, unit, scale)): (usize, &(&str, &str, f64))| {
         let mut sizes: Vec<f64> = values.iter().map(|v| (scale * v[i]).abs()).collect();
         sizes.sort_unstable_by(f64::total_cmp);
-        // What lies beyond the last hundredth counts in the outermost bars.
+        // Errors beyond the 99th percentile count in the outermost bars.
         let limit = sizes
             .get(sizes.len() * 99 / 100)
             .copied()
@@ -130,7 +129,7 @@ pub(super) fn histograms(values: &[[f64; 3]], of: &str) -> Vec<String> {
     QUANTITIES.iter().enumerate().map(one).collect()
 }
 
-/// Figure 13: error against |F|, at the paper's four poses, or without poses over all frames.
+/// Figure 13: error against |F|, at the paper's four poses, or over all frames without poses.
 pub(super) fn error_against_force(frames: &[Judged]) -> Vec<String> {
     let near = |alpha: f64, beta: f64| -> Vec<&Judged> {
         let there = |pose: usize| PaperPoses::angles_deg(pose) == [alpha, beta];

@@ -1,4 +1,4 @@
-//! The model's answers beside the truth.
+//! Compares a model's answers with the truth.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
@@ -15,24 +15,24 @@ use crate::data::loads::{from_polar, polar};
 use crate::evaluation::answer::Chip;
 use crate::evaluation::errors::angle_deg;
 
-/// One answer with its truth. Angles in degrees, forces in N.
+/// One answer with its truth; angles in degrees, forces in N.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judged {
-    /// (F_x, F_y, F_z) that pressed, as labelled.
+    /// The labelled force (F_x, F_y, F_z).
     pub truth: [f64; 3],
-    /// α, β and |F| that pressed.
+    /// α, β and |F| of the labelled force.
     pub truth_polar: [f64; 3],
-    /// α, β and |F| that the model gives.
+    /// α, β and |F| of the model's answer.
     pub found_polar: [f64; 3],
     /// The angle between both forces.
     pub direction_deg: f64,
-    /// The standard uncertainty of the direction that came with the force, degrees.
+    /// Stated standard uncertainty of the direction, degrees.
     pub direction_sigma_deg: f64,
-    /// The standard uncertainty of |F| that came with it, N.
+    /// Stated standard uncertainty of |F|, N.
     pub magnitude_sigma_n: f64,
-    /// Where the tip was, mm, where that is known.
+    /// The tip's place, mm, if known.
     pub tip_mm: Option<[f64; 2]>,
-    /// Where the model says it was, and the standard uncertainty of each coordinate, mm.
+    /// The model's place, and the standard uncertainty of each coordinate, mm.
     pub found_place: Option<([f64; 2], f64)>,
     /// The session.
     pub session: usize,
@@ -45,13 +45,13 @@ pub struct Judged {
 pub struct Evaluation {
     /// The model's name and identity.
     pub model: String,
-    /// What the frames are, in words.
+    /// Description of the frames, in words.
     pub frames: String,
-    /// Whether they were measured with a unit rather than simulated.
+    /// True for frames of a real unit, false for simulated ones.
     pub measured: bool,
     /// The contact reading.
     pub contact: Contact,
-    /// Frames with a force and an answer, warnings included.
+    /// Frames with a force and an answer, including those with a warning.
     pub judged: Vec<Judged>,
     /// Frames without an answer, by status.
     pub rejected: BTreeMap<String, usize>,
@@ -62,8 +62,8 @@ impl Evaluation {
     /// tared.
     ///
     /// # Errors
-    /// When the bytes are no model, it is for other conditions than the data's, or there is no such
-    /// row.
+    /// When the bytes are not a model, its conditions differ from the data's, or there are no such
+    /// rows.
     pub fn of(model: &[u8], dataset: &Dataset) -> Result<Self> {
         let model =
             Model::parse(model).map_err(|error| anyhow!("not a usable model file: {error}"))?;
@@ -97,8 +97,8 @@ impl Evaluation {
     }
 }
 
-/// The answers to all rows, each session tared on its own frames without force; those that the chip
-/// sends without a force are counted by status.
+/// The answers to all rows, each session tared on its own frames without force. Answers without a
+/// force are counted by status.
 fn judge(
     model: &Model<'_>,
     dataset: &Dataset,
@@ -135,7 +135,7 @@ fn compare(row: &Row, force: &Force) -> Judged {
         f64::from(force.beta.0) / 1e3,
         f64::from(force.magnitude.0) / 1e6,
     ];
-    // An answer without size has no direction: it is as far off as one can be on average.
+    // An answer of size 0 has no direction: its error counts as 90°, the mean over all directions.
     let direction_deg = angle_deg(from_polar(found_polar), truth).unwrap_or(90.0);
     Judged {
         truth,

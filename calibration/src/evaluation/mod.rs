@@ -1,13 +1,13 @@
-//! What a model makes of a data set, or of frames rendered anew: how far its forces are from the
-//! truth, and whether its uncertainties hold.
+//! Evaluates a model on a data set or on newly rendered frames: the errors of its forces, and
+//! whether its uncertainties hold.
 //!
 //! | file | subject |
 //! |---|---|
-//! | `answer` | what the chip says of a row of a data set |
-//! | `judge` | its answers to a whole data set, beside the truth |
-//! | `numbers`, `figures`, `places`, `report` | of these, the paper's numbers and figures (Section 7.1), with confidence intervals, as one HTML file |
-//! | `bounds`, `coverage` | what stated uncertainties promise, and whether they keep it |
-//! | `check`, `errors` | frames rendered anew, through the whole pipeline |
+//! | `answer` | the chip's answer to a row of a data set |
+//! | `judge` | its answers to a whole data set, compared with the truth |
+//! | `numbers`, `figures`, `places`, `report` | the paper's numbers and figures (Section 7.1) of these |
+//! | `bounds`, `coverage` | the 95 % bounds of stated uncertainties, and whether they hold |
+//! | `check`, `errors` | newly rendered frames, through the whole pipeline |
 //! | `plot` | SVG |
 
 pub mod answer;

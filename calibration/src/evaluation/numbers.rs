@@ -1,4 +1,4 @@
-//! Numbers of an evaluation, with confidence intervals.
+//! Computes the numbers of an evaluation, with confidence intervals.
 
 use std::collections::BTreeMap;
 
@@ -10,7 +10,7 @@ use super::Judged;
 /// Resamples of the bootstrap.
 const RESAMPLES: usize = 1000;
 
-/// A number with the interval that holds 95 % of its resamples.
+/// A number with the interval that contains 95 % of its resamples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
     /// The number.
@@ -19,10 +19,10 @@ pub struct Interval {
     pub range: [f64; 2],
 }
 
-/// Numbers of some of the frames.
+/// Numbers of a selection of the frames.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers {
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
     /// Mean angle between found and true force, degrees.
     pub direction_deg: Interval,
@@ -44,7 +44,7 @@ pub struct Numbers {
     pub force_worst_n: f64,
 }
 
-/// What is summed over the frames of a group that is resampled together.
+/// The number of sums over a group of frames that is resampled together.
 const SUMS: usize = 8;
 
 fn sums_of(frame: &Judged) -> [f64; SUMS] {
@@ -62,14 +62,14 @@ fn sums_of(frame: &Judged) -> [f64; SUMS] {
     ]
 }
 
-/// Found less true: α, β (degrees), |F| (N).
+/// Found minus true: α, β (degrees), |F| (N).
 pub(super) fn errors(frame: &Judged) -> [f64; 3] {
     std::array::from_fn(|i| frame.found_polar[i] - frame.truth_polar[i])
 }
 
 impl Numbers {
-    /// Of frames; `None` when there are none. Frames of a pose are resampled together, because they
-    /// share what is wrong there; without poses each frame is by itself.
+    /// Of frames; `None` without frames. Frames of a pose are resampled together, because they
+    /// share that pose's error; without poses, each frame alone.
     pub fn of<'a>(frames: impl Iterator<Item = &'a Judged>, seed: u64) -> Option<Self> {
         let mut groups: BTreeMap<usize, [f64; SUMS]> = BTreeMap::new();
         let (mut count, mut direction_worst_deg, mut force_worst_n) = (0, 0.0_f64, 0.0_f64);
@@ -143,10 +143,10 @@ fn means<'a>(groups: impl Iterator<Item = &'a [f64; SUMS]>) -> [f64; SUMS - 1] {
     means
 }
 
-/// The paper's kind of numbers: errors averaged over each pose.
+/// Numbers as the paper gives them: errors averaged over each pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseNumbers {
-    /// Poses.
+    /// Number of poses.
     pub poses: usize,
     /// Largest |average error| of α, β (degrees), |F| (N).
     pub worst: [f64; 3],
@@ -230,8 +230,8 @@ mod tests {
         assert!(Numbers::of([].iter(), 1).is_none() && PoseNumbers::of(&BTreeMap::new()).is_none());
     }
 
-    /// The mean of 400 uniform numbers strays by 0.0144: the interval must be about 2 · 1.96 times
-    /// that wide.
+    /// The mean of 400 uniform numbers has a standard deviation of 0.0144: the interval must be
+    /// about 2 · 1.96 times as wide.
     #[test]
     fn intervals_are_as_wide_as_theory_says() {
         let mut random = ChaCha8Rng::seed_from_u64(8);

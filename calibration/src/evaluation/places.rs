@@ -1,28 +1,28 @@
-//! How good answers are where the tip is off the film's middle.
+//! Computes errors by the tip's distance from the film's middle.
 
 use super::Judged;
 use crate::data::loads::norm;
 use crate::evaluation::bounds::PLACE_BOUND;
 use crate::evaluation::errors::{WEAK_N, mean};
 
-/// Distances from the middle that are told apart, mm.
+/// Limits of the rings of distance from the middle, mm.
 const RINGS_MM: [f64; 6] = [0.0, 1.0, 2.0, 3.0, 4.0, f64::INFINITY];
-/// Forces that are told apart, N, each with what is this part of it larger or smaller.
+/// Sizes of forces for which errors are computed, N, and the width of each, ± in parts of it.
 const SIZES_N: [f64; 3] = [0.05, 0.1, 0.2];
 const NEAR: f64 = 0.1;
 
-/// Errors of some of the frames whose place is known.
+/// Errors of a selection of the frames with a known place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlaceNumbers {
-    /// Which frames, in words.
+    /// The selection, in words.
     pub name: String,
-    /// How many.
+    /// Number of frames.
     pub frames: usize,
     /// Root mean square of the angle between found and true force, degrees.
     pub direction_deg: f64,
     /// Root mean square error of |F|, N.
     pub magnitude_n: f64,
-    /// Of the place; `None` from a model that does not tell it.
+    /// Errors of the place; `None` for a model without places.
     pub place: Option<PlaceErrors>,
 }
 
@@ -31,12 +31,12 @@ pub struct PlaceNumbers {
 pub struct PlaceErrors {
     /// Root mean square error of p_x and p_y, mm.
     pub each_mm: f64,
-    /// Part of the frames whose place is no farther off than the 95 % bound that was stated for it.
+    /// Part of the frames whose place error does not exceed its stated 95 % bound.
     pub within: f64,
 }
 
-/// The numbers by distance from the middle, from [`WEAK_N`] up, and by size of the force; parts
-/// without a frame are left out, and so are all when no place is known.
+/// The numbers by distance from the middle, from [`WEAK_N`] up, and by size of the force. Omits
+/// selections without a frame; empty when no place is known.
 pub fn by_place(frames: &[Judged]) -> Vec<PlaceNumbers> {
     let known = || frames.iter().filter_map(|f| Some((f, f.tip_mm?)));
     let weak = WEAK_N * 1e3;

@@ -1,39 +1,39 @@
-//! Plots as SVG: axes with numbers, lines and points. No text is taken from outside but through
+//! Draws plots as SVG: axes with numbers, lines and points. All text from outside passes through
 //! [`escaped`].
 
 use std::fmt::Write;
 
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 400.0;
-/// Left, right, top, bottom.
+/// Left, right, top, bottom; px.
 const MARGIN: [f64; 4] = [70.0, 16.0, 34.0, 48.0];
-/// Colours that differ for all eyes (Okabe and Ito 2008).
+/// Colours that colour-blind readers can distinguish (Okabe and Ito 2008).
 pub const COLOURS: [&str; 6] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
 ];
 
-/// How numbers lie on an axis.
+/// The scale of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scale {
-    /// Evenly.
+    /// Linear.
     Linear,
-    /// By powers of ten; what is not above zero is left out.
+    /// By powers of ten; omits numbers that are not above 0.
     Log,
 }
 
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it shows, with the unit.
+    /// The quantity, with its unit.
     pub label: String,
     /// Its ends.
     pub range: [f64; 2],
-    /// How numbers lie on it.
+    /// Its scale.
     pub scale: Scale,
 }
 
 impl Axis {
-    /// An axis over all of `values`, at least a little wide.
+    /// An axis over all of `values`, with a least width.
     pub fn over(label: &str, values: impl IntoIterator<Item = f64>, scale: Scale) -> Self {
         let usable = |v: &f64| v.is_finite() && (scale == Scale::Linear || *v > 0.0);
         let (low, high) = values
@@ -56,7 +56,7 @@ impl Axis {
         }
     }
 
-    /// Where a number lies between the ends, 0 to 1.
+    /// Position of a number between the ends, 0 to 1; `None` outside.
     fn place(&self, value: f64) -> Option<f64> {
         let [low, high] = self.range;
         let part = match self.scale {
@@ -66,7 +66,7 @@ impl Axis {
         (part.is_finite() && (-1e-9..=1.0 + 1e-9).contains(&part)).then_some(part)
     }
 
-    /// Numbers to write beside the axis.
+    /// Numbers to write along the axis.
     fn ticks(&self) -> Vec<f64> {
         let [low, high] = self.range;
         match self.scale {
@@ -93,7 +93,7 @@ fn nice_step(step: f64) -> f64 {
     factor.unwrap_or(10.0) * power
 }
 
-/// A plot in the making.
+/// A plot under construction.
 pub struct Plot {
     x: Axis,
     y: Axis,
@@ -123,12 +123,12 @@ impl Plot {
         ))
     }
 
-    /// Names a colour in the legend.
+    /// Adds a colour to the legend.
     pub fn name(&mut self, name: &str, colour: &'static str) {
         self.legend.push((name.into(), colour));
     }
 
-    /// A line through points; those outside the axes interrupt it.
+    /// A line through points; points outside the axes interrupt it.
     pub fn line(&mut self, points: &[(f64, f64)], colour: &str) {
         let placed: Vec<_> = points.iter().map(|&(x, y)| self.at(x, y)).collect();
         for part in placed.split(Option::is_none).filter(|part| part.len() > 1) {
@@ -157,7 +157,7 @@ impl Plot {
         self.body.push_str("</g>\n");
     }
 
-    /// A filled rectangle between two corners, cut at the axes' ends.
+    /// A filled rectangle between two corners, clipped at the axes' ends.
     pub fn rectangle(&mut self, from: (f64, f64), to: (f64, f64), colour: &str, hint: &str) {
         let cut = |axis: &Axis, v: f64| v.clamp(axis.range[0], axis.range[1]);
         let corner = |p: (f64, f64)| self.at(cut(&self.x, p.0), cut(&self.y, p.1));
@@ -175,7 +175,7 @@ impl Plot {
         );
     }
 
-    /// The picture.
+    /// The finished picture.
     pub fn to_svg(&self) -> String {
         let mut svg = format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" \
@@ -252,7 +252,7 @@ fn number(value: f64) -> String {
     }
 }
 
-/// Text that means nothing to a reader of SVG or HTML.
+/// Text with the special characters of SVG and HTML escaped.
 pub fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")

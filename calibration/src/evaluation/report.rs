@@ -1,4 +1,4 @@
-//! An evaluation as one HTML file, and as lines for a terminal.
+//! Writes an evaluation as one HTML file, and as lines for a terminal.
 
 use std::fmt::{self, Write};
 
@@ -21,7 +21,7 @@ td:first-child,th:first-child{text-align:left}svg{max-width:32%;height:auto}smal
 const SEED: u64 = 1;
 
 impl Evaluation {
-    /// Numbers of all frames, of those below and of those from 50 mN up.
+    /// Numbers of all frames, of those below 50 mN, and of those from 50 mN up.
     pub fn groups(&self) -> [(&'static str, Option<Numbers>); 3] {
         let part = |keep: fn(&&Judged) -> bool| Numbers::of(self.judged.iter().filter(keep), SEED);
         [
@@ -31,7 +31,7 @@ impl Evaluation {
         ]
     }
 
-    /// What this is and is not.
+    /// Describes what the evaluation shows, and what it does not.
     pub fn sentence(&self) -> String {
         if self.measured {
             return format!(
@@ -54,7 +54,7 @@ impl Evaluation {
         )
     }
 
-    /// One HTML file with its pictures inside.
+    /// The evaluation as one HTML file with embedded pictures.
     pub fn to_html(&self) -> String {
         let averages = by_pose(&self.judged);
         let mut html = format!(
@@ -164,7 +164,7 @@ fn cell(text: Option<String>) -> String {
     )
 }
 
-/// How often direction and size lie within the 95 % bounds that come with them.
+/// How often direction and size lie within their stated 95 % bounds.
 fn push_coverage(html: &mut String, frames: &[Judged]) {
     html.push_str(
         "<h2>Are the stated uncertainties honest?</h2><table><tr><th>|F|, mN (a tenth of the \
@@ -193,7 +193,7 @@ fn push_coverage(html: &mut String, frames: &[Judged]) {
     html.push_str("</table>\n");
 }
 
-/// What is told of places: their errors, and how often they lie within their stated 95 % bound.
+/// Errors of places, and how often they lie within their stated 95 % bound; `None` without places.
 fn place_cells(part: &PlaceNumbers) -> Option<[String; 2]> {
     let place = part.place?;
     Some([
@@ -202,7 +202,7 @@ fn place_cells(part: &PlaceNumbers) -> Option<[String; 2]> {
     ])
 }
 
-/// How good answers are off the middle; nothing where no place is known.
+/// Errors away from the middle; writes nothing when no place is known.
 fn push_places(html: &mut String, parts: &[PlaceNumbers]) {
     if parts.is_empty() {
         return;
@@ -228,7 +228,7 @@ fn push_places(html: &mut String, parts: &[PlaceNumbers]) {
     html.push_str("</table>\n");
 }
 
-/// The paper's numbers (abstract and Section 7.1) beside ours.
+/// The paper's numbers (abstract and Section 7.1) next to ours.
 fn push_paper(html: &mut String, evaluation: &Evaluation, poses: Option<PoseNumbers>) {
     let all = &evaluation.groups()[0].1;
     let frame = |value: Value| all.as_ref().map(value);

@@ -1,5 +1,5 @@
-//! From a data set to a weights file: split, fit, and measure what the chip makes of it on what was
-//! held out.
+//! Fits a network to a data set and makes a weights file: splits, trains, and measures the chip's
+//! errors on held-out rows.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_sensor::force::features::Features;
@@ -17,18 +17,17 @@ use crate::train::{Options, Progress, Samples, train};
 use crate::uncertainty::Miss;
 use crate::weights::{Training, Uncertainty, Weights};
 
-/// What was held out together, in files: single rows, whatever their pose.
+/// The unit of the split, in files: single rows, whatever their pose.
 const WITHIN_POSE: &str = "within-pose";
 
 /// The fewest accepted rows to train on.
 const FEWEST_ROWS: usize = 20;
 
-/// A fitted model, with its errors on the rows that were held out and lie inside the calibrated
-/// range. Its uncertainties are from all that were held out, so that they are known up to the
-/// range's end.
+/// A fitted model, with its errors on the held-out rows inside the calibrated range. Its
+/// uncertainties come from all held-out rows, so that they are known up to the range's end.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Ready to be saved or exported.
+    /// Ready to save or export.
     pub weights: Weights,
     /// Errors of the model in floats.
     pub float: Errors,
@@ -39,7 +38,7 @@ pub struct Fit {
 type Rows<'a> = Vec<Sample<'a>>;
 
 /// Trains on nine tenths of the accepted rows of a data set, its sessions tared, and measures on
-/// the rest.
+/// the others.
 ///
 /// # Errors
 /// When the data set has too few accepted rows or none at rest, or training fails.
@@ -72,13 +71,13 @@ fn parts(dataset: &Dataset, seed: u64) -> Result<(Rows<'_>, Rows<'_>)> {
     Ok((training, held_out))
 }
 
-/// How far a data set that knows places goes beyond what is calibrated with it: forces a tenth,
-/// places a twentieth.
+/// Ratio of a data set's range to the range calibrated with it, if it has places: for forces, a
+/// tenth more; for places, a twentieth more.
 const BEYOND: f64 = 1.1;
 const PLACE_BEYOND: f64 = 1.05;
 
-/// What a model made from such a data set is calibrated for: the paper's range, or where the tip
-/// may be anywhere, what the data set fills.
+/// The range for which a model of such a data set is calibrated. The paper's range; if the tip may
+/// be anywhere, the range that the data set fills.
 fn calibrated(about: &About) -> Range {
     if !about.range.knows_places() {
         return Range::default();
@@ -101,7 +100,7 @@ fn is_inside(row: &Sample<'_>, range: &Range) -> bool {
     norm(row.force_n) <= range.force_n && row.tip_mm.is_none_or(near)
 }
 
-/// Writes down what a model holds for, and measures it on `rows` that it was not made from.
+/// Records a model's conditions, and measures it on `rows` that were not used to make it.
 fn finished(
     dataset: &Dataset,
     network: Network,
@@ -126,8 +125,8 @@ fn finished(
     measured(weights, &tare, rows)
 }
 
-/// Measures a model on rows that it was not made from: its errors, and from these its
-/// uncertainties.
+/// Measures a model on rows that were not used to make it: its errors, and its uncertainties from
+/// them.
 fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fit> {
     let answers = quantized_answers(&weights, tare, rows)?;
     let misses: Vec<Miss> = answers
@@ -139,7 +138,7 @@ fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fi
     weights.uncertainty = Uncertainty::of(&misses, weights.range.force_n)?;
     let (mut float, mut quantized) = (Errors::default(), Errors::default());
     let judged = rows.iter().zip(answers);
-    // Where the model tells no place, places do not count.
+    // If the model gives no place, the range of places does not matter.
     let range = Range {
         place_mm: match weights.network.meaning.tells_place() {
             true => weights.range.place_mm,
@@ -158,7 +157,7 @@ fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fi
     })
 }
 
-/// What a model makes of a row.
+/// A model's answer to a row.
 struct Answer {
     force_n: [f64; 3],
     place_mm: Option<[f64; 2]>,
@@ -173,7 +172,7 @@ impl Answer {
         }
     }
 
-    /// The place as it was found, and the true one, mm, where both are known.
+    /// The found and the true place, mm, if both are known.
     fn places(&self, row: &Sample<'_>) -> Option<([f64; 2], [f64; 2])> {
         self.place_mm.zip(row.tip_mm)
     }
@@ -195,12 +194,12 @@ impl Answer {
     }
 }
 
-/// What the network shall answer: the force and the place.
+/// The answers wanted from the network: force and place.
 fn samples(rows: &Rows<'_>, options: &Options) -> Samples {
     let meaning = options.meaning_in_use();
     let answer = |row: &Sample<'_>| (row.seen.features_px(), meaning.of_force(row.force_n));
     let (features, answers) = rows.iter().map(answer).unzip();
-    // A film that nothing touches is as if touched in its middle.
+    // An untouched film counts as touched in its middle.
     let place = |row: &Sample<'_>| row.tip_mm.unwrap_or_default();
     Samples {
         features,
@@ -223,7 +222,7 @@ fn record(dataset: &Dataset, rows: usize) -> Training {
     }
 }
 
-/// What the exported model answers, run by the sensing's own arithmetic.
+/// The exported model's answers, computed by the sensing's own arithmetic.
 fn quantized_answers(weights: &Weights, tare: &Features, rows: &Rows<'_>) -> Result<Vec<Answer>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes)

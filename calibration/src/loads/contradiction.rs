@@ -1,35 +1,37 @@
-//! Loads whose notes contradict what the sensor saw: axes swapped, a sign or a unit wrong, a place
-//! mistyped.
+//! Finds loads whose notes contradict the sensor's picture: axes swapped, a wrong sign or unit, a
+//! mistyped place.
 //!
-//! A sensor that knows of a unit only how it rests finds places to half a millimetre and forces to
-//! a factor of some units: enough to see such mistakes, and to name them.
+//! A sensor that knows only a unit's rest position finds places to half a millimetre, and forces to
+//! a small factor. This is enough to detect such mistakes, and to name them.
 
 use anyhow::{Result, bail};
 
 use super::SeenLoad;
 
-/// Noted places that differ less, root mean square, mm, tell nothing of axes.
+/// Axes are checked only if noted places differ by at least this, root mean square, mm.
 const SPREAD_MM: f64 = 1.0;
-/// Notes are wrong where they are this far off, root mean square, mm, and something else explains
-/// them so many times better.
+/// Notes are wrong if their root mean square difference exceeds the first value, mm, and a mistake
+/// explains them better by at least the second, a factor.
 const WRONG_MM: f64 = 1.2;
 const BETTER: f64 = 2.5;
-/// A place is mistyped where it is so much farther off than the others, and so far, mm.
+/// A place is mistyped if its difference exceeds the median by this factor, and also exceeds this,
+/// mm.
 const FARTHER: f64 = 5.0;
 const MISTYPED_MM: f64 = 2.5;
-/// Forces that are so many times what a sensor finds are in another unit.
+/// Forces have a wrong unit if their median ratio to the sensor's exceeds this factor, or is below
+/// its inverse.
 const FACTOR: f64 = 25.0;
 
-/// What a sensor that knows only how the unit rests makes of a load.
+/// A load as estimated by a sensor that knows only the unit's rest position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoughLoad {
-    /// |F|, N, to a factor of some units.
+    /// F|, N, to a small factor.
     pub magnitude_n: f64,
     /// The place, mm, to half a millimetre.
     pub place_mm: [f64; 2],
 }
 
-/// What may have been done to a place, and what it is called.
+/// Possible mistakes in a place: matrix and description.
 const MISTAKES: [([[f64; 2]; 2], &str); 7] = [
     ([[-1.0, 0.0], [0.0, 1.0]], "x has the other sign"),
     ([[1.0, 0.0], [0.0, -1.0]], "y has the other sign"),
@@ -49,10 +51,10 @@ const MISTAKES: [([[f64; 2]; 2], &str); 7] = [
     ),
 ];
 
-/// Checks the loads' notes against what the sensor made of each.
+/// Checks the loads' notes against the sensor's estimate of each.
 ///
 /// # Errors
-/// Says what is wrong, and in which load.
+/// Names the mistake, and the load.
 pub fn check(loads: &[SeenLoad], rough: &[RoughLoad]) -> Result<()> {
     check_unit(loads, rough)?;
     let pairs: Vec<(usize, [f64; 2], [f64; 2])> = (loads.iter().zip(rough).enumerate())
@@ -120,7 +122,8 @@ fn check_unit(loads: &[SeenLoad], rough: &[RoughLoad]) -> Result<()> {
     Ok(())
 }
 
-/// How far places are apart, but for their median: a stage's zero is anywhere.
+/// Differences between noted and found places minus their median, because a stage's zero is
+/// arbitrary.
 fn apart(noted: &[[f64; 2]], found: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let off: Vec<[f64; 2]> = (noted.iter().zip(found))
         .map(|(a, b)| [a[0] - b[0], a[1] - b[1]])
@@ -166,7 +169,8 @@ mod tests {
         }
     }
 
-    /// What a sensor makes of presses there: some tenths of a millimetre off, a third of the force.
+    /// The sensor's estimates of those presses: some tenths of a millimetre off, a third of the
+    /// force.
     fn rough() -> Vec<RoughLoad> {
         let off = |k: usize| 0.3 * if k.is_multiple_of(2) { 1.0 } else { -1.0 };
         let of_place = |(k, [x, y]): (usize, &[f64; 2])| RoughLoad {

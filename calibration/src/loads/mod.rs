@@ -1,11 +1,10 @@
-//! The loads that a data set shows, for a fit of a unit: each with what was seen of it, and how
-//! well its size, direction and place are known.
+//! Selects the loads of a data set for the fit of a unit: each with its picture, and the
+//! uncertainties of its size, direction and place.
 //!
 //! | rows | loads |
 //! |---|---|
 //! | of one force at one noted place | frames of one load |
-//! | pressed anywhere, nobody noted where | some of them, spread over places and sizes:
-//! [`representative`] |
+//! | pressed anywhere, no place noted | a selection over places and sizes: [`representative`] |
 
 mod contradiction;
 mod representative;
@@ -27,51 +26,52 @@ use crate::weights::Weights;
 pub use contradiction::{RoughLoad, check};
 pub use representative::{LoadFrames, representative};
 
-/// So many loads are taken of presses anywhere.
+/// The largest number of loads selected from presses anywhere.
 pub const MOST_FREE: usize = 120;
-/// No press is taken to be farther from the middle along x or y, mm.
+/// The greatest estimate of a press's distance from the middle along x or y, mm.
 const FARTHEST_MM: f64 = 4.5;
-/// Standard uncertainty of a marker's mean coordinates over many frames, px: what the pixel grid
-/// does.
+/// Standard uncertainty of a marker's mean coordinates over many frames, px: the pixel grid's
+/// effect.
 const GRID_PX: f64 = 0.008;
-/// That of a single frame, where the weights have none.
+/// Standard uncertainty in a single frame, px, if the weights have none.
 const FRAME_PX: f64 = 0.025;
 
-/// What was seen of a load, and how well it is known.
+/// The picture of a load, and the uncertainties of its stated values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenLoad {
-    /// The force as the gauge or the weight tells it along the pose's direction, N.
+    /// The force by gauge or weight along the pose's direction, N.
     pub force_n: [f64; 3],
     /// Standard uncertainty of |F|, N.
     pub size_n: f64,
-    /// That of the direction along each of the two ways across it, radians; 0 where a stage set it.
+    /// Standard uncertainty of the direction along each of the two axes across it, radians; 0 where
+    /// a stage set it.
     pub direction_rad: f64,
-    /// Where the tip was as somebody noted it, mm, and otherwise about where.
+    /// The tip's place as noted, mm; otherwise estimated.
     pub place_mm: [f64; 2],
-    /// Standard uncertainty of this place along x and y, beside what is the same for all places,
-    /// mm; infinite where nobody noted it.
+    /// Standard uncertainty of this place along x and y, without the part common to all places, mm;
+    /// infinite if nobody noted it.
     pub each_place_mm: f64,
-    /// Where markers 0–3 were seen, mean of the frames, px.
+    /// Seen positions of markers 0–3, mean of the frames, px.
     pub seen_px: [[f64; 2]; 4],
     /// Standard uncertainty of these coordinates, px.
     pub noise_px: f64,
-    /// How many frames there are of it.
+    /// Number of frames.
     pub frames: usize,
 }
 
-/// How well a bench knows its loads.
+/// Uncertainties of a bench's loads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Certainty {
     /// Standard uncertainty of a load's |F|, N.
     pub gauge_n: f64,
-    /// That of each noted place on its own, mm; 0 with a stage.
+    /// Standard uncertainty of each noted place on its own, mm; 0 with a stage.
     pub place_mm: f64,
-    /// That of a marker's coordinates in one frame, px.
+    /// Standard uncertainty of a marker's coordinates in one frame, px.
     pub frame_px: f64,
 }
 
 impl Certainty {
-    /// With the noise of frames that weights know.
+    /// With the frame noise stated in the weights.
     pub fn of(weights: &Weights, gauge_n: f64, place_mm: f64) -> Self {
         let noise_px = weights.film.as_ref().map(|film| film.noise_px);
         let frame_px = noise_px.map_or(FRAME_PX, |[away, across]| {
@@ -84,16 +84,16 @@ impl Certainty {
         }
     }
 
-    /// Standard uncertainty of the mean of so many frames, px: noise becomes less, the pixel grid's
-    /// part stays.
+    /// Standard uncertainty of the mean of this many frames, px: noise averages out, the pixel
+    /// grid's effect remains.
     fn mean_px(&self, frames: usize) -> f64 {
         let noise = (self.frame_px.powi(2) - GRID_PX.powi(2)).max(0.0);
         (GRID_PX.powi(2) + noise / frames.max(1) as f64).sqrt()
     }
 }
 
-/// The loads of a data set, its sessions tared. `rough_place_mm` says about where a press was that
-/// nobody noted, by what was seen of it ([`Rough`]).
+/// The loads of a data set, its sessions tared. `rough_place_mm` estimates places that nobody noted
+/// from the picture ([`Rough`]).
 ///
 /// # Errors
 /// When a session has no frame of the untouched film.
@@ -124,8 +124,8 @@ pub fn loads_of(
     Ok(loads)
 }
 
-/// Rows of the same force at the same place are frames of one load. Where nobody noted places, the
-/// tip was set on the film's middle.
+/// Groups rows of the same force at the same place as frames of one load. Rows without a place were
+/// pressed on the film's middle.
 fn noted(samples: &[Sample<'_>], certainty: &Certainty) -> Vec<SeenLoad> {
     let mut loads: Vec<SeenLoad> = Vec::new();
     for sample in samples {
@@ -154,7 +154,7 @@ fn noted(samples: &[Sample<'_>], certainty: &Certainty) -> Vec<SeenLoad> {
 }
 
 impl SeenLoad {
-    /// What was seen, with markers of these areas, px.
+    /// The load's picture, with markers of these areas, px.
     pub fn observation(&self, areas_px: [u32; 4]) -> Observation {
         let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
         let markers = self.seen_px.map(|[x, y]| Marker {
@@ -188,25 +188,25 @@ fn markers_px(seen: &Observation) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| [features[2 * k], features[2 * k + 1]])
 }
 
-/// About where presses were on a unit, by a model that knows of it only how it rests.
+/// Estimates loads by a model that knows only a unit's rest position.
 pub struct Rough<'m>(RefCell<Chip<'m>>);
 
 impl<'m> Rough<'m> {
-    /// Of a model file, and where the unit's markers rest.
+    /// From a model file, and the unit's rest position.
     ///
     /// # Errors
-    /// When there is no such model, or its numbers do not hold the rest position.
+    /// When the bytes are not a model, or its numbers cannot hold the rest position.
     pub fn new(model: &'m [u8], rest: &Rest) -> Result<Self> {
         let model = Model::parse(model).map_err(|error| anyhow!("{error}"))?;
         Ok(Self(RefCell::new(Chip::new(model, rest)?)))
     }
 
-    /// About where a press was, mm; the film's middle where nothing is known.
+    /// Estimated place of a press, mm; the film's middle if unknown.
     pub fn place_mm(&self, seen: &Observation) -> [f64; 2] {
         self.load(seen).map_or([0.0; 2], |load| load.place_mm)
     }
 
-    /// What it makes of a load; `None` where the model tells no places.
+    /// The estimate of a load; `None` if the model gives no places.
     pub fn load(&self, seen: &Observation) -> Option<RoughLoad> {
         let (force, _) = self.0.borrow_mut().force(seen).ok()?;
         let place = force.place?;
@@ -217,10 +217,10 @@ impl<'m> Rough<'m> {
         })
     }
 
-    /// Checks loads' notes against what it makes of each.
+    /// Checks loads' notes against the estimates.
     ///
     /// # Errors
-    /// Says what contradicts what is seen.
+    /// Names the contradiction.
     pub fn check(&self, loads: &[SeenLoad]) -> Result<()> {
         let areas_px = self.0.borrow().areas_px();
         let of_load = |load: &SeenLoad| self.load(&load.observation(areas_px));

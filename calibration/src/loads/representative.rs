@@ -1,4 +1,4 @@
-//! Some loads out of minutes of pressing anywhere: frames in which the force was steadiest, spread
+//! Selects loads from minutes of pressing anywhere: frames in which the force was steadiest, spread
 //! over places and sizes.
 
 use std::collections::BTreeMap;
@@ -8,57 +8,57 @@ use crate::data::loads::norm;
 
 use super::markers_px;
 
-/// At most so many frames are taken together.
+/// The largest number of frames in a load.
 const MOST_FRAMES: usize = 8;
-/// They are as long as |F| and markers are within these of their mean: in parts, and px root mean
-/// square.
+/// Limits within which |F|, in parts of it, and markers, px root mean square, stay near a load's
+/// mean.
 const STRAY: f64 = 0.02;
 const STRAY_PX: f64 = 0.05;
-/// Smaller forces tell little, N.
+/// The least force of a load, N.
 const LEAST_N: f64 = 0.01;
-/// What a force is uncertain of where the gauge's rate is not known, in parts.
+/// Standard uncertainty of a force if the gauge's rate is unknown, in parts of it.
 const UNKNOWN_RATE: f64 = 0.05;
-/// Bins along x and along y over ± so many mm, and where sizes are divided, N.
+/// Number of bins along x and along y, their reach, ± mm, and the limits between sizes, N.
 const SIDE: usize = 5;
 const REACH_MM: f64 = 4.0;
 const SIZES_N: [f64; 4] = [0.04, 0.08, 0.13, 0.19];
-/// An uncertainty of |F| that counts as much as [`STRAY_PX`]: in parts, and N.
+/// The uncertainty of |F| that counts as much as [`STRAY_PX`]: in parts of |F|, and N.
 const USUAL: f64 = 0.01;
 const USUAL_N: f64 = 0.000_5;
-/// Two loads of a bin are at least so many rows apart: nearer ones are the same press.
+/// Two loads of a bin are at least this many rows apart; nearer ones belong to the same press.
 const APART: usize = 24;
 
-/// A load out of a recording.
+/// A load from a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoadFrames {
     /// The mean force along the rows' direction, N.
     pub force_n: [f64; 3],
-    /// Standard uncertainty of |F|, N: how fast the gauge changed times how well the clocks are
-    /// aligned, and how the frames scatter.
+    /// Standard uncertainty of |F|, N: the gauge's rate times the clocks' uncertainty, and the
+    /// scatter of the frames.
     pub clock_n: f64,
-    /// About where, mm.
+    /// Estimated place, mm.
     pub place_mm: [f64; 2],
-    /// Where markers 0–3 were seen on average, px.
+    /// Mean seen positions of markers 0–3, px.
     pub seen_px: [[f64; 2]; 4],
-    /// How many frames there are of it.
+    /// Number of frames.
     pub frames: usize,
 }
 
-/// A load as it is found, before it is chosen.
+/// A candidate load.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     load: LoadFrames,
     /// Number of its first row.
     at: usize,
-    /// The less, the steadier.
+    /// Smaller for steadier loads.
     cost: f64,
 }
 
-/// Place along x and y, and size.
+/// Index of the place along x and y, and of the size.
 type Bin = (usize, usize, usize);
 
-/// At most so many loads of presses in the order they were recorded, spread over places and sizes;
-/// `rough_place_mm` says about where each was.
+/// At most `most` loads from presses in their recorded order, spread over places and sizes.
+/// `rough_place_mm` estimates each place.
 pub fn representative(
     rows: &[Sample<'_>],
     most: usize,
@@ -82,7 +82,7 @@ pub fn representative(
     chosen.into_iter().map(|group| group.load).collect()
 }
 
-/// How many of the first rows are one steady load.
+/// Number of rows at the start that are one steady load.
 fn steady(rows: &[Sample<'_>]) -> usize {
     let first = &rows[0];
     let direction = |sample: &Sample<'_>| {
@@ -160,7 +160,8 @@ impl Group {
     }
 }
 
-/// Round by round the steadiest of every bin that is no press of an earlier round.
+/// Takes from every bin, round by round, the steadiest candidate that is not near an earlier
+/// choice.
 fn spread(mut bins: BTreeMap<Bin, Vec<Group>>, most: usize) -> Vec<Group> {
     let mut chosen: Vec<Group> = Vec::new();
     let mut taken: BTreeMap<Bin, Vec<usize>> = BTreeMap::new();

@@ -17,7 +17,7 @@ const CERTAINTY: Certainty = Certainty {
     frame_px: 0.03,
 };
 
-/// A film that is a formula: markers go apart with the force, and aside with the place.
+/// A film given by a formula: markers spread with the force, and shift with the place.
 fn seen(force_n: f64, [x, y]: [f64; 2], off_px: f64) -> Observation {
     let mut features_px = [0.0; FEATURES];
     for (k, [right, down]) in [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
@@ -34,7 +34,7 @@ fn seen(force_n: f64, [x, y]: [f64; 2], off_px: f64) -> Observation {
     }
 }
 
-/// Where a press was, by that formula.
+/// The place of a press by that formula, mm.
 fn place_mm(seen: &Observation) -> [f64; 2] {
     let px = markers_px(seen);
     [(0, 160.0), (1, 120.0)].map(|(axis, middle)| {
@@ -71,8 +71,8 @@ fn dataset(rows: Vec<Row>, free: Option<Free>, sessions: usize) -> Dataset {
     Dataset { about, rows }
 }
 
-/// A hand that goes over the film for so many frames, holds now and then, and is fast in between;
-/// how fast, N for the clocks.
+/// A hand that moves over the film for this many frames, holds sometimes, and is fast in between.
+/// Fast frames have a larger clock uncertainty, N.
 fn hand(frames: usize) -> Vec<Row> {
     let mut rows = vec![row(0, 0.0, None, seen(0.0, [0.0; 2], 0.0))];
     for i in 0..frames {
@@ -103,7 +103,7 @@ fn rows_of_one_force_and_place_are_frames_of_one_load() {
             rows.push(row(0, 0.1, Some(at), seen(0.1, at, off_px)));
         }
     }
-    // Another day, on which the camera was bent by a pixel.
+    // A second session, in which the camera was shifted by a pixel.
     rows.push(row(1, 0.0, None, seen(0.0, [0.0; 2], 1.0)));
     rows.push(row(1, 0.1, Some([3.0, 0.0]), seen(0.1, [3.0, 0.0], 1.0)));
     let mut dataset = dataset(rows, None, 2);
@@ -167,7 +167,8 @@ fn presses_anywhere_are_loads_of_unknown_places_beside_known_ones() {
     }
 }
 
-/// Held presses are taken, fast ones where there is nothing else; places and sizes are spread.
+/// Held presses are preferred, fast ones taken only where there are no others; places and sizes are
+/// spread.
 #[test]
 fn steady_frames_are_chosen_from_everywhere() {
     let dataset = dataset(hand(30_000), FREE, 1);
@@ -193,7 +194,7 @@ fn steady_frames_are_chosen_from_everywhere() {
     );
 }
 
-/// A gauge that changes fast while clocks are known to some milliseconds says less of the force.
+/// If the gauge changes fast and clocks are known to some milliseconds, the force is less certain.
 #[test]
 fn what_clocks_leave_is_part_of_a_loads_uncertainty() {
     let mut dataset = dataset(hand(3_000), FREE, 1);
@@ -215,8 +216,7 @@ fn what_clocks_leave_is_part_of_a_loads_uncertainty() {
     );
 }
 
-/// The default model says about where a press was, on a unit that it does not know: one whose
-/// picture is shifted.
+/// The default model estimates the place of a press on an unknown unit whose picture is shifted.
 #[test]
 fn a_model_of_no_unit_tells_rough_places() {
     let recipe = Recipe {

@@ -1,24 +1,24 @@
-//! How far hidden units reach, and how that fits an activation of few bits.
+//! Fits the range of hidden units to activations of few bits.
 
 use super::{Arithmetic, INPUTS, Network};
 
-/// How much a unit that hardly speaks is scaled up at most.
+/// The largest factor by which a weakly active unit is scaled up.
 const MOST_STRETCHED: f64 = 32.0;
-/// What split units reach beyond the largest activation of the data, as a part of it: it costs them
-/// next to no steps, and other rows may go a little further.
+/// Part by which split units extend beyond the data's largest activation, for rows that go a little
+/// further; it costs hardly any steps.
 const HEADROOM: f64 = 1.0 / 32.0;
 
 impl Network {
-    /// Whether the chip holds a hidden layer's activations in seven bits: those between layers of
-    /// int8 weights.
+    /// Whether the chip holds a hidden layer's activations in seven bits: those followed by int8
+    /// weights.
     pub(crate) fn is_coarse(&self, layer: usize) -> bool {
         self.arithmetic != Arithmetic::Int16 && layer + 2 < self.layers.len()
     }
 
-    /// Scales each unit of the hidden layers, and what takes it up, such that all of a layer reach
-    /// as far over `rows`: the network is the same, and each unit has all steps of an activation
-    /// (Nagel et al. 2019, "Data-Free Quantization Through Weight Equalization and Bias
-    /// Correction").
+    /// Scales each unit of the hidden layers, and inversely the weights after it, so that all units
+    /// of a layer have the same largest output over `rows`. The network stays the same, and each
+    /// unit uses all steps of an activation (Nagel et al. 2019, "Data-Free Quantization Through
+    /// Weight Equalization and Bias Correction").
     pub fn equalize(&mut self, rows: &[[f64; INPUTS]]) {
         for i in 0..self.layers.len().saturating_sub(1) {
             let maxima = self.unit_maxima(i + 1, rows).swap_remove(i);
@@ -37,11 +37,11 @@ impl Network {
         }
     }
 
-    /// Replaces each unit of the layers whose activations have seven bits by `parts` units, one for
-    /// each part of its reach: silent below its part, saturated above it. Their sum is the unit, so
-    /// the network is the same as far as `activation_max` tells; but a step of an activation is as
-    /// many times finer, and only one part of each unit is rounded at a time. One part leaves
-    /// everything as it is.
+    /// Replaces each unit of the layers with seven-bit activations by `parts` units, one for each
+    /// part of its range: 0 below its part, saturated above it. Their sum is the unit, so the
+    /// network stays the same within `activation_max`. But a step of an activation is finer by the
+    /// factor `parts`, and only one part of each unit is rounded at a time. With one part nothing
+    /// changes.
     pub fn split(&mut self, parts: usize) {
         if parts <= 1 {
             return;
@@ -63,7 +63,7 @@ impl Network {
         self.saturates = true;
     }
 
-    /// The largest output of each unit of the first few layers, which are hidden ones, over `rows`.
+    /// The largest output over `rows` of each unit of the first `few` layers, all hidden ones.
     fn unit_maxima(&self, few: usize, rows: &[[f64; INPUTS]]) -> Vec<Vec<f64>> {
         let layers = &self.layers[..few];
         let mut maxima: Vec<_> = layers.iter().map(|it| vec![0.0; it.outputs()]).collect();
@@ -79,8 +79,8 @@ impl Network {
         maxima
     }
 
-    /// The largest output of each hidden layer over `rows`; at least a tiny positive number, so
-    /// that a layer that never fires can still be scaled.
+    /// The largest output of each hidden layer over `rows`. At least a tiny positive number, so
+    /// that a layer without any activity can still be scaled.
     pub fn activation_maxima(&self, rows: &[[f64; INPUTS]]) -> Vec<f64> {
         let of_layer = |units: Vec<f64>| units.into_iter().fold(1e-6, f64::max);
         let hidden = self.layers.len().saturating_sub(1);
@@ -89,7 +89,7 @@ impl Network {
     }
 }
 
-/// Each item so many times, one after the other.
+/// Each item `times` times in a row.
 fn repeated<T: Clone>(items: &[T], times: usize) -> Vec<T> {
     let copies = |item: &T| vec![item.clone(); times];
     items.iter().flat_map(copies).collect()
@@ -124,7 +124,7 @@ mod tests {
         let [a, b] = [0, 1].map(|unit| network.unit_maxima(1, &rows)[0][unit]);
         assert!((a - b).abs() < 1e-4 * a && a == before.unit_maxima(1, &rows)[0][0]);
         same(&network, &before, &rows);
-        // A unit that never speaks, and a layer of such.
+        // An inactive unit, and a layer of such units.
         network.layers[0].bias.fill(-1e3);
         let silent = network.clone();
         network.equalize(&rows);
@@ -156,8 +156,8 @@ mod tests {
         let finer = before.activation_max[0] / network.activation_max[0];
         assert!((3.8..4.0).contains(&finer), "{finer}");
         assert_eq!(network.activation_max[1], before.activation_max[1]);
-        // Of each unit one part at most is neither silent nor saturated, and going on keeps what
-        // saturates.
+        // At most one part of each unit is neither 0 nor saturated, and further training keeps
+        // saturation.
         let limit = network.activation_max[0];
         for row in rows() {
             let parts = network.activations(0, &network.input.forward(&row));

@@ -1,5 +1,5 @@
-//! Adam (Kingma and Ba 2014), with the constants of its paper, and weight decay beside it
-//! (Loshchilov and Hutter 2017).
+//! The optimizer: Adam (Kingma and Ba 2014), with the constants of its paper, and decoupled weight
+//! decay (Loshchilov and Hutter 2017).
 
 use super::mlp::{Dense, Mlp};
 
@@ -9,7 +9,7 @@ const EPSILON: f32 = 1e-8;
 
 /// Moving averages of every parameter's gradient and of its square.
 pub(super) struct Adam {
-    /// The part of each weight that a step of size one takes away.
+    /// The part of each weight that a step of size 1 removes.
     decay: f64,
     averages: Vec<[Averages; 2]>,
     /// β₁ᵗ and β₂ᵗ after t steps.
@@ -30,7 +30,7 @@ impl Averages {
         }
     }
 
-    /// `rate` already holds both corrections of the averages' beginning; `epsilon` does, too.
+    /// `rate` and `epsilon` already contain the corrections of the averages' initial bias.
     #[inline(always)]
     fn step(&mut self, parameters: &mut [f32], gradients: &[f32], rate: f32, epsilon: f32) {
         let averages = self.gradient.iter_mut().zip(&mut self.square);
@@ -80,7 +80,7 @@ impl Adam {
 mod tests {
     use super::*;
 
-    /// The first step is the rate, whatever the gradient; later ones follow the paper's algorithm.
+    /// The first step equals the rate for any gradient; later ones follow the paper's algorithm.
     #[test]
     fn steps_are_those_of_the_paper() {
         let mut mlp = Mlp {

@@ -1,18 +1,18 @@
-//! What training makes small: the mean square of what is off, standardized; where directions are
-//! asked for, weighed across the force by how much of a direction it is.
+//! The loss that training minimizes: the mean square of standardized errors. If directions count,
+//! errors across the force are weighted by the change of direction that they cause.
 
 use super::{DirectionWeight, Samples};
 use crate::data::loads::norm;
 use crate::network::OUTPUTS;
 
-/// How much what is off across each row's force counts; along it, every row counts the same.
+/// Weight of errors across each row's force; errors along it weigh the same in every row.
 pub(super) struct Across {
     /// Unit vector along the force (0 without one), and the weight across it.
     rows: Vec<([f32; OUTPUTS], f32)>,
 }
 
 impl Across {
-    /// Weights of `samples`, their mean over `training` being that of `weight`.
+    /// Weights of `samples`, scaled so that their mean over `training` is that of `weight`.
     pub fn new(samples: &Samples, training: &Samples, weight: DirectionWeight) -> Self {
         let DirectionWeight { mean, floor_n } = weight;
         let raw = |force: &[f64; OUTPUTS]| {
@@ -32,7 +32,7 @@ impl Across {
         }
     }
 
-    /// Half the gradient of a row's loss by what it is off; its product with that is the loss.
+    /// Half the gradient of a row's loss by its errors; the product of both is the loss.
     fn pull(&self, row: usize, off: [f32; OUTPUTS]) -> [f32; OUTPUTS] {
         let (along, weight) = &self.rows[row];
         let size: f32 = off.iter().zip(along).map(|(off, along)| off * along).sum();
@@ -40,8 +40,8 @@ impl Across {
     }
 }
 
-/// The mean loss of these rows, and its gradient by the outputs; outputs and targets lie component
-/// by component, the force's first. What a place is off by counts the same in each row.
+/// The mean loss of these rows, and its gradient by the outputs. Outputs and targets are stored
+/// component by component, the force's first. Errors of a place weigh the same in each row.
 pub(super) fn loss(
     outputs: &[f32],
     targets: &[f32],
@@ -81,7 +81,7 @@ mod tests {
         }
     }
 
-    /// Without weights it is the mean square.
+    /// Without weights the loss is the mean square.
     #[test]
     fn all_count_the_same_without_weights() {
         let (loss, gradient) = loss(&[1.0, 2.0, 3.0], &[0.0, 2.0, 5.0], None, &[0]);
@@ -89,8 +89,8 @@ mod tests {
         assert_eq!(gradient, [2.0, 0.0, -4.0].map(|x: f32| x / 3.0));
     }
 
-    /// Across a force of half the size counts twice as much, along it the same, and without a force
-    /// all ways are across.
+    /// Errors across a force of half the size weigh twice as much, errors along it the same.
+    /// Without a force all directions are across.
     #[test]
     fn weak_forces_count_more_across_and_the_same_along() {
         let data = samples(vec![[0.0, 0.0, -0.1], [0.0, 0.0, -0.05], [0.0; 3]]);
@@ -107,7 +107,7 @@ mod tests {
         assert!((mean - 3.0 * 0.03).abs() < 1e-6, "{mean}");
     }
 
-    /// Outputs after the force's are not weighed by it.
+    /// Outputs after the force's have no such weight.
     #[test]
     fn a_place_counts_the_same_whatever_the_force() {
         let data = samples(vec![[0.0, 0.0, -0.1], [0.0, 0.0, -0.01]]);

@@ -1,7 +1,7 @@
-//! Layers with ReLU between them: forward, and backward by the chain rule.
+//! The network in training: layers with ReLU between them, forward, and backward by the chain rule.
 //!
-//! Values of a batch lie feature by feature, so that a feature's values for all rows are
-//! neighbours.
+//! Values of a batch are stored feature by feature, so that a feature's values of all rows are
+//! adjacent.
 
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
@@ -18,12 +18,12 @@ pub(super) struct Dense {
     pub bias: Vec<f32>,
 }
 
-/// What a forward pass leaves for the backward pass.
+/// Values of a forward pass that the backward pass needs.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trace {
     /// The values that entered each layer.
     pub inputs: Vec<Vec<f32>>,
-    /// For each value that left a hidden layer, whether a small change before ReLU comes through.
+    /// For each output of a hidden layer, whether ReLU passes a small change of its input.
     pub open: Vec<Vec<bool>>,
     /// The last layer's values.
     pub outputs: Vec<f32>,
@@ -81,7 +81,7 @@ impl Mlp {
         }
     }
 
-    /// From layers that fit each other.
+    /// From layers of matching widths.
     pub fn of_layers(layers: &[Layer]) -> Self {
         let dense = |layer: &Layer| Dense {
             weights: layer.weights.concat(),

@@ -1,7 +1,7 @@
-//! Training: first in floats, then with the chip's own integers in the forward pass.
+//! Trains networks: first in floats, then with the chip's own integers in the forward pass.
 //!
-//! Written by hand, because networks this small are: three products of matrices a layer and Adam.
-//! It gives the same bits on every machine.
+//! Networks this small need only three matrix products per layer and Adam, so the code is written
+//! here. It gives the same bits on every machine.
 
 mod adam;
 mod loss;
@@ -20,17 +20,17 @@ use crate::network::{
 pub use options::{DirectionWeight, Options};
 use state::{Phase, State};
 
-/// Features with what the network shall answer.
+/// Features and the answers wanted from the network.
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
     /// Features (px, px²), row by row.
     pub features: Vec<[f64; INPUTS]>,
-    /// Answers but for places, in the units of the network's meaning, row by row.
+    /// Answers except places, in the units of the network's meaning, row by row.
     pub answers: Vec<[f64; OUTPUTS]>,
-    /// The whole force (N), of which the answers may be a part, row by row. Only
-    /// [`Options::direction_weight`] needs it.
+    /// The whole force (N), of which the answers may be a part, row by row. Used only by
+    /// [`Options::direction_weight`].
     pub forces_n: Vec<[f64; OUTPUTS]>,
-    /// Where the tip is (mm), row by row, for a network that shall tell it; otherwise none.
+    /// The tip's place (mm), row by row, for a network that gives places; otherwise empty.
     pub places_mm: Vec<[f64; PLACE_OUTPUTS]>,
 }
 
@@ -39,24 +39,24 @@ pub struct Samples {
 pub struct Progress {
     /// Passes finished, from 1.
     pub epoch: usize,
-    /// Passes in all.
+    /// All passes.
     pub epochs: usize,
     /// Whether the chip's rounding was on.
     pub rounded: bool,
-    /// Mean squared error of the standardized answers over the pass; a constant answer has 1,
-    /// unless [`Options::direction_weight`] weighs rows.
+    /// Mean squared error of the standardized answers over the pass. A constant answer has a loss
+    /// of 1, unless [`Options::direction_weight`] weights rows.
     pub loss: f64,
-    /// The same on the held-out samples after the pass; not a number when there are none.
+    /// The same on the held-out samples after the pass; NaN without them.
     pub held_out: f64,
 }
 
 /// Trains a network. The same samples and options give the same network, on every machine.
 ///
-/// `held_out` decides which pass was best: the network is the one after that pass. Without held-out
-/// samples it is the one after the last.
+/// `held_out` decides which pass was best: the result is the network after that pass. Without
+/// held-out samples it is the network after the last.
 ///
 /// # Errors
-/// When there is too little data, features and answers differ in number, or training diverges.
+/// When there is too little data, the numbers of features and answers differ, or training diverges.
 pub fn train(
     training: &Samples,
     held_out: &Samples,
@@ -78,7 +78,7 @@ pub fn train(
             epochs: options.epochs,
             rate: options.learning_rate,
         },
-        // A third of the first step: the weights are near their place already.
+        // A third of the first step: the weights are already near their optimum.
         Phase {
             rounded: true,
             epochs: options.rounded_epochs,
@@ -140,21 +140,22 @@ impl Samples {
 }
 
 impl Samples {
-    /// All that the network shall answer to a row.
+    /// All answers wanted for a row.
     fn answer(&self, row: usize) -> Vec<f64> {
         let place = self.places_mm.get(row).into_iter().flatten();
         self.answers[row].iter().chain(place).copied().collect()
     }
 }
 
-/// What a component's deviation may be above the common one: more is no force that anyone tilts.
+/// The largest ratio of a component's deviation to the common one. A larger ratio means a force
+/// that is never tilted on purpose.
 const MOST_APART: f64 = 16.0;
 
 /// Scaling of features and answers, from the data.
 ///
-/// The components of a force that vary share the smallest of their deviations, so that a
-/// millinewton counts the same in each: F_z varies several times as much as F_x and F_y, and would
-/// be learnt as much more coarsely with a deviation of its own. A place has deviations of its own.
+/// The varying components of a force share the smallest of their deviations, so that a millinewton
+/// counts the same in each. F_z varies several times as much as F_x and F_y; with its own deviation
+/// it would be learnt more coarsely by the same factor. A place has deviations of its own.
 fn scaling(training: &Samples, meaning: Meaning) -> Result<[Standardization; 2]> {
     let mut answers = Standardization::of_answers(&training.answers)?;
     if meaning.is_vector() {

@@ -1,4 +1,4 @@
-//! How to train.
+//! Options of a training.
 
 use std::path::Path;
 
@@ -66,19 +66,19 @@ pub struct Options {
     pub start: Option<Network>,
 }
 
-/// Weighs what is off across each row's force by 1 / √(|F|² + floor²), times what makes the mean
-/// weight of all rows `mean`, so that weak forces' directions count, too; what is off along the
-/// force counts 1 everywhere.
+/// Weights errors across each row's force by 1 / √(|F|² + floor²), scaled so that the mean weight
+/// of all rows is `mean`. Thus directions of weak forces count as well; errors along the force
+/// always weigh 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DirectionWeight {
     /// Mean of the weights, above 0.
     pub mean: f64,
-    /// Below this |F|, N, above 0, no direction counts more.
+    /// Below this |F|, N, above 0, the weight grows no further.
     pub floor_n: f64,
 }
 
 impl Default for Options {
-    /// As the default model is trained, but for the place.
+    /// The default model's options, without the place.
     fn default() -> Self {
         Self {
             hidden: vec![64, 64],
@@ -101,7 +101,7 @@ impl Default for Options {
     }
 }
 
-/// The network in a weights file or in one of PyTorch.
+/// The network in a weights file or in a file from PyTorch.
 fn network_in(file: &str) -> Result<Network, String> {
     let path = Path::new(file);
     let network = match path.extension().is_some_and(|it| it == "safetensors") {
@@ -112,12 +112,12 @@ fn network_in(file: &str) -> Result<Network, String> {
 }
 
 impl Options {
-    /// What the outputs of the trained network are.
+    /// Meaning of the trained network's outputs.
     pub(crate) fn meaning_in_use(&self) -> Meaning {
         self.start.as_ref().map_or(self.meaning, |it| it.meaning)
     }
 
-    /// How directions count: as all else where angles are the outputs.
+    /// The weight of directions; `None` when the outputs are angles.
     pub(super) fn direction_weight_in_use(&self) -> Option<DirectionWeight> {
         let is_vector = self.meaning_in_use().is_vector();
         self.direction_weight.filter(|_| is_vector)

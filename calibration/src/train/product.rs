@@ -1,9 +1,8 @@
-//! The one product of matrices that training needs, quick enough and the same bits on every
-//! machine.
+//! Computes the only matrix product of training, fast and with the same bits on every machine.
 //!
-//! Every element is summed in the order of the inner index, by itself: vector instructions only do
-//! several elements at a time, nothing is fused and nothing is reassociated. So it does not matter
-//! which instructions or how many threads a machine has.
+//! Every element is summed separately, in the order of the inner index. Vector instructions only
+//! process several elements at a time; nothing is fused or reassociated. So the machine's
+//! instruction set and number of threads do not matter.
 
 use std::ops::{AddAssign, Mul};
 
@@ -13,7 +12,7 @@ use rayon::prelude::*;
 /// Rows and columns of the result that are summed at a time.
 const TILE_ROWS: usize = 4;
 const TILE_COLUMNS: usize = 16;
-/// From this many products on the rows are shared by all cores.
+/// From this number of multiplications on, all cores share the rows.
 const WORTH_SHARING: usize = 1 << 21;
 
 /// `f32` for training in floats, `f64` for the chip's integers, which it holds exactly.
@@ -45,8 +44,8 @@ pub(super) fn product<T: Number>(a: &[T], b: &[T], [m, k, n]: [usize; 3]) -> Vec
     c
 }
 
-/// Up to four rows of the result; a type of its own, because a closure would not be compiled for
-/// the vector instructions that it is dispatched to.
+/// Up to four rows of the result. A type rather than a closure, which would not be compiled for the
+/// vector instructions that are dispatched.
 struct Block<'a, T> {
     a: &'a [T],
     b: &'a [T],
@@ -112,7 +111,8 @@ fn add_outer<T: Number, const R: usize>(
 pub(super) fn transposed<T: Number>(a: &[T], rows: usize, columns: usize) -> Vec<T> {
     debug_assert_eq!(a.len(), rows * columns);
     let mut t = vec![T::default(); a.len()];
-    // In squares: whole columns of a wide matrix would meet a new cache line with every element.
+    // In square tiles: whole columns of a wide matrix would touch a new cache line for every
+    // element.
     for top in (0..rows).step_by(TILE_COLUMNS) {
         for left in (0..columns).step_by(TILE_COLUMNS) {
             for r in top..rows.min(top + TILE_COLUMNS) {

@@ -1,7 +1,7 @@
-//! The forward pass as the chip does it: the exporter's integers, the chip's arithmetic, every
-//! rounding included.
+//! Runs the forward pass as the chip does: the exporter's integers, the chip's arithmetic, with
+//! every rounding.
 //!
-//! The backward pass takes each rounding for the identity and each limit for what it is
+//! The backward pass treats each rounding as the identity and differentiates each limit as it is
 //! (straight-through estimator, Bengio et al. 2013).
 
 use anyhow::Result;
@@ -11,19 +11,19 @@ use super::product::product;
 use crate::network::Network;
 use crate::quantize::{QuantizedLayer, layers};
 
-/// What a forward pass on the chip's integers gives.
+/// The result of a forward pass on the chip's integers.
 pub(super) struct Rounded {
     /// The chip's outputs for each row: µN, or m°.
     #[cfg(test)]
     pub values: Vec<i64>,
     /// The values as floats, for the backward pass; its outputs are standardized.
     pub trace: Trace,
-    /// The layers that the chip's integers stand for.
+    /// The layers in floats that the chip's integers represent.
     pub mlp: Mlp,
 }
 
-/// Runs the integers of `network`, whose layers are the state of training, on standardized inputs
-/// in the chip's steps.
+/// Runs the integers of `network`, whose layers are those in training, on standardized inputs in
+/// the chip's steps.
 pub(super) fn forward(network: &Network, inputs: Vec<f64>, rows: usize) -> Result<Rounded> {
     let quantized = layers(network)?;
     let mlp = Mlp {

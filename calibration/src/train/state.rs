@@ -1,4 +1,4 @@
-//! A training as it goes on: weights, optimizer, data and the best weights so far.
+//! The state of a training: weights, optimizer, data and the best weights up to now.
 
 use anyhow::Result;
 use hivtac_sensor::force::features::Features;
@@ -16,10 +16,10 @@ use crate::data::rest::{features_from_q16, q16};
 use crate::network::{Arithmetic, INPUTS, Layer, Network, Standardization};
 use crate::quantize::input_scaling;
 
-/// Rows that are measured at a time.
+/// Number of rows in a batch of measurement.
 const MEASURED_ROWS: usize = 256;
 
-/// One half of a training.
+/// One of the two phases of a training.
 pub(super) struct Phase {
     /// Whether the chip's rounding is on.
     pub rounded: bool,
@@ -29,7 +29,7 @@ pub(super) struct Phase {
 }
 
 pub(super) struct State {
-    /// The network; during a phase its first layer takes components.
+    /// The network; during a phase its first layer takes whitened components.
     mlp: Mlp,
     whitening: Whitening,
     adam: Adam,
@@ -40,7 +40,7 @@ pub(super) struct State {
     order: Vec<usize>,
     training: Rows,
     held_out: Rows,
-    /// Everything but the layers, which are in `mlp`.
+    /// The network without its layers, which are in `mlp`.
     network: Network,
     best: Option<Best>,
 }
@@ -50,15 +50,15 @@ struct Best {
     loss: f64,
 }
 
-/// Data as the network takes it.
+/// Data in the form that the network takes.
 struct Rows {
     /// Components of the standardized features.
     components: Vec<[f32; INPUTS]>,
-    /// The features as the chip has them.
+    /// The features in the chip's steps.
     steps: Vec<[i16; INPUTS]>,
     /// Standardized answers.
     answers: Vec<Vec<f32>>,
-    /// How much what is off across each force counts, when that is not the same for all.
+    /// Weights of errors across each force, if they differ between rows.
     across: Option<Across>,
 }
 
@@ -159,14 +159,14 @@ impl State {
         })
     }
 
-    /// Starts a phase. The first fixes how much each hidden layer of the chip can carry for the
-    /// second.
+    /// Starts a phase. The first phase fixes the largest activation of each hidden layer on the
+    /// chip for the second.
     pub fn begin(&mut self, phase: &Phase, training: &Samples) -> Result<()> {
         self.best = None;
         if phase.rounded {
             self.network.layers = self.mlp.to_layers();
-            // Activations of twelve bits have steps to spare, and the weights after them would be
-            // the coarser for it.
+            // Twelve-bit activations have enough steps, and equalizing would make the weights after
+            // them coarser.
             if phase.epochs > 0 && self.network.arithmetic != Arithmetic::Int16 {
                 self.network.equalize(&training.features);
             }
@@ -185,7 +185,8 @@ impl State {
         Ok(())
     }
 
-    /// One pass over the shuffled data; the mean loss over it, and on the held-out data after it.
+    /// One pass over the shuffled data. Returns the mean loss over it, and that on the held-out
+    /// data after it.
     pub fn pass(&mut self, phase: &Phase, epoch: usize) -> Result<[f64; 2]> {
         let mut order = std::mem::take(&mut self.order);
         order.shuffle(&mut self.random);
@@ -251,27 +252,27 @@ impl State {
             layers: self.mlp.clone(),
             loss,
         });
-        // A loss that is no number never is the best: without held-out samples the last pass is.
+        // A NaN loss is never the best; without held-out samples the last pass counts as the best.
         if loss <= best.loss || loss.is_nan() {
             (best.layers, best.loss) = (self.mlp.clone(), loss);
         }
     }
 
-    /// The layers in training, the first by features.
+    /// The layers in training, the first taking features.
     fn by_features(&self) -> Vec<Layer> {
         let mut mlp = self.mlp.clone();
         self.whitening.fold(&mut mlp);
         mlp.to_layers()
     }
 
-    /// The training data as the chip takes it.
+    /// The training data in the chip's steps.
     #[cfg(test)]
     pub fn chip_inputs(&self) -> Vec<f64> {
         let all: Vec<usize> = (0..self.training.steps.len()).collect();
         gathered(&self.training.steps, &all)
     }
 
-    /// Goes back to the best weights of the phase.
+    /// Restores the best weights of the phase.
     pub fn take_best(&mut self) {
         if let Some(best) = self.best.take() {
             self.mlp = best.layers;
@@ -287,7 +288,7 @@ impl State {
     }
 }
 
-/// A network without layers: scaling from the data.
+/// A network without layers, with scaling from the data.
 fn blank(training: &Samples, options: &Options) -> Result<Network> {
     let [input, output] = scaling(training, options.meaning)?;
     Ok(Network {

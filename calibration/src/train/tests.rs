@@ -33,7 +33,7 @@ fn weights(network: Network) -> Weights {
     }
 }
 
-/// Every row counts the same.
+/// Options in which every row has the same weight.
 fn plain() -> Options {
     Options {
         direction_weight: None,
@@ -46,8 +46,7 @@ fn features(random: &mut ChaCha8Rng) -> [Q<16, i64>; INPUTS] {
     std::array::from_fn(|_| Q::from_bits(random.random_range(90 << 16..110_i64 << 16)))
 }
 
-/// Training's forward pass and the exported model on the chip give the same integers, every one of
-/// them.
+/// Training's forward pass and the exported model on the chip give exactly the same integers.
 fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
     let mut random = ChaCha8Rng::seed_from_u64(11);
     let q16: Vec<_> = (0..ROWS).map(|_| features(&mut random)).collect();
@@ -79,7 +78,7 @@ fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
         saturates: false,
         layers: mlp.to_layers(),
     };
-    // A little less than the largest, so that some saturate.
+    // Slightly below the largest, so that some saturate.
     network.activation_max = network
         .activation_maxima(&samples.features)
         .iter()
@@ -162,7 +161,7 @@ fn parts_of_units_make_rounding_cost_less() {
         let options = Options {
             epochs: 0,
             rounded_epochs: 1,
-            // Hardly a step: what rounding alone costs.
+            // A negligible step: shows the cost of rounding alone.
             learning_rate: 1e-6,
             unit_parts,
             start: Some(start.clone()),
@@ -178,11 +177,11 @@ fn parts_of_units_make_rounding_cost_less() {
     assert_eq!(widths(&one), [16, 16, OUTPUTS]);
     assert_eq!(widths(&four), [64, 16, OUTPUTS]);
     let [off_one, off_four] = [&one, &four].map(|network| apart(network, &start, &held_out));
-    // The rounding of weights stays.
+    // The rounding of weights remains.
     assert!(off_four < 0.9 * off_one, "{off_one} {off_four}");
 
-    // In floats such a network saturates, too, so that it can be measured and gone on from with
-    // rounding.
+    // Such a network saturates in floats as well, so that it can be measured and trained further
+    // with rounding.
     let again = Options {
         epochs: 0,
         rounded_epochs: 2,
@@ -199,8 +198,8 @@ fn parts_of_units_make_rounding_cost_less() {
     assert!(error.to_string().contains("rounding only"), "{error}");
 }
 
-/// How far a network on the chip is from another in floats, root mean square in its standard
-/// deviations.
+/// Root mean square difference between a network on the chip and one in floats, in the latter's
+/// standard deviations.
 fn apart(chip: &Network, float: &Network, samples: &Samples) -> f64 {
     let state = State::new(
         samples,
@@ -223,7 +222,7 @@ fn apart(chip: &Network, float: &Network, samples: &Samples) -> f64 {
     (sum / (rows * OUTPUTS) as f64).sqrt()
 }
 
-/// A component that no data has keeps no weight.
+/// The weights of a component that never varies decay.
 #[test]
 fn what_no_data_ask_for_decays() {
     let mut training = easy(500, 1);
@@ -251,7 +250,7 @@ fn what_no_data_ask_for_decays() {
 #[test]
 fn the_best_pass_is_kept() {
     let (training, mut held_out) = (easy(200, 1), easy(100, 2));
-    // The better the training rows are learnt, the worse.
+    // The better the training rows are learnt, the larger the error on these.
     let mean = Standardization::of_answers(&held_out.answers).unwrap().mean;
     for answers in &mut held_out.answers {
         *answers = std::array::from_fn(|o| 2.0 * mean[o] - answers[o]);

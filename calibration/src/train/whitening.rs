@@ -1,33 +1,35 @@
-//! Directions that the optimizer walks along.
+//! Whitens the features, so that the optimizer finds directions quickly.
 //!
-//! The eleven features nearly all say the same: how far the film was pressed. What tells directions
-//! is small differences of them, which Adam, walking along features, would take long to find. So
-//! the first layer is trained on the features' principal components, weak ones made as large as a
-//! feature (after LeCun et al. 1998, "Efficient BackProp"), and folded back afterwards: the network
-//! is the same. The strong one stays as it is: made smaller, what varies quickly along it, such as
-//! the pixel grid's part in a centroid, would be learnt late.
+//! Nearly all variance of the eleven features is one number: how far the film was pressed.
+//! Directions are in small differences of the features, which Adam, stepping along features, would
+//! learn slowly. So the first layer is trained on the features' principal components, with weak
+//! ones scaled up to a feature's size (after LeCun et al. 1998, "Efficient BackProp"). It is folded
+//! back afterwards, which does not change the network. The strong component keeps its size. If it
+//! were scaled down, rapid variation along it, such as the pixel grid's effect on a centroid, would
+//! be learnt late.
 
 use super::mlp::Mlp;
 use crate::network::INPUTS;
 
-/// A part of the whole variance that is added to each component's, so that noise is not blown up.
+/// Part of the whole variance that is added to each component's variance, so that noise is not
+/// amplified.
 const FLOOR: f64 = 1e-4;
-/// Jacobi's sweeps; six reach the last bit.
+/// Sweeps of Jacobi's rotations; six reach the last bit.
 const SWEEPS: usize = 12;
 
 type Matrix = [[f64; INPUTS]; INPUTS];
 
-/// Standardized features to components of variance 1 or more: row k holds the weights of component
-/// k.
+/// Maps standardized features to components of variance 1 or more: row k holds the weights of
+/// component k.
 #[derive(Clone, Debug)]
 pub(super) struct Whitening {
     rows: [[f32; INPUTS]; INPUTS],
-    /// The way back: row k is what a unit of component k is made of.
+    /// The inverse map: row k holds the features of a unit of component k.
     back: [[f32; INPUTS]; INPUTS],
 }
 
 impl Whitening {
-    /// Features as they are.
+    /// The identity: components are the features.
     pub fn none() -> Self {
         let one = identity().map(|row| row.map(|part| part as f32));
         Self {
@@ -36,7 +38,7 @@ impl Whitening {
         }
     }
 
-    /// That of these standardized features.
+    /// The whitening of these standardized features.
     pub fn of(features: &[[f32; INPUTS]]) -> Self {
         let mut covariance = [[0.0; INPUTS]; INPUTS];
         for row in features {
@@ -64,7 +66,7 @@ impl Whitening {
         self.rows.map(|row| dot(&row, x))
     }
 
-    /// A network whose first layer takes components becomes the same one that takes features.
+    /// Converts a network whose first layer takes components into the same network taking features.
     pub fn fold(&self, mlp: &mut Mlp) {
         let folded = |row: &[f32]| -> [f32; INPUTS] {
             std::array::from_fn(|i| row.iter().zip(&self.rows).map(|(w, own)| w * own[i]).sum())
@@ -73,14 +75,14 @@ impl Whitening {
         mlp.layers[0].weights = rows.flat_map(folded).collect();
     }
 
-    /// The way back.
+    /// The inverse of [`Self::fold`].
     pub fn unfold(&self, mlp: &mut Mlp) {
         let rows = mlp.layers[0].weights.chunks(INPUTS);
         let unfolded = rows.flat_map(|row| self.back.map(|own| dot(&own, row)));
         mlp.layers[0].weights = unfolded.collect();
     }
 
-    /// The gradient by weights by components, from that by weights by features.
+    /// Converts the gradient by weights of features into that by weights of components.
     pub fn gradient(&self, gradient: &[f32]) -> Vec<f32> {
         let rows = gradient.chunks(INPUTS);
         rows.flat_map(|row| self.rows.map(|own| dot(&own, row)))
@@ -122,7 +124,7 @@ fn identity() -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))))
 }
 
-/// Turns two rows of a matrix.
+/// Rotates two rows of a matrix.
 fn rotate(matrix: &mut Matrix, [i, j]: [usize; 2], [cos, sin]: [f64; 2]) {
     let (a, b) = (matrix[i], matrix[j]);
     matrix[i] = std::array::from_fn(|k| cos * a[k] - sin * b[k]);
@@ -135,7 +137,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 
-    /// Features that nearly all say the same, with small differences of three kinds.
+    /// Features that are nearly proportional, with small differences of three kinds.
     fn features(rows: usize) -> Vec<[f32; INPUTS]> {
         let mut random = ChaCha8Rng::seed_from_u64(5);
         let row = |_| {
@@ -169,7 +171,7 @@ mod tests {
                 assert!(covariance.abs() < 1e-3, "{i}, {j}: {covariance}");
             }
         }
-        // The other eight are linear in these: noise, were there any.
+        // The other eight depend linearly on these; in real data they would be noise.
         assert_eq!(strong, 3);
     }
 
@@ -196,7 +198,7 @@ mod tests {
         }
     }
 
-    /// W by features is W by components times the rows: so the gradient is taken along them.
+    /// W by features is W by components times the rows: so the gradient is multiplied by them.
     #[test]
     fn gradients_follow_the_chain_rule() {
         let whitening = Whitening::of(&features(50));

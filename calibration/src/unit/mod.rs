@@ -1,5 +1,5 @@
-//! A unit's own model, with a person at a bench: what to do next in words, live numbers, and at the
-//! end the model and how good it is.
+//! Guides a person at a bench to a unit's own model: instructions, live numbers, and finally the
+//! model and its errors.
 
 mod plan;
 mod verdict;
@@ -21,9 +21,9 @@ use crate::weights::Weights;
 use plan::MOST_LOADS;
 use verdict::Verdict;
 
-/// What the model of the firmware was made of: the simulated sensor.
+/// Weights of the firmware's model, made from the simulated sensor.
 const DEFAULT_WEIGHTS: &str = include_str!("../../models/default.weights");
-/// In the recording's folder: the loads, the unit's weights and its model.
+/// Files in the recording's folder: the loads, the unit's weights and its model.
 const LOADS: &str = "loads.csv";
 const WEIGHTS: &str = "unit.weights";
 const MODEL: &str = "unit.hvtm";
@@ -65,16 +65,16 @@ pub struct GuideArgs {
 }
 
 impl GuideArgs {
-    /// The folder, when a person is to be led.
+    /// The folder, if a person is to be guided.
     pub fn folder(&self) -> Option<&Path> {
         self.into.as_deref()
     }
 
-    /// Leads through the loads that are left, and once none is, fits the unit to them.
+    /// Guides through the remaining loads. When none remains, fits the unit to them.
     ///
     /// # Errors
-    /// When sensor, gauge or folder fail; what was recorded until then stays. When the loads cannot
-    /// be joined with the gauge, or no unit explains them.
+    /// When sensor, gauge or folder fail; what was recorded before stays. When the loads cannot be
+    /// aligned with the gauge, or no unit explains them.
     pub fn lead(&self, into: &Path, weights: Option<&Path>, known: Known<'_>) -> Result<()> {
         let tasks = self.tasks(known.from.is_some())?;
         let weights = match weights {
@@ -100,8 +100,8 @@ impl GuideArgs {
         Ok(())
     }
 
-    /// What a person is to do: press anywhere, or put on loads, fewer for a film in a unit whose
-    /// camera is known.
+    /// The person's tasks: presses anywhere, or loads; fewer loads for a new film in a unit with
+    /// known camera.
     fn tasks(&self, is_swapped: bool) -> Result<Vec<Task>> {
         if let Some(task) = self.free.task() {
             return Ok(vec![task]);

@@ -1,8 +1,8 @@
-//! The loads that a person puts on, in words.
+//! Plans the loads that a person applies, with instructions.
 
 use crate::data::collect::poses::{Pose, Task};
 
-/// More loads tell hardly more of a unit (`docs/results/units.md`).
+/// More loads hardly improve a unit's fit (`docs/results/units.md`).
 pub const MOST_LOADS: usize = 10;
 
 /// The usual loads: α and β in degrees, x and y in mm, and |F| in mN. One weak and one strong in
@@ -19,30 +19,30 @@ const USUAL: [([f64; 2], [f64; 2], u32); MOST_LOADS] = [
     ([0.0, 0.0], [0.0, 3.0], 100),
     ([0.0, 0.0], [0.0, -3.0], 100),
 ];
-/// Those for another film in a unit whose camera and dots are known: its stiffness, its thickness
-/// and where its middle is are left.
+/// Loads for a new film in a unit with known camera and dots. They determine its stiffness, its
+/// thickness and where its middle is.
 const SWAPPED: [([f64; 2], [f64; 2], u32); 3] = [
     ([0.0, 0.0], [0.0, 0.0], 200),
     ([0.0, 0.0], [3.0, 0.0], 100),
     ([0.0, 0.0], [0.0, 3.0], 100),
 ];
-/// |F| that is asked for where nobody says, mN.
+/// The requested |F| if none is given, mN.
 const USUAL_MN: u32 = 100;
 
-/// A load to be put on.
+/// A planned load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Planned {
     pub pose: Pose,
-    /// About how much force, mN: the gauge says how much it was.
+    /// Approximate force, mN; the gauge measures the actual one.
     pub force_mn: u32,
 }
 
-/// The usual ten.
+/// The usual ten loads.
 pub fn usual() -> Vec<Planned> {
     of_list(&USUAL)
 }
 
-/// The three for a film that was swapped.
+/// The three loads for a swapped film.
 pub fn swapped() -> Vec<Planned> {
     of_list(&SWAPPED)
 }
@@ -60,7 +60,7 @@ fn of_list(list: &[([f64; 2], [f64; 2], u32)]) -> Vec<Planned> {
     planned.collect()
 }
 
-/// Those of a list.
+/// Loads at the poses of a list.
 pub fn of_poses(list: &[Pose]) -> Vec<Planned> {
     let planned = list.iter().map(|&pose| Planned {
         pose,
@@ -69,7 +69,7 @@ pub fn of_poses(list: &[Pose]) -> Vec<Planned> {
     planned.collect()
 }
 
-/// What a person is asked to do for each, in a take of so many seconds.
+/// The instructions for each load, in takes of this many seconds.
 pub fn tasks(planned: &[Planned], seconds: f64) -> Vec<Task> {
     let all = planned.len();
     let task = |(number, it): (usize, &Planned)| Task {
@@ -89,7 +89,7 @@ pub fn tasks(planned: &[Planned], seconds: f64) -> Vec<Task> {
     (1..).zip(planned).map(task).collect()
 }
 
-/// A pose for somebody who has a stage before them.
+/// A pose in words, for a person with a stage.
 fn words(pose: &Pose) -> String {
     let [alpha, beta] = pose.angles_deg;
     let tilt = match pose.angles_deg {

@@ -1,4 +1,4 @@
-//! How good a unit's model is on loads that it was not fitted to.
+//! Sums up a unit's model: its errors on loads that it was not fitted to.
 
 use std::fmt;
 
@@ -8,15 +8,15 @@ use crate::unit_fit::LeftOut;
 #[derive(Clone, Copy, Debug)]
 pub struct Verdict {
     loads: usize,
-    /// `None` where nobody noted directions.
+    /// `None` if nobody noted directions.
     direction_deg: Option<f64>,
     magnitude_mn: f64,
-    /// Of the place along x and y each; `None` where nobody noted places.
+    /// Of the place along x and y each; `None` if nobody noted places.
     place_um: Option<f64>,
 }
 
 impl Verdict {
-    /// Of loads that were left out, the gauge's and the stage's own errors included.
+    /// From loads that were left out; includes the gauge's and the stage's own errors.
     pub fn of(left_out: &[LeftOut]) -> Verdict {
         let of = |values: Vec<f64>| (!values.is_empty()).then(|| root_mean_square(&values));
         let noted = left_out.iter().filter(|load| load.place_mm.is_some());
