@@ -6,7 +6,7 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `data` | forces together with what the sensor saw: rendered, or from a unit and a force gauge |
+//! | `data` | forces with what the sensor saw: rendered, or from a unit and a force gauge |
 //! | `evaluation` | errors of a model's forces |
 //! | `train`, `fit` | networks; from a data set to weights |
 //! | `forward` | the film run forwards, from the known numbers of a unit |

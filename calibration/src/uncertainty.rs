@@ -43,7 +43,7 @@ fn tells_no_place(place_mm: &[f64; KNOTS]) -> bool {
 /// The error of a force and of its place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Miss {
-    /// F| found, N.
+    /// |F| found, N.
     pub found_n: f64,
     /// The angle between found and true force (radians) times |F| found, N.
     pub across_n: f64,

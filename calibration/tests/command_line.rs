@@ -1,4 +1,4 @@
-//! The program as a user runs it.
+//! Runs the program as a user does.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -74,7 +74,7 @@ fn from_data_to_a_checked_model() {
         assert!(report.contains(words), "no `{words}` in:\n{report}");
     }
 
-    // Going on from the network as it is changes nothing.
+    // Training that starts from a network and makes no pass changes nothing.
     let again = ["train", "--data", "data.csv", "--start", "a.weights"];
     let none = ["--epochs", "0", "--rounded-epochs", "0"];
     stdout(&run(
@@ -85,7 +85,7 @@ fn from_data_to_a_checked_model() {
     assert_eq!(network("a.weights").layers, network("b.weights").layers);
 }
 
-/// What the labels mean goes from the data set into the model and every report.
+/// The meaning of the labels passes from the data set into the model and every report.
 #[test]
 fn the_contact_reading_is_carried_through() {
     let directory = tempfile::tempdir().unwrap();

@@ -1,5 +1,5 @@
-//! The model that firmware and host tool embed: the committed weights give it, byte for byte, and
-//! it is as good as `docs/training.md` says.
+//! Checks the model embedded in firmware and host tool: the committed weights give it byte for
+//! byte, and its errors are those in `docs/training.md`.
 
 use std::fs;
 use std::path::PathBuf;
@@ -23,17 +23,17 @@ fn committed() -> Vec<u8> {
     fs::read(models().join("default.hvtm")).unwrap()
 }
 
-/// The same for cameras that send YUV422.
+/// The model for cameras that send YUV422.
 fn committed_for_yuv422() -> Vec<u8> {
     fs::read(models().join("yuv422/default.hvtm")).unwrap()
 }
 
-/// That for an MT9V034 with its lens of 1.2 mm and black markers.
+/// The model for an MT9V034 with its lens of 1.2 mm and black markers.
 fn committed_for_mt9v034() -> Vec<u8> {
     fs::read(models().join("mt9v034/default.hvtm")).unwrap()
 }
 
-/// The tip within ±4 mm of the middle: each ring of a millimetre.
+/// The tip within ±4 mm of the middle, by rings of a millimetre.
 #[test]
 fn it_measures_force_and_place_wherever_the_tip_presses() {
     let recipe = Recipe {
@@ -60,7 +60,7 @@ fn it_measures_force_and_place_wherever_the_tip_presses() {
     }
 }
 
-/// Of loads too weak for a direction or a place, too, the model refuses hardly any.
+/// The model refuses hardly any frames, even of loads too weak for a direction or a place.
 #[test]
 fn the_weakest_presses_are_measured() {
     let weak = Recipe {
@@ -107,7 +107,7 @@ fn the_model_for_yuv422_is_made_for_the_same_unit_and_measures_its_frames() {
     let report = check(&bytes, 400, 77, || ()).unwrap();
     let errors = &report.errors;
     assert!(errors.count() >= 380, "{report}");
-    // It sees half as many columns in colour.
+    // In colour, such a camera has half as many columns.
     assert!(errors.mean_strong_direction_deg() < 0.3, "{report}");
     assert!(errors.magnitude_rmse_n() < 0.1e-3, "{report}");
 }
@@ -116,8 +116,8 @@ fn newtons(micronewtons: i32) -> f64 {
     f64::from(micronewtons) * 1e-6
 }
 
-/// A press in a corner whose guess by the network leads to where the film's tables bend: no step
-/// from there goes further downhill, 0.3 mm and 7 mN off.
+/// A press in a corner for which the network's first guess leads to a bend of the film's tables. No
+/// step from there lowers the residual, 0.3 mm and 7 mN off.
 #[test]
 fn steps_that_find_no_way_on_begin_anew_from_the_middle() {
     let bytes = committed_for_mt9v034();
@@ -182,7 +182,7 @@ fn it_is_made_for_the_firmware() {
 fn it_measures_frames_that_no_training_saw() {
     let report = check(&committed(), 1000, 77, || ()).unwrap();
     let errors = &report.errors;
-    // Where a strong press is far off the middle, a marker leaves the picture.
+    // Strong presses far from the middle move a marker out of the picture.
     let hidden = report.rejected.get("markers_missing").copied();
     assert!(errors.count() + hidden.unwrap_or(0) >= 997, "{report}");
     assert!(errors.count() >= 930, "{report}");
@@ -192,7 +192,7 @@ fn it_measures_frames_that_no_training_saw() {
     assert!(errors.place_rmse_mm().unwrap() < 0.01, "{report}");
 }
 
-/// Presses within ±4 mm, as many in each session.
+/// Presses within ±4 mm, the same number in each session.
 fn presses(each: usize, sessions: usize) -> Evaluation {
     let recipe = Recipe {
         loads: Loads::Random(each),
@@ -209,8 +209,8 @@ fn presses(each: usize, sessions: usize) -> Evaluation {
     Evaluation::of(&committed(), &dataset).unwrap()
 }
 
-/// A camera that is mounted otherwise cannot be told from dots that are glued otherwise: what is
-/// stated allows for both.
+/// A differently mounted camera and differently glued dots give the same picture: the stated
+/// uncertainty covers both.
 #[test]
 fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
     let evaluation = presses(50, 40);
@@ -220,7 +220,8 @@ fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
     }
 }
 
-/// Over |F|: a tenth of the frames are 200, of which 95 to 97 in a hundred give or take 1.5.
+/// Each tenth of the frames by |F| holds 200; of these, 95 to 97 in a hundred lie within their
+/// bounds, give or take 1.5.
 #[test]
 fn its_uncertainties_are_honest() {
     let evaluation = presses(2_000, 1);
@@ -248,7 +249,7 @@ fn damaged_models_are_not_checked() {
 #[test]
 fn unusable_weights_are_refused_with_the_reason() {
     let text = fs::read_to_string(models().join("default.weights")).unwrap();
-    // A key's number, or the first of its numbers, made negative or another one.
+    // Replaces a key's number, or the first of its numbers.
     let with = |key: &str, number: &str| {
         let at = text.find(key).unwrap() + key.len();
         let end = at + text[at..].find([',', '}']).unwrap();

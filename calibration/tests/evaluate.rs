@@ -1,4 +1,4 @@
-//! From the paper's poses to its figures.
+//! Evaluates a model on the paper's poses and draws the paper's figures.
 
 use std::sync::LazyLock;
 

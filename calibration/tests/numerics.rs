@@ -1,6 +1,6 @@
-//! Training, import and export at the extremes (`docs/numerics.md`). Those that measure print a row
-//! of that document's table: `cargo test --release -p hivtac-calibration --test numerics --
-//! --nocapture`.
+//! Tests training, import and export at extreme numbers (`docs/numerics.md`). Tests that measure
+//! print a row of that document's table: `cargo test --release -p hivtac-calibration --test
+//! numerics -- --nocapture`.
 
 use std::collections::HashMap;
 
@@ -19,7 +19,7 @@ use hivtac_terms::threshold::PixelFormat;
 use safetensors::serialize;
 use safetensors::tensor::{Dtype, TensorView};
 
-/// Where the markers rest, px; every feature a whole number of steps of 1/65,536.
+/// The markers' rest position, px; every feature is a whole multiple of 1/65,536.
 const REST: [f64; INPUTS] = [
     100.0, 60.0, 220.0, 60.0, 220.0, 180.0, 100.0, 180.0, 160.0, 120.0, 14_400.0,
 ];
@@ -40,7 +40,7 @@ fn weights(network: Network) -> Weights {
     }
 }
 
-/// What the chip makes of features, in N.
+/// The chip's answer to features, in N.
 fn on_the_chip(network: &Network, features: &[f64; INPUTS]) -> ([f64; 3], Output) {
     let bytes = export(&weights(network.clone())).unwrap();
     let model = Model::parse(&bytes).unwrap();
@@ -78,7 +78,7 @@ fn apart(a: [f64; 3], b: [f64; 3]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Markers that move by `px` in all directions.
+/// Features of markers that move by multiples of `px`.
 fn moved(px: f64) -> [f64; INPUTS] {
     std::array::from_fn(|i| REST[i] + px * [1.0, -1.0, 0.5][i % 3])
 }
@@ -89,7 +89,7 @@ fn row(stage: &str, tried: &str, bound: &str, worst: String) {
 
 #[test]
 fn a_feature_that_never_varies_says_nothing() {
-    // All features alike in all rows; and only one that varies.
+    // All rows with the same features; then only one feature that varies.
     let constant = Standardization::of(&vec![REST; 100_000]).unwrap();
     assert_eq!(constant.mean, REST);
     assert_eq!(constant.sigma, [1.0; INPUTS]);
@@ -121,8 +121,8 @@ fn a_feature_that_never_varies_says_nothing() {
     );
 }
 
-/// A deviation below what a feature's step of 1/65,536 px can give is a mistake that has to be
-/// told, not a model.
+/// A deviation below a feature's step of 1/65,536 px is a mistake that must be reported, not
+/// exported.
 #[test]
 fn deviations_are_exported_or_refused() {
     let network = |sigma: f64| {
@@ -139,7 +139,7 @@ fn deviations_are_exported_or_refused() {
         let (m, s) = (model.input.multipliers[3], model.input.shifts[3]);
         let factor = 4096.0 / (sigma * 65_536.0);
         let found = f64::from(m) / 2_f64.powi(s.into());
-        // What is too small for 2⁻⁶² stays the smallest there is: it moves no input.
+        // A factor too small for 2⁻⁶² keeps the smallest value: it moves no input.
         let least = 2_f64.powi(-62) * f64::from(1 << 23);
         assert!(
             (found / factor - 1.0).abs() < 1.0 / f64::from(1 << 23) || factor < least,
@@ -178,7 +178,7 @@ fn one_sample_and_duplicates_train_to_what_they_say() {
     worst = worst.max(apart(on_the_chip(&alone, &moved(3.0)).0, label));
     let same = trained(vec![moved(3.0); 500], vec![label; 500]);
     worst = worst.max(apart(on_the_chip(&same, &moved(3.0)).0, label));
-    // The same label whatever is seen.
+    // The same label for all features.
     let features: Vec<_> = (0..300).map(|i| moved(f64::from(i % 30) / 5.0)).collect();
     let constant = trained(features.clone(), vec![label; 300]);
     for features in &features {
@@ -208,8 +208,8 @@ fn one_sample_and_duplicates_train_to_what_they_say() {
     );
 }
 
-/// A safetensors file of a network whose first weight of the first layer, and whose bias, are as
-/// given.
+/// Imports a network from a safetensors file. The first unit of its first layer has this weight
+/// from every input and this bias; its first input has this sigma.
 fn imported(weight: f64, bias: f64, sigma: f64) -> anyhow::Result<Network> {
     let layer = |inputs: usize, outputs: usize| {
         (0..inputs * outputs)
@@ -269,8 +269,8 @@ fn imported_numbers_that_are_none_are_refused() {
     }
 }
 
-/// A row of weights of which single precision holds only denormals, or nothing, is one of zeros,
-/// beside any bias.
+/// A row of weights that single precision holds only as denormals, or as 0, counts as a row of
+/// zeros, with any bias.
 #[test]
 fn denormal_weights_are_as_none() {
     let mut worst = 0.0_f64;

@@ -1,4 +1,5 @@
-//! A network that PyTorch wrote (`python/train_pytorch.py --hidden 12,8 --epochs 60 --examples 5`).
+//! Imports a network that PyTorch wrote (`python/train_pytorch.py --hidden 12,8 --epochs 60
+//! --examples 5`).
 
 use std::collections::HashMap;
 use std::path::PathBuf;
@@ -72,7 +73,7 @@ fn it_goes_on_to_the_chip() {
     assert!(export(&fitted.weights).is_ok());
 }
 
-/// The network as the documented layout has it, written by this test.
+/// The network in the documented layout, written by this test.
 fn written(
     network: &Network,
     meaning: &str,
@@ -103,7 +104,7 @@ fn written(
     for (i, layer) in network.layers.iter().enumerate() {
         let weights = layer.weights.concat().into_iter().map(f64::from).collect();
         let bias = layer.bias.iter().map(|&b| f64::from(b)).collect();
-        // As an nn.Sequential counts, which has a ReLU after each.
+        // Numbered as in an nn.Sequential, which has a ReLU after each.
         tensors.push((
             format!("{}.weight", 2 * i),
             vec![layer.outputs(), layer.inputs()],
@@ -176,7 +177,7 @@ fn what_is_no_network_is_refused_with_the_tensor() {
         &written(&network, "force-vector", |t| t[4].2[3] = f64::INFINITY),
         "layer 0",
     );
-    // A number too large for single precision is infinite there.
+    // A number too large for single precision becomes infinite.
     refused(
         &written(&network, "force-vector", |t| t[4].2[3] = 1e300),
         "layer 0",

@@ -1,5 +1,5 @@
-//! The exported network against the floats that it came from: never further than its roundings add
-//! up to.
+//! Compares the exported network with its floats: the difference never exceeds the sum of its
+//! roundings.
 
 use hivtac_calibration::data::conditions::Conditions;
 use hivtac_calibration::data::range::Range;
@@ -76,8 +76,8 @@ fn rows(network: &Network, unit: &[[f64; INPUTS]]) -> Vec<[Q<16, i64>; INPUTS]> 
         .collect()
 }
 
-/// The most that rounding weights, bias and inputs can change a layer's outputs; `x` are its
-/// inputs, `e` their errors.
+/// The largest change of a layer's outputs due to the rounding of weights, bias and inputs; `x` are
+/// its inputs, `e` their errors.
 fn layer_error(layer: &Layer, x: &[f64], e: &[f64], step: f64) -> Vec<f64> {
     let one = |row: &Vec<f32>| {
         let scale = row.iter().map(|w| f64::from(w.abs())).fold(0.0, f64::max) / 127.0;

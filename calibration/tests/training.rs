@@ -1,4 +1,4 @@
-//! Training, small: it learns, it is repeatable, it says what it cannot learn from.
+//! Tests small trainings: they learn, are repeatable, and report data from which they cannot learn.
 
 use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::data::range::Range;
@@ -43,10 +43,10 @@ fn a_few_hundred_frames_teach_the_force() {
     let fitted = fit(&data(), &small(), |progress| losses.push(progress)).unwrap();
     assert_eq!(losses.len(), 90);
     assert_eq!(losses.iter().filter(|p| p.rounded).count(), 30);
-    // Standardized forces: always answering their mean has a loss of 1.
+    // Standardized forces: answering always their mean has a loss of 1.
     let last = losses.last().unwrap();
     assert!(last.loss < 0.1, "{last:?}");
-    // Always answering the mean force is 58 mN off in |F| (0.2 N / √12).
+    // Answering always the mean force has an error of 58 mN in |F| (0.2 N / √12).
     assert!(
         fitted.quantized.magnitude_rmse_n() < 0.012,
         "{:?}",
@@ -56,7 +56,7 @@ fn a_few_hundred_frames_teach_the_force() {
     assert_eq!(fitted.weights.training.rows, 360);
 }
 
-/// As [`data`], the tip anywhere within 4.2 mm.
+/// As [`data`], with the tip anywhere within 4.2 mm.
 fn data_of_places() -> Dataset {
     let range = Range {
         force_n: 0.25,
@@ -80,7 +80,7 @@ fn frames_of_places_teach_the_place() {
         ..small()
     };
     let fitted = fit(&data, &options, |_| ()).unwrap();
-    // Always answering the middle is 2.4 mm off.
+    // Answering always the middle has an error of 2.4 mm.
     let place_mm = fitted.quantized.place_rmse_mm().unwrap();
     assert!(place_mm < 1.2, "{place_mm}");
     assert!(fitted.quantized.magnitude_rmse_n() < 0.012);
@@ -102,7 +102,7 @@ fn frames_of_places_teach_the_place() {
     assert!(evaluation.to_html().contains("Off the middle"));
     assert!(evaluation.to_string().contains("µm along x and y each"));
 
-    // Without the place it is as before.
+    // A network without the place among its outputs gives forces only.
     let force = Options {
         epochs: 2,
         rounded_epochs: 1,

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | `answer` | the chip's answer to a row of a data set |
 //! | `judge` | its answers to a whole data set, compared with the truth |
-//! | `numbers`, `figures`, `places`, `report` | the paper's numbers and figures (Section 7.1) of these |
+//! | `numbers`, `figures`, `places`, `report` | their numbers and figures, as the paper's (7.1) |
 //! | `bounds`, `coverage` | the 95 % bounds of stated uncertainties, and whether they hold |
 //! | `check`, `errors` | newly rendered frames, through the whole pipeline |
 //! | `plot` | SVG |

@@ -50,7 +50,7 @@ const TRIES: usize = 3;
 /// Newton's steps to the size of the images.
 const SIZE_STEPS: usize = 8;
 
-/// How units differ of which only a rest picture is known.
+/// How much units differ when only their rest picture is known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OtherUnits {

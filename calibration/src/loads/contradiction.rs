@@ -25,7 +25,7 @@ const FACTOR: f64 = 25.0;
 /// A load as estimated by a sensor that knows only the unit's rest position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoughLoad {
-    /// F|, N, to a small factor.
+    /// |F|, N, to a small factor.
     pub magnitude_n: f64,
     /// The place, mm, to half a millimetre.
     pub place_mm: [f64; 2],

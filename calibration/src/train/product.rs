@@ -1,7 +1,7 @@
 //! Computes the only matrix product of training, fast and with the same bits on every machine.
 //!
 //! Every element is summed separately, in the order of the inner index. Vector instructions only
-//! process several elements at a time; nothing is fused or reassociated. So the machine's
+//! process several elements at a time; sums are not fused or reassociated. So the machine's
 //! instruction set and number of threads do not matter.
 
 use std::ops::{AddAssign, Mul};

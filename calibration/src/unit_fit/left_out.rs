@@ -10,7 +10,7 @@ use super::problem::Problem;
 /// Difference between a load found with a model fitted to all others, and its stated values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeftOut {
-    /// F| found minus |F| stated, N.
+    /// |F| found minus |F| stated, N.
     pub size_n: f64,
     /// Angle between the two directions, degrees.
     pub direction_deg: f64,

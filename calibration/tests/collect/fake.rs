@@ -1,4 +1,4 @@
-//! A sensor whose film is a formula, and a hand that presses it.
+//! A fake sensor whose film is a formula, and a hand that presses it.
 
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::units::{
@@ -27,7 +27,7 @@ use hivtac_wire::message::{
 use hivtac_wire::settings::{RestPosition, TareReport};
 use hivtac_wire::version::SCHEMA_HASH;
 
-/// How hard the hand presses at a time of the sensor, N; it begins after a second.
+/// The hand's force at a time of the sensor, N; it begins after a second.
 pub fn press_n(time_s: f64) -> f64 {
     let t = time_s - 1.0;
     let swing = |hz: f64| (TAU * hz * t).sin();
@@ -35,14 +35,14 @@ pub fn press_n(time_s: f64) -> f64 {
     if t < 0.0 { 0.0 } else { force.clamp(0.0, 0.2) }
 }
 
-/// A force in the film frame, N.
+/// The force with this size, N, and these angles, degrees, in the film frame, N.
 pub fn force_n(size: f64, [alpha, beta]: [f64; 2]) -> [f64; 3] {
     let (sin_a, cos_a) = alpha.to_radians().sin_cos();
     let (sin_b, cos_b) = beta.to_radians().sin_cos();
     [sin_a * cos_b, sin_b, -cos_a * cos_b].map(|part| size * part)
 }
 
-/// Where the markers are under a force: apart with its square root, aside in proportion.
+/// The markers under a force: spread with its square root, shifted in proportion.
 pub fn markers(force: [f64; 3]) -> [Marker; 4] {
     let apart = 40.0 * (-force[2]).max(0.0).sqrt();
     let marker = |x: f64, y: f64| Marker {
@@ -77,24 +77,24 @@ pub fn hello() -> DeviceHello {
     }
 }
 
-/// What the sensor's clock says, and how it goes on from frame to frame.
+/// Returns the sensor's time of the next frame.
 pub type Clock = Box<dyn FnMut() -> f64 + Send>;
 
-/// What a sensor measures: of the frame of this number, since the start of samples of this number.
-/// Both count from 1.
+/// The sample of a frame, by the frame's number and the number of starts of samples before it. Both
+/// count from 1.
 pub type Film = Box<dyn FnMut(u32, u32) -> Sample + Send>;
 
-/// A sensor on a TCP port, whose film is pressed in the pose that the test sets.
+/// A sensor on a TCP port, whose film is pressed in the pose set by the test.
 pub struct FakeSensor {
     pub port: String,
     pub pose: Arc<Mutex<[f64; 2]>>,
-    /// What a tare is answered with.
+    /// The answer to a tare.
     pub tare: Arc<Mutex<Outcome>>,
 }
 
 impl FakeSensor {
-    /// Every seventh frame misses a marker, and in every eleventh one is half covered. `after`
-    /// frames of a conversation it is gone.
+    /// Every seventh frame lacks a marker, and every eleventh one is half covered. The sensor
+    /// disappears after `after` frames of a conversation.
     pub fn start(mut clock: Clock, after: usize) -> Self {
         let pose = Arc::new(Mutex::new([0.0; 2]));
         let set = pose.clone();
@@ -105,7 +105,7 @@ impl FakeSensor {
         }
     }
 
-    /// One that measures what is said; `after` frames of a conversation it is gone.
+    /// A sensor that measures this film; it disappears after `after` frames of a conversation.
     pub fn of_film(mut film: Film, after: usize) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp:{}", listener.local_addr().unwrap());
@@ -225,8 +225,8 @@ fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
     }
 }
 
-/// A sample of a film that a straight force presses, N, as a model that knows nothing of the unit
-/// feels it: µN, and where.
+/// A sample of a film under a straight force, N. Its force, µN, and place are those of a model that
+/// does not know the unit.
 pub fn pressed(
     frame: u32,
     time_s: f64,
@@ -253,11 +253,11 @@ pub fn pressed(
 
 fn send(stream: &mut TcpStream, message: &DeviceMessage) {
     let mut buffer = [0; MAX_DEVICE_FRAME];
-    // A host that is gone is noticed when nothing can be read.
+    // A write to a host that is gone may fail; the next read notices it.
     let _ = stream.write_all(encode(message, &mut buffer).unwrap());
 }
 
-/// `hivtac-calibrate ARGUMENTS`, ready to be talked to.
+/// Starts `hivtac-calibrate ARGUMENTS` with its input and outputs connected.
 pub fn start(here: &Path, arguments: &[&str]) -> Child {
     Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
         .current_dir(here)
@@ -269,7 +269,7 @@ pub fn start(here: &Path, arguments: &[&str]) -> Child {
         .unwrap()
 }
 
-/// The same to its end, with lines on its standard input.
+/// Runs it to its end, with lines on its standard input.
 pub fn run(here: &Path, arguments: &[&str], lines: &str) -> (Output, String) {
     let mut child = start(here, arguments);
     child
@@ -282,7 +282,7 @@ pub fn run(here: &Path, arguments: &[&str], lines: &str) -> (Output, String) {
     (output, std::fs::read_to_string(here.join("said")).unwrap())
 }
 
-/// Its standard output when it succeeded.
+/// Its standard output; it must have succeeded.
 pub fn stdout((output, said): (Output, String)) -> String {
     assert!(output.status.success(), "{said}");
     String::from_utf8(output.stdout).unwrap()

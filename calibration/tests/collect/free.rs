@@ -1,4 +1,4 @@
-//! Presses anywhere: from a hand that covers the film to a data set, through an interruption.
+//! Presses anywhere: from a hand that covers the film to a data set, with an interruption.
 
 use std::io::{Read, Write};
 use std::path::Path;
@@ -12,7 +12,7 @@ use hivtac_terms::units::{Micrometres, SignedMicrometres};
 use crate::fake::*;
 use crate::over_serial::pseudo_terminal;
 
-/// Seconds from frame to frame.
+/// Time between frames, s.
 const FRAME_S: f64 = 0.04;
 /// The untouched film before the first press, s.
 const BEFORE_S: f64 = 1.0;
@@ -21,12 +21,12 @@ const SIDE: usize = 5;
 const FORCES_N: [f64; 3] = [0.05, 0.1, 0.2];
 const PRESSES: usize = SIDE * SIDE * FORCES_N.len();
 
-/// How long a press takes, s: no two alike.
+/// Length of a press, s: each different.
 fn length_s(press: usize) -> f64 {
     0.55 + 0.3 * (press as f64 * 0.618).fract()
 }
 
-/// Where and how hard a hand presses, mm and N, that goes over the film again and again.
+/// Place, mm, and force, N, of a hand that passes over the film repeatedly.
 fn press(time_s: f64) -> ([f64; 2], f64) {
     let (mut press, mut left_s) = (0, time_s - BEFORE_S);
     if left_s < 0.0 {
@@ -43,7 +43,7 @@ fn press(time_s: f64) -> ([f64; 2], f64) {
     ([at(place % SIDE), at(place / SIDE)], force_n)
 }
 
-/// A sensor under that hand; its own model feels a fifth too little.
+/// A sensor under that hand; its own model reports a fifth too little.
 pub fn sensor(after: usize) -> FakeSensor {
     let mut time_s = 0.0;
     let film = move |frame, _| {
@@ -75,7 +75,8 @@ pub fn record<'a>(port: &'a str, free_s: &'a str) -> Vec<&'a str> {
     [&record[..], &more].concat()
 }
 
-/// Without a terminal there is a line every ten seconds; with all covered it ends before its time.
+/// Without a terminal there is a line every ten seconds; with complete coverage the take ends
+/// early.
 #[test]
 fn a_hand_that_covers_the_film_is_let_go_and_its_presses_are_a_data_set() {
     let directory = tempfile::tempdir().unwrap();
@@ -121,7 +122,7 @@ fn a_hand_that_covers_the_film_is_let_go_and_its_presses_are_a_data_set() {
         FORCES_N.iter().any(near)
     });
     assert!(held.count() > pressed.len() / 2);
-    // A network is not trained on what nobody noted.
+    // A network is not trained on presses at unknown places.
     let train = ["train", "--data", "data.csv", "--out", "unit.weights"];
     let (output, said) = run(here, &train, "");
     let left_out = String::from_utf8(output.stdout).unwrap();
@@ -139,7 +140,7 @@ fn a_hand_that_covers_the_film_is_let_go_and_its_presses_are_a_data_set() {
 fn an_interrupted_hand_goes_on_with_the_time_that_is_left() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
-    // Gone after some 13 s of the second conversation.
+    // The sensor disappears after some 13 s of the second conversation.
     let sensor = sensor(345);
     let arguments = record(&sensor.port, "20");
     let (output, said) = run(here, &arguments, "\n\n");
@@ -160,7 +161,7 @@ fn an_interrupted_hand_goes_on_with_the_time_that_is_left() {
         takes.contains("1,0,0,") && takes.trim_end().ends_with(",0,,"),
         "{takes}"
     );
-    // Once it is done there is nothing left of it.
+    // Once the take is done, no time of it is left.
     let (output, said) = run(here, &arguments, "\n\n");
     assert!(
         output.status.success() && !said.contains("Press the film"),
@@ -168,7 +169,7 @@ fn an_interrupted_hand_goes_on_with_the_time_that_is_left() {
     );
 }
 
-/// The guided command does both and writes the loads down.
+/// The guided command does both and writes the loads.
 #[test]
 fn a_unit_is_led_from_presses_anywhere_to_its_loads() {
     let directory = tempfile::tempdir().unwrap();
@@ -211,7 +212,7 @@ fn what_cannot_be_pressed_is_refused_before_anything_is_recorded() {
     assert!(!here.join("unit").exists());
 }
 
-/// On a terminal there is a map, drawn again over itself.
+/// On a terminal there is a map, drawn over itself.
 #[test]
 fn a_terminal_shows_a_map() {
     let directory = tempfile::tempdir().unwrap();
@@ -228,7 +229,7 @@ fn a_terminal_shows_a_map() {
         .unwrap();
     child.stdin.take().unwrap().write_all(b"\n\n").unwrap();
     let mut shown = Vec::new();
-    // Ends with an error once nobody has the terminal any more.
+    // Ends with an error once the terminal is closed.
     let _ = person.read_to_end(&mut shown);
     assert!(child.wait().unwrap().success());
     let shown = String::from_utf8(shown).unwrap();

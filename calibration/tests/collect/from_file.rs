@@ -9,7 +9,7 @@ use hivtac_wire::message::Outcome;
 
 use crate::fake::*;
 
-/// 100 frames a second, whatever the computer does.
+/// 100 frames per second, however fast the computer is.
 fn clock() -> Clock {
     let mut time = 0.0;
     Box::new(move || {
@@ -18,7 +18,7 @@ fn clock() -> Clock {
     })
 }
 
-/// What the gauge wrote of the first `span_s` seconds.
+/// The gauge's file of the first `span_s` seconds.
 fn gauge_file(here: &Path, span_s: f64) {
     let forces: Vec<_> = (0..(span_s * 200.0) as usize)
         .map(|i| (i as f64 / 200.0, press_n(i as f64 / 200.0)))
@@ -51,7 +51,7 @@ fn record<'a>(port: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     [&common[..], more].concat()
 }
 
-/// The rest position of a unit decides about every force of it.
+/// Every force of a unit depends on its rest position.
 #[test]
 fn a_film_that_cannot_be_tared_is_not_recorded() {
     let directory = tempfile::tempdir().unwrap();
@@ -69,7 +69,7 @@ fn from_a_recording_to_a_model_for_the_unit() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     for pose in ["8, -4", "-8, 4", "0, 8"] {
-        // Started anew each time, its clock too.
+        // Restarted each time, and its clock as well.
         let sensor = FakeSensor::start(clock(), usize::MAX);
         let angles = pose.split(", ").map(|angle| angle.parse().unwrap());
         *sensor.pose.lock().unwrap() = angles.collect::<Vec<f64>>().try_into().unwrap();
@@ -105,7 +105,7 @@ fn from_a_recording_to_a_model_for_the_unit() {
         (Loads::Measured(3), 3)
     );
     assert_eq!(data.about.down, Some([0.0, 0.0, -1.0]));
-    // Where the gauge's force is known, the film's formula gives the very features.
+    // Where the gauge's force is known, the film's formula gives exactly the features.
     let rest = data.rest().unwrap();
     let mut pressed = 0;
     for (seen, force) in data.accepted().filter(|(_, force)| *force != [0.0; 3]) {
@@ -145,7 +145,7 @@ fn an_interrupted_recording_goes_on_with_the_poses_that_are_left() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     std::fs::write(here.join("poses.csv"), "alpha,beta\n0,0\n8,0\n0,8\n").unwrap();
-    // Gone in the middle of the second take.
+    // The sensor disappears in the middle of the second take.
     let sensor = FakeSensor::start(clock(), 1400);
     let arguments = record(&sensor.port, &["--poses", "poses.csv"]);
     let (output, said) = run(here, &arguments, "\n\n\n\n");

@@ -1,4 +1,4 @@
-//! `unit --into`: led from the untouched film to a unit's own model, through an interruption.
+//! `unit --into`: guided from the untouched film to a unit's own model, with an interruption.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};
@@ -26,8 +26,8 @@ const LOADS: [[f64; 4]; 6] = [
     [0.0, 0.0, 0.0, -3.0],
 ];
 const FORCE_N: f64 = 0.1;
-/// What the hand does between two starts of samples: which load it presses, if any. It forgets the
-/// second one at first.
+/// The load that the hand presses after each start of samples, if any. The hand at first forgets
+/// the second load.
 const HAND: [Option<usize>; 9] = [
     None,
     Some(0),
@@ -39,10 +39,11 @@ const HAND: [Option<usize>; 9] = [
     Some(4),
     Some(5),
 ];
-/// Seconds from frame to frame.
+/// Time between frames, s.
 const FRAME_S: f64 = 0.04;
 
-/// The force of a press, N, so long after the take began: held a good second, no two alike.
+/// The force of a press, N, at this time after the take began: held for over a second, each
+/// differently.
 fn press_n(load: usize, time_s: f64) -> f64 {
     let begin = 0.3 + 0.1 * ((3 * load) % 7) as f64;
     let end = begin + 1.3 + 0.07 * load as f64;
@@ -50,10 +51,10 @@ fn press_n(load: usize, time_s: f64) -> f64 {
     FORCE_N * rise.clamp(0.0, 1.0)
 }
 
-/// What was pressed when: s, N.
+/// Time and force of the presses: s, N.
 type Pressed = Arc<Mutex<Vec<(f64, f64)>>>;
 
-/// The simulated sensor's film, seen by the sensing in rendered frames.
+/// The simulated sensor's film, measured by the sensing in rendered frames.
 fn film(pressed: Pressed) -> Film {
     let recipe = Recipe::default();
     let scene = recipe.scene(0).unwrap();
@@ -94,7 +95,7 @@ fn film(pressed: Pressed) -> Film {
     })
 }
 
-/// What the sensor's own model makes of it: the size alone matters here.
+/// The answer of the sensor's own model: only the size matters here.
 fn felt(force_n: f64) -> Force {
     let size = (1e6 * force_n) as i32;
     Force {
@@ -108,7 +109,7 @@ fn felt(force_n: f64) -> Force {
     }
 }
 
-/// The number after these words.
+/// The number that follows these words.
 fn number(text: &str, words: &str) -> f64 {
     let (_, rest) = text
         .split_once(words)
@@ -141,7 +142,7 @@ fn a_person_is_led_to_a_units_own_model() {
         ],
     ]
     .concat();
-    // The untouched film, the first load, the second one twice, the third.
+    // The untouched film, the first load, the second load twice, and the third.
     let (begun, said) = run(here, &with_sensor, "\n\n\n\n\ndone\n");
     assert!(
         said.contains("Load 1 of 6: the film level, the tip over its middle"),
@@ -161,7 +162,7 @@ fn a_person_is_led_to_a_units_own_model() {
     );
     let stdout = String::from_utf8(begun.stdout).unwrap();
     assert!(stdout.contains("3 of 6 loads are left"), "{stdout}: {said}");
-    // The film again, and the three that are left; then a gauge is missing.
+    // The untouched film again, and the three remaining loads; then a gauge is missing.
     let (gone_on, said) = run(here, &with_sensor, "\n\n\n\n");
     assert!(
         said.contains("Load 6 of 6") && !said.contains("Load 3 of 6"),
@@ -178,14 +179,14 @@ fn a_person_is_led_to_a_units_own_model() {
     };
     let lines = gauge.lines(&pressed.lock().unwrap()).unwrap();
     std::fs::write(here.join("gauge.csv"), lines).unwrap();
-    // No sensor is needed any more.
+    // A sensor is no longer needed.
     let (done, said) = run(here, &[&unit[..], &["--gauge", "gauge.csv"]].concat(), "");
     let stdout = String::from_utf8(done.stdout).unwrap();
     assert!(done.status.success(), "{stdout}: {said}");
     assert_good(here, &stdout);
 }
 
-/// The verdict on loads left out, and the model's file.
+/// Checks the verdict on loads left out, and the model's file.
 fn assert_good(here: &Path, stdout: &str) {
     let verdict = stdout
         .lines()

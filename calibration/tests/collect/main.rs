@@ -1,4 +1,4 @@
-//! `hivtac-calibrate collect` with a sensor and a gauge that are played by the tests.
+//! Tests of `hivtac-calibrate collect` with a fake sensor and a fake gauge.
 #![cfg(unix)]
 
 mod fake;

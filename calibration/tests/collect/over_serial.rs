@@ -24,8 +24,8 @@ pub fn pseudo_terminal() -> (File, File, String) {
     (gauge.into(), host.into(), name.into_string().unwrap())
 }
 
-/// A gauge that shows, 0.15 s late, what presses; now and then a line is spoilt. Until it is told
-/// to end.
+/// Plays a gauge that shows the pressing force 0.15 s late, with an occasional spoilt line, until
+/// `end`.
 fn play(mut gauge: File, begun: Instant, end: Arc<AtomicBool>) {
     let mut count = 0;
     while !end.load(Ordering::Relaxed) {
@@ -108,7 +108,7 @@ fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
         .unwrap()
         .parse()
         .unwrap();
-    // A busy computer adds some milliseconds to either side.
+    // A busy computer adds some milliseconds on either side.
     assert!((0.1..0.2).contains(&lag), "{report}");
     assert!(
         report.contains("gauge lines were not used (no reading"),
@@ -116,7 +116,7 @@ fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
     );
 }
 
-/// A gauge set to another output would have ten loads put on for nothing.
+/// A gauge set to a different output would waste ten loads.
 #[test]
 fn a_gauge_that_sends_no_readings_ends_the_guide_at_once() {
     let sends = |line: &'static str, words: &[&str]| {

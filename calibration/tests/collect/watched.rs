@@ -10,7 +10,7 @@ use serde_json::Value;
 use crate::fake::start;
 use crate::free::{record, sensor};
 
-/// The page's host and its path, once the program has said them.
+/// The page's host and path, once the program has printed them.
 fn address(here: &Path) -> (String, String) {
     let end = Instant::now() + Duration::from_secs(20);
     loop {
@@ -28,7 +28,7 @@ fn address(here: &Path) -> (String, String) {
     }
 }
 
-/// All that a request is answered until the other side ends.
+/// Sends a request, and returns the connection from which its answer is read.
 fn ask(host: &str, request: &str) -> TcpStream {
     let mut stream = TcpStream::connect(host).unwrap();
     stream.write_all(request.as_bytes()).unwrap();
@@ -37,19 +37,19 @@ fn ask(host: &str, request: &str) -> TcpStream {
 
 fn read(mut stream: TcpStream) -> String {
     let mut answer = Vec::new();
-    // A program that has ended resets it.
+    // A program that has ended resets the connection.
     let _ = stream.read_to_end(&mut answer);
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// The states of a stream of events, the oldest first.
+/// The states in a stream of events, the oldest first.
 fn states(events: &str) -> Vec<Value> {
     let states = events.split("event: state\ndata: ").skip(1);
     let states = states.filter_map(|rest| serde_json::from_str(rest.lines().next()?).ok());
     states.map(|told: Value| told["state"].clone()).collect()
 }
 
-/// How many places are covered where they are asked for: all but hard presses in corners.
+/// Number of covered places among the needed ones: all but hard presses in corners.
 fn covered(coverage: &Value) -> usize {
     let maps = coverage["maps"].as_array().unwrap().iter().enumerate();
     let places = maps.flat_map(|(size, map)| {
@@ -75,7 +75,7 @@ fn a_page_shows_what_the_terminal_says_and_orders_nothing() {
     let (host, path) = address(here);
     let get = format!("GET {path}events HTTP/1.1\r\nHost: {host}\r\n\r\n");
     let events = ask(&host, &get);
-    // The sensor of this test takes no other requests than those of a recording.
+    // This test's sensor accepts only the requests of a recording.
     let body = r#"{"sensor":0,"order":"tare"}"#;
     let refused = read(ask(
         &host,
@@ -104,7 +104,7 @@ fn a_page_shows_what_the_terminal_says_and_orders_nothing() {
         };
         assert_eq!(count.parse(), Ok(covered(coverage)), "{coverage}");
         last = last.max(covered(coverage));
-        // What is pressed is marked in the map of its range.
+        // The present press is marked in the map of its range.
         let marked = coverage["maps"].as_array().unwrap().iter();
         let marked = marked.filter(|map| !map["pressed"].is_null()).count();
         let now = coverage["now"].as_str().unwrap();

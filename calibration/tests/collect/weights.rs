@@ -6,21 +6,21 @@ use hivtac_calibration::data::dataset::Dataset;
 
 use crate::fake::*;
 
-/// Seconds from frame to frame.
+/// Time between frames, s.
 const FRAME_S: f64 = 0.04;
-/// The weights, g, and from when to when of its take each rests, s.
+/// The weights, g, and the start and end of each one's rest in its take, s.
 const WEIGHTS: [(f64, [f64; 2]); 3] = [(5.0, [2.3, 8.6]), (10.0, [1.4, 10.1]), (20.0, [3.2, 13.9])];
 /// The force of a gram, N.
 const GRAM_N: f64 = 9.806_65e-3;
 
-/// A weight that is put on within a tenth of a second, g, so long after its take began, s.
+/// The weight, g, on the film at this time after its take began, s; it is put on within 0.1 s.
 fn grams(load: usize, time_s: f64) -> f64 {
     let (grams, [on_s, off_s]) = WEIGHTS[load];
     let part = ((time_s - on_s) / 0.1).min((off_s - time_s) / 0.1);
     grams * part.clamp(0.0, 1.0)
 }
 
-/// A formula of a film that looks up, under these weights; tells when each take began, s.
+/// A film given by a formula that looks up, under these weights; records when each take began, s.
 fn sensor(begun: Arc<Mutex<Vec<f64>>>) -> FakeSensor {
     let (mut time_s, mut begun_s, mut last_start) = (0.0, 0.0, 0);
     let film = move |frame, start: u32| {
@@ -37,8 +37,8 @@ fn sensor(begun: Arc<Mutex<Vec<f64>>>) -> FakeSensor {
     FakeSensor::of_film(Box::new(film), usize::MAX)
 }
 
-/// What somebody notes by a watch that shows seconds, 50 s at the sensor's start: four lines a
-/// weight; the takes, that of the untouched film first, began then.
+/// A person's notes by a watch that shows seconds, 50 s at the sensor's start: four lines per
+/// weight. `begun_s` holds the start of each take, first that of the untouched film.
 fn notes(begun_s: &[f64]) -> String {
     let mut text = "s,weight\n50,0 g\n".to_owned();
     for (load, (grams, [on_s, off_s])) in WEIGHTS.iter().enumerate() {
@@ -55,7 +55,7 @@ fn notes(begun_s: &[f64]) -> String {
     text
 }
 
-/// The loads are those of the weights; three are too few for a fit, which is said.
+/// The loads are those of the weights; the program reports that three are too few for a fit.
 #[test]
 fn a_person_with_weights_is_led_to_loads() {
     let directory = tempfile::tempdir().unwrap();

@@ -7,7 +7,7 @@
 //! | `gauge.csv` | every line of a gauge at a serial port, as it came |
 //! | `takes.csv` | the takes that were finished |
 //! | `down.csv` | which way the sensor was held in each run, where that was known |
-//! | `covered.csv` | where and how hard the film was pressed enough, by the sensor's own account, in takes of presses anywhere |
+//! | `covered.csv` | places and forces covered by presses anywhere, as the sensor measured them |
 //!
 //! Every line is written at once. An interruption therefore costs at most the unfinished line,
 //! which the next run removes.
@@ -210,7 +210,7 @@ fn pair(numbers: Option<[f64; 2]>) -> String {
     numbers.map_or(",".to_owned(), |[a, b]| format!("{a},{b}"))
 }
 
-/// Status bits that depend on the model in use and say nothing about the markers.
+/// Status bits that depend on the model in use rather than on the markers.
 const OF_THE_MODEL: Status =
     Status(Status::MODEL_MISSING.0 | Status::MODEL_MISMATCH.0 | Status::UNEXPLAINED.0);
 

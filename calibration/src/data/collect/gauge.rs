@@ -7,10 +7,10 @@
 //! +0.123N    -0.123 N    0,123    123.4mN    0.0452 lbF    +0.123NTO    ST,+00012.3  g
 //! ```
 //!
-//! `what` comes from balances: `ST` steady, `US` unsteady, `GS` gross, `NT` net; `S S` and `S D`
-//! likewise. The letters after the unit are those of common gauges. First `T` or `C` for the
-//! present force (`P`: a held peak, not a present reading). Then `O`, `H` or `L` for its comparison
-//! with the gauge's own limits (`E`: overload). Before these letters, `K` and `O` are kgf and lbf.
+//! `what` comes from balances: `ST` or `S S` steady, `US` or `S D` unsteady, `GS` gross, `NT` net.
+//! The letters after the unit are those of common gauges. First `T` or `C` for the present force
+//! (`P`: a held peak, not a present reading). Then `O`, `H` or `L` for its comparison with the
+//! gauge's own limits (`E`: overload). Before these letters, `K` and `O` are kgf and lbf.
 
 pub use super::gauge_unit::Unit;
 use crate::data::dataset;

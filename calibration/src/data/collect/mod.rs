@@ -80,10 +80,10 @@ pub struct AlignArgs {
     out: PathBuf,
 }
 
-/// How well a direction is known, of a command line: a standard uncertainty, degrees.
+/// Parses a standard uncertainty of a direction, degrees, from a command line.
 ///
 /// # Errors
-/// When it is none that a press can have.
+/// When it is not a number above 0 and up to 45.
 pub fn direction_deg(text: &str) -> Result<f64, String> {
     match text.parse() {
         Ok(degrees) if degrees > 0.0 && degrees <= 45.0 => Ok(degrees),

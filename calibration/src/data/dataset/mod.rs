@@ -94,8 +94,7 @@ pub struct Row {
     /// Its session and its pose.
     pub place: Place,
     /// The labelled force, N, film frame: the force on the film in the contact reading `force`,
-    /// otherwise
-    /// F| along the pressing direction.
+    /// otherwise |F| along the pressing direction.
     pub force_n: [f64; 3],
     /// The point of the film under the tip, given by its rest position, mm from the middle; `None`
     /// without a force, and where unknown.
