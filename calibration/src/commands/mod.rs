@@ -1,4 +1,4 @@
-//! The commands, one file for each kind of file that they write.
+//! The program's commands, one module for each kind of file that they write.
 
 pub mod data;
 pub mod default_model;

@@ -1,4 +1,4 @@
-//! The effect of a film's own weight on its images, as a model file holds it.
+//! Computes the effect of a film's own weight on its images, for a model file.
 
 use anyhow::Result;
 use hivtac_sensor::force::forward::weight::{

@@ -147,8 +147,8 @@ impl Samples {
     }
 }
 
-/// The largest ratio of a component's deviation to the common one. A larger ratio means a force
-/// that is never tilted on purpose.
+/// The largest ratio of a component's deviation to the common one. With a larger ratio, nobody
+/// tilted the force on purpose.
 const MOST_APART: f64 = 16.0;
 
 /// Scaling of features and answers, from the data.

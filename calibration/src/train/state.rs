@@ -159,8 +159,8 @@ impl State {
         })
     }
 
-    /// Starts a phase. The first phase fixes the largest activation of each hidden layer on the
-    /// chip for the second.
+    /// Starts a phase. At the start of the rounded phase, the layers trained before determine the
+    /// largest activation of each hidden layer on the chip.
     pub fn begin(&mut self, phase: &Phase, training: &Samples) -> Result<()> {
         self.best = None;
         if phase.rounded {

@@ -1,4 +1,4 @@
-//! Gauss–Newton steps to the unit that explains the loads best.
+//! Finds the unit that explains the loads best, by Gauss–Newton steps.
 
 use anyhow::{Result, anyhow};
 use hivtac_shell::Change;
@@ -25,12 +25,14 @@ const TRUSTS: [Trust; 3] = [apart(100.0), apart(10.0), Trust::WHOLE];
 pub const EXPLAINED: f64 = 1.4;
 /// The greatest excess of the nominal family's χ² over its expectation, in standard deviations.
 const BY_CHANCE: f64 = 3.0;
-/// The greatest number of steps, and the fall of χ² below which they end.
+/// The greatest number of steps.
 const ROUNDS: usize = 20;
+/// Steps end when χ² falls by less than this.
 const SETTLED: f64 = 0.3;
-/// χ² over the number of coordinates above which a fit is far from the loads. There, steps end when
-/// they lower χ² by less than this part of it, because they then do not come near the loads.
+/// χ² over the number of coordinates above which a fit is far from the loads.
 const FAR: f64 = 100.0;
+/// There, steps end when they lower χ² by less than this part of it: they then do not come near the
+/// loads.
 const FAR_SETTLED: f64 = 0.03;
 /// Damping factors, tried in order until χ² falls (Levenberg–Marquardt): each is added to the prior
 /// of every number, in parts of that prior.

@@ -1,4 +1,4 @@
-//! A unit's own film as a model file holds it: tables of its dots, and their uncertainty.
+//! Makes a unit's own film as a model file holds it: tables of its dots, and their uncertainty.
 
 use std::collections::HashMap;
 use std::sync::Mutex;

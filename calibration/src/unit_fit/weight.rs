@@ -1,4 +1,4 @@
-//! What gravity does to a unit's film when it is turned, by finite elements.
+//! Computes what gravity does to a unit's film when it is turned, by finite elements.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::forward::weight::{AT_REST, SIZES, TERMS, UNDER_LOAD};

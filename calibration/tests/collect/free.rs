@@ -1,4 +1,4 @@
-//! Presses anywhere: from a hand that covers the film to a data set, with an interruption.
+//! Tests presses anywhere: from a hand that covers the film to a data set, with an interruption.
 
 use std::io::{Read, Write};
 use std::path::Path;

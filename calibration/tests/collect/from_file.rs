@@ -1,4 +1,4 @@
-//! A gauge that records by itself, with a clock of its own.
+//! Tests recordings with a gauge that records by itself, with a clock of its own.
 
 use std::path::Path;
 

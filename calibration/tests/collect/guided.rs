@@ -1,4 +1,4 @@
-//! `unit --into`: guided from the untouched film to a unit's own model, with an interruption.
+//! Tests `unit --into`: guided from the untouched film to a unit's own model, with an interruption.
 
 use std::path::Path;
 use std::sync::{Arc, Mutex};

@@ -1,4 +1,4 @@
-//! A gauge at a serial port, and Ctrl-C.
+//! Tests recordings with a gauge at a serial port, and Ctrl-C.
 
 use std::fs::File;
 use std::io::Write;

@@ -1,4 +1,4 @@
-//! Presses anywhere on a live page, as a browser reads it.
+//! Tests the live page of presses anywhere, as a browser reads it.
 
 use std::io::{Read, Write};
 use std::net::TcpStream;

@@ -1,4 +1,4 @@
-//! `unit --into` with weights and a watch instead of a gauge.
+//! Tests `unit --into` with weights and a watch instead of a gauge.
 
 use std::sync::{Arc, Mutex};
 
