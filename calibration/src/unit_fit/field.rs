@@ -408,8 +408,8 @@ fn depth(at: &At, state: &Equilibrium) -> f64 {
     rest - here
 }
 
-/// Coefficients a and b of f = a·x + b·x³ with the least relative squared errors at these pairs, f
-/// > 0.
+/// Coefficients a and b of f = a·x + b·x³ with the least relative squared errors at these pairs
+/// (x, f), with f > 0.
 fn cubic_law(pairs: impl IntoIterator<Item = (f64, f64)>) -> [f64; 2] {
     let [mut xx, mut xy, mut yy, mut xf, mut yf] = [0.0; 5];
     for (x, f) in pairs {

@@ -1,4 +1,5 @@
-//! Computes images of the dots of a film that finite elements solve, and their rates by changes of the film.
+//! Computes images of the dots of a film that finite elements solve, and their rates by changes of
+//! the film.
 
 use std::f64::consts::PI;
 
