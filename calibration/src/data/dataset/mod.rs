@@ -33,6 +33,7 @@ pub struct Dataset {
     /// One row per frame.
     pub rows: Vec<Row>,
 }
+
 /// Origin of a data set and meaning of its numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct About {
