@@ -22,14 +22,6 @@ pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     write_file(&Path::new("docs/results").join(name), &text)
 }
 
-/// A page's text with each figure in the place of its name in braces.
-pub fn filled(template: &str, figures: &[(&str, String)]) -> String {
-    let text = template.to_owned();
-    figures.iter().fold(text, |text, (name, figure)| {
-        text.replace(&format!("{{{name}}}"), figure.trim_end())
-    })
-}
-
 /// Writes a file of the project and says so.
 ///
 /// # Errors

@@ -7,8 +7,10 @@ use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
-use hivtac_data::dataset::{Dataset, Observation};
+use hivtac_calibration::weights::Weights;
+use hivtac_data::dataset::{Dataset, Loads, Observation, Recipe, generate};
 use hivtac_data::loads::norm;
+use hivtac_data::range::Range;
 use hivtac_evaluation::answer::Chip;
 use hivtac_evaluation::errors::angle_deg;
 use hivtac_sensing::model::Model;
@@ -16,10 +18,13 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
-use crate::large::{Large, dataset};
 use crate::page;
 use crate::press::{FORCES_MN, REACH_MM};
 
+/// Columns and rows.
+const SIZE: [u16; 2] = [800, 600];
+/// Steps from the answer of our network.
+const STEPS: u8 = 1;
 /// The seed of the frames that are judged.
 const TEST_SEED: u64 = 77;
 /// Frames within this of a force, in parts of it, count for it.
@@ -127,12 +132,7 @@ impl Paper {
 
     /// Weighted centroids, a small network and steps, as the chip computes them.
     fn ours(&self) -> Result<Vec<Judged>> {
-        let large = Large {
-            frames: self.frames,
-            presses: 0,
-            json: false,
-        };
-        let bytes = export(&large.weights()?)?;
+        let bytes = export(&small(self.frames)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let test = dataset(CentroidEstimator::RednessWeighted, self.judged, TEST_SEED)?;
         let mut chip = Chip::new(model, &test.rest()?)?;
@@ -144,6 +144,47 @@ impl Paper {
             (!status.contains(Status::UNEXPLAINED)).then_some((force_n, place_mm))
         }))
     }
+}
+
+/// A small network with the nominal film, from as many frames as are asked for.
+///
+/// # Errors
+/// When frames cannot be rendered, or training fails.
+fn small(frames: usize) -> Result<Weights> {
+    let dataset = dataset(CentroidEstimator::RednessWeighted, frames, 1)?;
+    let options = Training {
+        hidden: vec![32, 32],
+        meaning: Meaning::ForceAndPlace,
+        epochs: 150,
+        rounded_epochs: 100,
+        direction_weight: None,
+        ..Training::default()
+    };
+    let network = fit(&dataset, &options, |_| ())?.weights;
+    network.with_film(STEPS, &dataset)
+}
+
+/// So many presses anywhere, seen at 800×600.
+///
+/// # Errors
+/// When they cannot be rendered.
+fn dataset(centroid: CentroidEstimator, frames: usize, seed: u64) -> Result<Dataset> {
+    let [width, height] = SIZE;
+    let recipe = Recipe {
+        width,
+        height,
+        centroid,
+        loads: Loads::Random(frames),
+        range: Range {
+            force_n: 0.25,
+            alpha_deg: 10.0,
+            beta_deg: 10.0,
+            place_mm: 1.05 * REACH_MM,
+        },
+        seed,
+        ..Recipe::default()
+    };
+    generate(&recipe, || ())
 }
 
 /// What is said of the frames with a press.

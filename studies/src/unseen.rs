@@ -6,13 +6,12 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensing::forward::{Estimate, Forward, Pose};
+use hivtac_sensing::forward::{Estimate, Forward, Mounting, Observed, Pose};
 use hivtac_sensing::model::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
-use crate::convergence::ways::{Contact, Film};
 use crate::maps::{self, CALIBRATED_MM, Map, PLACES, place_mm};
 use crate::page;
 
@@ -81,7 +80,7 @@ impl Unseen {
     pub fn run(&self) -> Result<()> {
         let bytes = export(&Weights::load(&self.weights)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        let film = Film::new(&model, model).context("the model has no film")?;
+        let film = Film::new(&model).context("the model has no film")?;
         let maps: Vec<(u32, Vec<Cell>)> = FORCES_MN
             .into_iter()
             .map(|force_mn| {
@@ -111,9 +110,65 @@ impl Unseen {
     }
 }
 
+/// A model's film.
+struct Film<'m> {
+    forward: Forward<'m>,
+    mounting: Mounting,
+}
+
+/// A straight press, and the markers that show it.
+struct Contact {
+    pose: Pose,
+    observed: Observed<'static>,
+}
+
+impl<'m> Film<'m> {
+    /// Of a model; `None` when it has no film.
+    fn new(model: &Model<'m>) -> Option<Film<'m>> {
+        let forward = model.forward?;
+        let mounting = Mounting {
+            beside_mm: [[0.0; 2]; 4],
+            ..forward.rest_image.mounting(&model.rest)
+        };
+        Some(Film { forward, mounting })
+    }
+
+    /// A straight press, N, at a place, mm, as markers without noise show it.
+    fn contact(&self, force_n: f64, place_mm: [f64; 2]) -> Contact {
+        let Film { forward, mounting } = self;
+        let force_n = [0.0, 0.0, -force_n as f32];
+        let place_mm = place_mm.map(|part| part as f32);
+        let pose = Pose::of_force(force_n, place_mm, &forward.stiffness, &forward.limits);
+        let shown = forward
+            .tables
+            .predict(&pose, &forward.limits, &mounting.beside_mm);
+        let variances = forward.noise.at_rest_px.map(|part| {
+            let noise = mounting.scale() * part;
+            noise * noise
+        });
+        let observed = Observed {
+            hanging: None,
+            drift: None,
+            moved: shown.moved,
+            noise: std::array::from_fn(|k| forward.rest_image.noise(k, variances)),
+        };
+        Contact { pose, observed }
+    }
+
+    /// What the sensor makes of a marker that is seen farther along x and y, focal lengths.
+    fn estimate(&self, contact: &Contact, marker: usize, off: [f32; 2]) -> Estimate {
+        let Film { forward, mounting } = self;
+        let mut observed = contact.observed;
+        for (moved, off) in observed.moved[2 * marker..].iter_mut().zip(off) {
+            *moved += off;
+        }
+        forward.estimate(&observed, mounting, forward.unknown(true), contact.pose)
+    }
+}
+
 fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
     let place_mm = place_mm(number);
-    let contact = film.contact(f64::from(force_mn) * 1e-3, place_mm, None);
+    let contact = film.contact(f64::from(force_mn) * 1e-3, place_mm);
     let mut cell = Cell {
         place_mm,
         worst: Worst::default(),
@@ -124,14 +179,10 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
         for way in 0..WAYS {
             let turn = std::f32::consts::TAU * way as f32 / WAYS as f32;
             for off_px in OFF_PX {
-                let focal = off_px as f32 * film.per_px();
+                let focal = off_px as f32 * film.mounting.scale();
                 let off = [turn.cos(), turn.sin()].map(|part| focal * part);
-                cell.take(
-                    film.forward(),
-                    &contact,
-                    off_px,
-                    &contact.with_marker_off(marker, off),
-                );
+                let found = film.estimate(&contact, marker, off);
+                cell.take(&film.forward, &contact.pose, off_px, &found);
             }
         }
     }
@@ -139,8 +190,8 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
 }
 
 impl Cell {
-    fn take(&mut self, forward: &Forward<'_>, truth: &Contact<'_>, off_px: f64, found: &Estimate) {
-        let errors = errors(forward, &found.pose, truth.pose());
+    fn take(&mut self, forward: &Forward<'_>, truth: &Pose, off_px: f64, found: &Estimate) {
+        let errors = errors(forward, &found.pose, truth);
         let refused = !found.is_explained() || found.pose.size >= forward.limits.size;
         let matters = found.sigma(&forward.strength(true)).is_none_or(|sigma| {
             let stated = [

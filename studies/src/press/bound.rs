@@ -1,10 +1,10 @@
 //! The Cramér–Rao bound of a force and its place that are read from the centroids of four markers.
 
-use crate::peers::limit::matrix::{cholesky, dot, forward, inverse};
 use anyhow::{Context, Result};
 use hivtac_scene::Load;
 
 use super::TestedUnit;
+use super::matrix::{cholesky, dot, forward, inverse};
 
 /// Unknowns: F_x, F_y, F_z (N) and p_x, p_y (mm).
 const UNKNOWNS: usize = 5;
@@ -16,8 +16,6 @@ pub type Noise = [[f64; COORDINATES]; COORDINATES];
 /// Part of |F| by which a load is changed to see how the centroids follow, and how far a tip, mm.
 const STEP: f64 = 0.005;
 const STEP_MM: f64 = 0.01;
-/// How far the tip's radius is changed, mm.
-const RADIUS_STEP_MM: f64 = 0.02;
 
 /// The least mean squares that any unbiased reading can have.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -45,58 +43,22 @@ impl Bound {
     /// # Errors
     /// When a marker is out of sight, or the centroids leave an unknown undetermined.
     pub fn of(unit: &TestedUnit, load: &Load, noise: &Noise) -> Result<Bound> {
-        let covariance = covariance(jacobian(unit, load)?, noise)?;
-        Ok(Bound::of_covariance(load, |i, j| covariance[i][j]))
-    }
-
-    /// The same where nobody knows the tip's radius either; and the radius' mean square, mm².
-    ///
-    /// # Errors
-    /// As [`Bound::of`].
-    pub fn with_radius(unit: &TestedUnit, load: &Load, noise: &Noise) -> Result<(Bound, f64)> {
-        let [x, y, z, right, down] = jacobian(unit, load)?;
-        let by_radius = by_radius(unit, load)?;
-        let covariance = covariance([x, y, z, right, down, by_radius], noise)?;
-        let bound = Bound::of_covariance(load, |i, j| covariance[i][j]);
-        Ok((bound, covariance[UNKNOWNS][UNKNOWNS]))
-    }
-
-    /// Of the covariance of force, N, and place, mm.
-    fn of_covariance(load: &Load, covariance: impl Fn(usize, usize) -> f64) -> Bound {
+        let whitening = cholesky(noise)?;
+        let columns = jacobian(unit, load)?.map(|column| forward(&whitening, column));
+        let information: [[f64; UNKNOWNS]; UNKNOWNS] =
+            std::array::from_fn(|i| std::array::from_fn(|j| dot(&columns[i], &columns[j])));
+        let covariance = inverse(&information)?;
         let size = load.magnitude_n();
         let toward = load.vector_n().map(|part| part / size);
-        let both = |i: usize, j: usize| toward[i] * toward[j] * covariance(i, j);
+        let both = |i: usize, j: usize| toward[i] * toward[j] * covariance[i][j];
         let along: f64 = (0..9).map(|k| both(k / 3, k % 3)).sum();
-        let whole: f64 = (0..3).map(|i| covariance(i, i)).sum();
-        Bound {
+        let whole: f64 = (0..3).map(|i| covariance[i][i]).sum();
+        Ok(Bound {
             direction: (whole - along) / (size * size),
             force: along,
-            place: (covariance(3, 3) + covariance(4, 4)) / 2.0,
-        }
+            place: (covariance[3][3] + covariance[4][4]) / 2.0,
+        })
     }
-}
-
-/// The least covariance of unknowns that centroids follow so, px per each.
-fn covariance<const N: usize>(
-    columns: [[f64; COORDINATES]; N],
-    noise: &Noise,
-) -> Result<[[f64; N]; N]> {
-    let whitening = cholesky(noise)?;
-    let columns = columns.map(|column| forward(&whitening, column));
-    let information: [[f64; N]; N] =
-        std::array::from_fn(|i| std::array::from_fn(|j| dot(&columns[i], &columns[j])));
-    inverse(&information)
-}
-
-/// How the centroids follow the tip's radius, px per mm: central differences.
-fn by_radius(unit: &TestedUnit, load: &Load) -> Result<[f64; COORDINATES]> {
-    let radius_mm = unit.with_tip(*load)?.tip_radius_mm();
-    let [more, less] =
-        [RADIUS_STEP_MM, -RADIUS_STEP_MM].map(|step| load.with_tip_radius_mm(radius_mm + step));
-    let (more, less) = (seen(unit, &more?)?, seen(unit, &less?)?);
-    Ok(std::array::from_fn(|i| {
-        (more[i] - less[i]) / (2.0 * RADIUS_STEP_MM)
-    }))
 }
 
 /// How the centroids follow each unknown, px per N and px per mm: central differences.
@@ -125,12 +87,7 @@ fn jacobian(unit: &TestedUnit, load: &Load) -> Result<[[f64; COORDINATES]; UNKNO
 
 /// The true centroids under a load, px: x0, y0, x1, …
 fn centroids(unit: &TestedUnit, load: Load) -> Result<[f64; COORDINATES]> {
-    seen(unit, &unit.with_tip(load)?)
-}
-
-/// The same, of a load that says its tip.
-fn seen(unit: &TestedUnit, load: &Load) -> Result<[f64; COORDINATES]> {
-    let truth = unit.scene().truth_under(load)?;
+    let truth = unit.scene().truth_under(&unit.with_tip(load)?)?;
     let mut px = [0.0; COORDINATES];
     for (pair, marker) in px.chunks_exact_mut(2).zip(&truth.markers) {
         pair.copy_from_slice(&marker.context("a marker is out of sight")?.centroid_px);

@@ -3,16 +3,17 @@
 mod bound;
 mod drawn;
 mod held;
+mod matrix;
 mod real;
 mod rows;
 mod unit;
 
-pub use bound::{Bound, Noise};
+use bound::{Bound, Noise};
 use drawn::Drawn;
 pub use drawn::{normal, seeded};
-pub use held::{Held, noise_of};
+pub use held::Held;
 pub use real::RealFilm;
-pub use rows::{Errors, Off, Row, Tally};
+pub use rows::{Errors, Row, Tally};
 pub use unit::{Answer, Tared, TestedUnit};
 
 use hivtac_scene::{FilmError, Load};
@@ -46,24 +47,6 @@ pub fn press_of_any(
 ) -> Result<Load, FilmError> {
     let force_n = least_n + (most_n - least_n) * part(number, 11);
     press(number, force_n, reach_mm)
-}
-
-/// The press with this number whose tangential force is so many times its normal one, and turned
-/// anywhere.
-///
-/// # Errors
-/// When the force is none.
-pub fn tilted_press(
-    number: u32,
-    force_n: f64,
-    ratio: f64,
-    reach_mm: f64,
-) -> Result<Load, FilmError> {
-    let (sin, cos) = (std::f64::consts::TAU * part(number, 2)).sin_cos();
-    let normal_n = force_n / ratio.hypot(1.0);
-    let vector_n = [normal_n * ratio * cos, normal_n * ratio * sin, -normal_n];
-    Load::from_vector(vector_n)?
-        .with_offset_mm([5, 7].map(|base| reach_mm * (2.0 * part(number, base) - 1.0)))
 }
 
 /// A part of one for a press with this number, evenly spread; another base is another coordinate.

@@ -10,7 +10,6 @@ use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed
 use rand::Rng;
 
 use super::seeded;
-use crate::calculix::{CalculixFilm, RUBBERS_POISSON, Solver};
 
 /// States that are kept to start others from.
 const MOST_STATES: usize = 40;
@@ -19,50 +18,26 @@ const FINENESS: f64 = 0.7;
 
 /// A film on its posts.
 pub struct RealFilm {
-    solved: Solved,
-    /// What a scene shows under loads that were asked for before.
-    pressed: Mutex<Vec<(Load, Pressed)>>,
-}
-
-/// Who solves it.
-enum Solved {
-    Here(Box<ShellFilm>),
-    ByCalculix(Box<CalculixFilm>),
-}
-
-/// A film of the project's own solver.
-struct ShellFilm {
     film: Film,
     rest: Equilibrium,
     /// The states that were found last.
     states: Mutex<Vec<(Load, Equilibrium)>>,
+    /// What a scene shows under loads that were asked for before.
+    pressed: Mutex<Vec<(Load, Pressed)>>,
 }
 
 impl RealFilm {
     /// The film with this number, on the posts and with the dots of these options, under a tip of a
-    /// radius, mm; by CalculiX where its solver is given.
+    /// radius, mm.
     ///
     /// # Errors
     /// When it finds no rest position.
-    pub fn drawn(
-        number: u64,
-        options: &Options,
-        tip_radius_mm: f64,
-        calculix: Option<&Solver>,
-    ) -> Result<Self> {
-        let mut design = drawn(number, options, tip_radius_mm);
-        let solved = match calculix {
-            None => Solved::Here(Box::new(ShellFilm::new(&design)?)),
-            Some(solver) => {
-                // Solids of St Venant's law give way under a tip.
-                design.law.neo_hooke = 1.0;
-                design.material.poisson = RUBBERS_POISSON;
-                let solver = solver.within(&format!("film-{number}"));
-                Solved::ByCalculix(Box::new(CalculixFilm::new(&solver, design)?))
-            }
-        };
+    pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
+        let film = Film::new(&drawn(number, options, tip_radius_mm))?;
         Ok(Self {
-            solved,
+            rest: film.rest(),
+            film,
+            states: Mutex::default(),
             pressed: Mutex::default(),
         })
     }
@@ -76,26 +51,12 @@ impl RealFilm {
         if let Some((_, pressed)) = known.iter().find(|(other, _)| other == load) {
             return Ok(*pressed);
         }
-        let pressed = match &self.solved {
-            Solved::Here(film) => film.press(load)?,
-            Solved::ByCalculix(film) => film.press(load)?,
-        };
+        let pressed = self.solve(load)?;
         known.push((*load, pressed));
         Ok(pressed)
     }
-}
 
-impl ShellFilm {
-    fn new(design: &Design) -> Result<Self, ShellError> {
-        let film = Film::new(design)?;
-        Ok(Self {
-            rest: film.rest(),
-            film,
-            states: Mutex::default(),
-        })
-    }
-
-    fn press(&self, load: &Load) -> Result<Pressed, ShellError> {
+    fn solve(&self, load: &Load) -> Result<Pressed, ShellError> {
         let mut states = locked(&self.states);
         let state = match load.magnitude_n() {
             0.0 => self.rest.clone(),

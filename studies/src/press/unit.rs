@@ -1,7 +1,6 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
-use hivtac_data::dataset::measure;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_scene::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensing::force::Force;
@@ -10,14 +9,11 @@ use hivtac_sensing::model::{Conditions, Model};
 use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
 use hivtac_sensing::rest::Rest;
-use hivtac_sensing::tare::{Refusal, TareBuilder};
-use hivtac_sensing::temporal::{Followed, Moment};
+use hivtac_sensing::tare::TareBuilder;
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::ByteOrder;
 
 use super::{Drawn, RealFilm};
-use crate::calculix::Solver;
 
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
@@ -85,19 +81,14 @@ impl TestedUnit {
         Self::new(conditions, options, tip_radius_mm, number)
     }
 
-    /// The same with the film of this number of those that people mount; by CalculiX where its
-    /// solver is given.
+    /// The same with the film of this number of those that people mount.
     ///
     /// # Errors
     /// When there is no such camera, or the film finds no rest position.
-    pub fn with_real_film(
-        conditions: &Conditions,
-        number: u64,
-        calculix: Option<&Solver>,
-    ) -> Result<Self> {
+    pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
         let unit = Self::drawn(conditions, number)?;
         let options = unit.scene.options();
-        let film = RealFilm::drawn(number, options, unit.tip_radius_mm, calculix)?;
+        let film = RealFilm::drawn(number, options, unit.tip_radius_mm)?;
         Ok(Self {
             real: Some(film),
             ..unit
@@ -195,10 +186,17 @@ impl TestedUnit {
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
         let mut tared = Tared { sensor };
-        let outcome = tared.judge_tare(self, &Load::REST, false)?;
-        let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
-        tared.set_rest(rest);
-        Ok(tared)
+        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
+        // Every second frame may be bad.
+        for number in 0..2 * TARE_FRAMES {
+            let seen = tared.measure(&self.frame(&Load::REST, 1_000_000 + u64::from(number))?);
+            if let Some(outcome) = tared.sensor.tare_with(&mut tare, &seen) {
+                let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
+                tared.sensor.set_tare(Some(rest), Drift::NONE);
+                return Ok(tared);
+            }
+        }
+        Err(anyhow!("no rest position: too few frames show the markers"))
     }
 }
 
@@ -221,54 +219,7 @@ impl Tared<'_> {
 
     /// What the sensor says of a frame.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
-        measure(&mut self.sensor, frame)
-    }
-
-    /// The rest position that a tare of a unit finds under a load, or why it is refused; it is not
-    /// set.
-    ///
-    /// # Errors
-    /// When the film cannot take the load, or too few frames show the markers.
-    pub fn judge_tare(
-        &mut self,
-        unit: &TestedUnit,
-        load: &Load,
-        insists: bool,
-    ) -> Result<Result<Rest, Refusal>> {
-        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
-        if insists {
-            tare = tare.insisting();
-        }
-        // Every second frame may be bad.
-        for number in 0..2 * TARE_FRAMES {
-            let seen = self.measure(&unit.frame(load, 1_000_000 + u64::from(number))?);
-            if let Some(outcome) = self.sensor.tare_with(&mut tare, &seen) {
-                return Ok(outcome);
-            }
-        }
-        if tare.saw_implausible() {
-            return Ok(Err(Refusal::MarkersImplausible));
-        }
-        Err(anyhow!("no rest position: too few frames show the markers"))
-    }
-
-    /// How forces are followed from now on.
-    ///
-    /// # Errors
-    /// A setting out of its range.
-    pub fn set_temporal(&mut self, settings: TemporalSettings) -> Result<()> {
-        let set = self.sensor.set_temporal(settings);
-        set.map_err(|error| anyhow!("{error}"))
-    }
-
-    /// What follows from a frame, measured last, and those before it.
-    pub fn follow(&mut self, at: Moment, measurement: &Measurement) -> Followed {
-        self.sensor.follow(at, measurement)
-    }
-
-    /// Measures from now on against another rest position.
-    pub fn set_rest(&mut self, rest: Rest) {
-        self.sensor.set_tare(Some(rest), Drift::NONE);
+        self.sensor.measure_frame(&frame.words())
     }
 
     /// Where it rests.
@@ -291,7 +242,7 @@ impl Tared<'_> {
         let mut mean = [[0.0; 2]; 4];
         for frame in 0..frames {
             let picture = unit.frame(&load, number + frame)?;
-            let markers = measure(&mut self.sensor, &picture).markers;
+            let markers = self.measure(&picture).markers;
             let markers = markers.ok_or_else(|| anyhow!("no markers under a load"))?;
             for (mean, marker) in mean.iter_mut().zip(markers) {
                 mean[0] += marker.x.to_f64() / frames as f64;
@@ -307,29 +258,8 @@ impl Tared<'_> {
     /// When the film cannot take the press.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
         self.sensor.forget_frame();
-        self.said(unit, load, number, measure)
-    }
-
-    /// The same of a press that follows the one before, by a sensor that looks again at a frame
-    /// that it refuses.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
-    pub fn answer_next(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
-        self.said(unit, load, number, |sensor, frame| {
-            sensor.measure_frame_closely(&frame.words())
-        })
-    }
-
-    fn said(
-        &mut self,
-        unit: &TestedUnit,
-        load: Load,
-        number: u64,
-        measure: impl Fn(&mut Sensor<'_>, &Frame) -> Measurement,
-    ) -> Result<Answer> {
         let frame = unit.frame(&load, number)?;
-        let seen = measure(&mut self.sensor, &frame);
+        let seen = self.measure(&frame);
         let off = |k: usize| {
             let [x, y] = frame.truth.markers[k]?.centroid_px;
             let marker = seen.markers?[k];

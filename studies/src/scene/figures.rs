@@ -1,4 +1,4 @@
-//! The pictures of `docs/scene.md`, `docs/paper-model.md` and `docs/building-a-sensor.md`.
+//! The pictures of `docs/scene.md` and `docs/building-a-sensor.md`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use hivtac_scene::{Load, Preset, Scene};
-use hivtac_studies::paper_model::{Design, Map, PinholeDistance};
 
 use super::canvas::{BLACK, CHARACTER, Canvas, WHITE};
 use super::cases::CasesArgs;
@@ -24,8 +23,6 @@ pub struct FiguresArgs {
 const LOADS: [(f64, f64, f64); 3] = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.2, 8.0, -6.0)];
 /// Pixels between frames, and above and below a caption.
 const GAP: u32 = 8;
-/// Cells of Figure 8 along each axis.
-const CELLS: usize = 100;
 
 impl FiguresArgs {
     pub(super) fn run(&self) -> Result<()> {
@@ -34,8 +31,7 @@ impl FiguresArgs {
         let file = |name: &str| self.out_dir.join(name);
         frames(&file("frames.png"))?;
         CasesArgs::all(file("hard-cases.png")).run()?;
-        guide::draw(&file("guide.png"))?;
-        figure8(&file("figure8.svg"))
+        guide::draw(&file("guide.png"))
     }
 }
 
@@ -64,15 +60,6 @@ fn frames(out: &Path) -> Result<()> {
         picture.text([x, below], 1, &caption, BLACK);
     }
     picture.save(out)?;
-    println!("wrote {}", out.display());
-    Ok(())
-}
-
-/// R* over presses and shears: the paper's Figure 8.
-fn figure8(out: &Path) -> Result<()> {
-    let map = Map::new(&Design::paper(PinholeDistance::Slant), CELLS)?;
-    let svg = map.to_svg("R* that maximizes Q (Figure 8; slant D_ph, ε = 0)");
-    fs::write(out, svg).with_context(|| format!("cannot write {}", out.display()))?;
     println!("wrote {}", out.display());
     Ok(())
 }

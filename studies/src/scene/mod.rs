@@ -2,14 +2,12 @@
 
 mod canvas;
 mod cases;
-mod effects;
 mod figures;
 mod film;
 mod guide;
 mod overlay;
 mod pipeline;
 mod render;
-pub(crate) mod size;
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -21,8 +19,6 @@ pub enum SceneCommand {
     Render(render::RenderArgs),
     /// Press the film once: where tip and markers go, and where the markers are seen.
     Film(film::FilmArgs),
-    /// Switch each effect of the simulated sensor and measure what that changes.
-    Effects(effects::EffectsArgs),
     /// Draw all hard cases on one sheet, with what the sensing makes of them.
     Cases(cases::CasesArgs),
     /// Draw the pictures of the documentation.
@@ -38,7 +34,6 @@ impl SceneCommand {
         match self {
             SceneCommand::Render(args) => args.run(),
             SceneCommand::Film(args) => args.run(),
-            SceneCommand::Effects(args) => args.run(),
             SceneCommand::Cases(args) => args.run(),
             SceneCommand::Figures(args) => args.run(),
         }

@@ -5,23 +5,31 @@ use std::path::Path;
 
 use anyhow::{Context, Result};
 use hivtac_calibration::fit::fit;
-use hivtac_calibration::network::Meaning;
+use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
 use hivtac_data::conditions::Conditions;
 use hivtac_data::dataset::{Loads, Recipe, generate};
+use hivtac_data::range::Range;
 use hivtac_evaluation::check::check;
+use hivtac_terms::conditions::CentroidEstimator;
 use serde_json::json;
 
-use super::plan::{RENDERED, preset};
-use super::table::Configuration;
+use super::{Centroid, Configuration, Numbers};
 
 /// Frames that the network is trained on, and frames that tell the markers' noise and their seed:
 /// as for the default model.
 const ROWS: usize = 80_000;
 const NOISE: (usize, u64) = (6_000, 5);
+/// Loads of the frames that are rendered, a little beyond those that are judged.
+const RENDERED: Range = Range {
+    force_n: 0.25,
+    alpha_deg: 10.0,
+    beta_deg: 10.0,
+    place_mm: 4.2,
+};
 /// Frames that are rendered for a model.
-pub const FRAMES: usize = ROWS + NOISE.0;
+pub(super) const FRAMES: usize = ROWS + NOISE.0;
 /// Frames to check on, and the seed of their loads and noise.
 const CHECKED: (usize, u64) = (4000, 1_000_001);
 
@@ -33,21 +41,28 @@ const CHECKED: (usize, u64) = (4000, 1_000_001);
 ///
 /// # Errors
 /// When the frames cannot be rendered, training fails, or a file cannot be written.
-pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) -> Result<String> {
+pub(super) fn write(
+    picked: &Configuration,
+    folder: &Path,
+    progress: impl Fn() + Sync,
+) -> Result<String> {
     let recipe = Recipe {
-        preset: preset(picked.size),
-        width: picked.size[0],
-        height: picked.size[1],
-        centroid: picked.centroid,
+        width: picked.width,
+        height: picked.height,
+        centroid: picked.centroid.estimator(),
         loads: Loads::Random(ROWS),
         range: RENDERED,
         ..Recipe::default()
     };
     let dataset = generate(&recipe, &progress)?;
+    let widths = picked.network.split('-').map(str::parse);
     let options = Options {
         meaning: Meaning::ForceAndPlace,
-        hidden: picked.estimator.hidden.clone(),
-        arithmetic: picked.numbers.arithmetic().unwrap_or_default(),
+        hidden: widths.collect::<Result<_, _>>()?,
+        arithmetic: match picked.numbers {
+            Numbers::Int8PerChannel => Arithmetic::Int8PerChannel,
+            Numbers::F32 | Numbers::Int16 => Arithmetic::Int16,
+        },
         ..Options::default()
     };
     let mut weights = fit(&dataset, &options, |_| ())?.weights;
@@ -101,4 +116,14 @@ fn orders(model: &Path) -> String {
          touches the film:\n\n  hivtac tare",
         model.display()
     )
+}
+
+impl Centroid {
+    /// As the sensing has it.
+    pub(super) fn estimator(self) -> CentroidEstimator {
+        match self {
+            Centroid::Binary => CentroidEstimator::BinaryMask,
+            Centroid::Weighted => CentroidEstimator::RednessWeighted,
+        }
+    }
 }

@@ -1,8 +1,8 @@
-//! The Pareto front, and which configuration is best under a user's limits.
+//! Which configuration is best under a user's limits.
 
 use anyhow::{Context, Result, bail};
 
-use super::table::{Configuration, Reach};
+use super::{Configuration, Reach};
 
 /// Errors count as equal within this part of themselves: training again changes them as much.
 const EQUAL: f64 = 0.05;
@@ -19,24 +19,6 @@ pub struct Limits {
     pub max_error_deg: Option<f64>,
 }
 
-/// The configurations within reach that no other within reach beats or equals in both time and
-/// direction error from 50 mN up, by time.
-pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configuration> {
-    let mut candidates: Vec<_> = configurations
-        .iter()
-        .filter(|c| c.reach() >= reach)
-        .filter_map(|c| Some((c.cost?.cycles, c.strong_direction_deg.value, c)))
-        .collect();
-    candidates.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let mut least = f64::INFINITY;
-    candidates.retain(|(_, error, _)| {
-        let better = *error < least;
-        least = least.min(*error);
-        better
-    });
-    candidates.into_iter().map(|(_, _, c)| c).collect()
-}
-
 /// The best configuration within the limits that the firmware does as it is.
 ///
 /// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
@@ -45,10 +27,13 @@ pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configurati
 ///
 /// # Errors
 /// When there is none; says what comes nearest.
-pub fn best<'c>(configurations: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
+pub(super) fn best<'c>(
+    configurations: &'c [Configuration],
+    limits: &Limits,
+) -> Result<&'c Configuration> {
     let reachable: Vec<&Configuration> = configurations
         .iter()
-        .filter(|c| c.reach() == Reach::Firmware)
+        .filter(|c| c.reach == Reach::Firmware)
         .collect();
     let fitting: Vec<_> = reachable
         .iter()
@@ -76,9 +61,9 @@ fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
         let near = |c: &&&Configuration| of(c) <= least * (1.0 + EQUAL);
         among.iter().filter(near).copied().collect::<Vec<_>>()
     };
-    let by_direction = equals(fitting, |c| c.strong_direction_deg.value);
-    let by_force = equals(&by_direction, |c| c.force_rmse_mn.value);
-    equals(&by_force, |c| c.place_rmse_um.value)
+    let by_direction = equals(fitting, |c| c.strong_direction_deg);
+    let by_force = equals(&by_direction, |c| c.force_rmse_mn);
+    equals(&by_force, |c| c.place_rmse_um)
 }
 
 /// The fastest and their equals.
@@ -97,115 +82,91 @@ fn refuses_least<'c>(fitting: &[&'c Configuration]) -> Option<&'c Configuration>
 }
 
 fn cycles(configuration: &Configuration) -> i64 {
-    configuration.cost.map_or(i64::MAX, |cost| cost.cycles)
+    configuration.modelled_cycles.unwrap_or(i64::MAX)
 }
 
 fn nearest(reachable: &[&Configuration], limits: &Limits) -> String {
     let fastest = reachable.iter().min_by_key(|c| cycles(c));
-    let accurate = reachable
-        .iter()
-        .min_by(|a, b| limit_error(a).total_cmp(&limit_error(b)));
-    let (Some(fastest), Some(accurate)) = (fastest, accurate) else {
-        return String::new();
+    let by_error = |a: &&&Configuration, b: &&&Configuration| {
+        a.limit_error_deg().total_cmp(&b.limit_error_deg())
     };
     let mut text = String::new();
-    if let (true, Some(cost)) = (
-        limits.budget_us.is_some() || limits.min_rate.is_some(),
-        fastest.cost,
-    ) {
+    let wants_time = limits.budget_us.is_some() || limits.min_rate.is_some();
+    if let Some(fastest) = fastest.filter(|_| wants_time) {
         text += &format!(
             "; the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second)",
-            cost.microseconds(),
-            cost.rate()
+            fastest.microseconds().unwrap_or(f64::NAN),
+            fastest.rate().unwrap_or(f64::NAN)
         );
     }
-    if limits.max_error_deg.is_some() {
+    let accurate = reachable.iter().min_by(by_error);
+    if let Some(accurate) = accurate.filter(|_| limits.max_error_deg.is_some()) {
         text += &format!(
             "; the most accurate, {accurate}, is within {:.3}°",
-            limit_error(accurate)
+            accurate.limit_error_deg()
         );
     }
     text
 }
 
-/// The upper end of the direction error's interval.
-fn limit_error(configuration: &Configuration) -> f64 {
-    let error = configuration.strong_direction_deg;
-    error.value + error.half_width.unwrap_or(0.0)
-}
-
 impl Limits {
     /// Whether a configuration is within them.
-    pub fn hold(&self, configuration: &Configuration) -> bool {
-        let Some(cost) = configuration.cost else {
+    fn hold(&self, configuration: &Configuration) -> bool {
+        let (Some(us), Some(rate)) = (configuration.microseconds(), configuration.rate()) else {
             return false;
         };
-        self.budget_us
-            .is_none_or(|most| cost.microseconds() <= most)
-            && self.min_rate.is_none_or(|least| cost.rate() >= least)
+        self.budget_us.is_none_or(|most| us <= most)
+            && self.min_rate.is_none_or(|least| rate >= least)
             && self
                 .max_error_deg
-                .is_none_or(|most| limit_error(configuration) <= most)
+                .is_none_or(|most| configuration.limit_error_deg() <= most)
     }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::tradeoff::costs::Cost;
-    use crate::tradeoff::plan::{Estimator, Numbers};
-    use crate::tradeoff::table::Mean;
-    use hivtac_terms::conditions::CentroidEstimator;
+    use crate::tradeoff::{Centroid, Numbers};
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
     /// (mN).
-    pub fn made(size: [u16; 2], cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
-        let mean = |value: f64| Mean {
-            value,
-            half_width: Some(0.1 * value),
-        };
+    fn made(reach: Reach, cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         Configuration {
-            size,
-            centroid: CentroidEstimator::RednessWeighted,
-            estimator: Estimator::all()[0].clone(),
+            width: 320,
+            height: 240,
+            centroid: Centroid::Weighted,
+            network: "16-16".to_owned(),
             numbers: Numbers::Int16,
             steps: 1,
-            looks: 2.0,
-            direction_deg: mean(3.0 * direction),
-            strong_direction_deg: mean(direction),
-            force_rmse_mn: mean(force),
-            place_rmse_um: mean(10.0),
+            reach,
+            direction_deg: 3.0 * direction,
+            strong_direction_deg: direction,
+            strong_direction_deg_95: Some(0.1 * direction),
+            force_rmse_mn: force,
+            place_rmse_um: 10.0,
             unexplained: 0.001,
-            worst: [10.0 * direction, 5.0 * force],
-            cost: Some(Cost {
-                instructions: 2 * cycles,
-                cycles,
-                latency_cycles: cycles / 5,
-                flash: 200_000,
-                ram: 300_000,
-            }),
+            modelled_cycles: Some(cycles),
+            latency_microseconds: Some(10.0),
         }
     }
-
-    const QVGA: [u16; 2] = [320, 240];
 
     /// By cycles: rough; good; as good; a little better; much better in |F|; then one without a
     /// firmware, and one without a camera.
     fn several() -> Vec<Configuration> {
         vec![
-            made(QVGA, 96_000, [0.5, 0.3]),
-            made(QVGA, 144_000, [0.20, 0.1]),
-            made(QVGA, 240_000, [0.20, 0.1]),
-            made(QVGA, 288_000, [0.195, 0.1]),
-            made(QVGA, 480_000, [0.198, 0.01]),
-            made([640, 480], 960_000, [0.1, 0.01]),
-            made([800, 600], 1_440_000, [0.05, 0.01]),
+            made(Reach::Firmware, 96_000, [0.5, 0.3]),
+            made(Reach::Firmware, 144_000, [0.20, 0.1]),
+            made(Reach::Firmware, 240_000, [0.20, 0.1]),
+            made(Reach::Firmware, 288_000, [0.195, 0.1]),
+            made(Reach::Firmware, 480_000, [0.198, 0.01]),
+            made(Reach::Camera, 960_000, [0.1, 0.01]),
+            made(Reach::None, 1_440_000, [0.05, 0.01]),
         ]
     }
 
     fn picked(limits: Limits) -> i64 {
         let all = several();
-        best(&all, &limits).unwrap().cost.unwrap().cycles
+        cycles(best(&all, &limits).unwrap())
     }
 
     #[test]
@@ -232,12 +193,12 @@ pub(super) mod tests {
     #[test]
     fn among_equals_as_fast_the_one_that_refuses_least_is_best() {
         let mut all = several();
-        let mut other = made(QVGA, 500_000, [0.198, 0.01]);
+        let mut other = made(Reach::Firmware, 500_000, [0.198, 0.01]);
         other.unexplained = 0.0005;
         all.push(other.clone());
         assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, 0.0005);
         all.pop();
-        other.cost = made(QVGA, 510_000, [0.198, 0.01]).cost;
+        other.modelled_cycles = Some(510_000);
         all.push(other);
         assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, 0.001);
     }
@@ -266,25 +227,5 @@ pub(super) mod tests {
         for words in ["200 µs", "is within 0.21"] {
             assert!(error.contains(words), "no `{words}` in: {error}");
         }
-    }
-
-    #[test]
-    fn the_front_holds_what_nothing_beats() {
-        let all = several();
-        let cycles = |reach| -> Vec<i64> {
-            let front = front(&all, reach);
-            front.iter().map(|c| c.cost.unwrap().cycles).collect()
-        };
-        assert_eq!(cycles(Reach::Firmware), [96_000, 144_000, 288_000]);
-        assert_eq!(cycles(Reach::Camera), [96_000, 144_000, 288_000, 960_000]);
-    }
-
-    #[test]
-    fn floats_are_out_of_reach_and_other_frames_need_a_firmware() {
-        let mut float = made(QVGA, 1, [0.0; 2]);
-        float.cost = None;
-        assert_eq!(float.reach(), Reach::None);
-        let large = made([640, 480], 1, [0.0; 2]);
-        assert_eq!(large.reach(), Reach::Camera);
     }
 }

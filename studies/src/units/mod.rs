@@ -17,7 +17,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
-use crate::calculix::Solver;
 use crate::page;
 use crate::press::{Errors, FORCES_MN, REACH_MM, Row, Tared, TestedUnit, press};
 use bench::Bench;
@@ -42,8 +41,6 @@ pub struct Units {
     /// Whose films: of today's tables, or as people mount them.
     #[arg(long, value_enum, default_value_t = Films::Nominal)]
     films: Films,
-    #[command(flatten)]
-    calculix: Solver,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
@@ -56,8 +53,6 @@ pub enum Films {
     Nominal,
     /// Solved by finite elements: stretched, cut otherwise, of other rubber.
     Real,
-    /// The same, solved by CalculiX as solids; an hour for two.
-    Calculix,
 }
 
 /// One unit's errors at each force.
@@ -87,15 +82,12 @@ impl Units {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        let calculix = match self.films {
-            Films::Nominal => return self.of_todays_tables(&weights, &model),
-            Films::Real => None,
-            Films::Calculix => Some(&self.calculix),
-        };
+        if self.films == Films::Nominal {
+            return self.of_todays_tables(&weights, &model);
+        }
         let study = RealFilms {
             weights: &weights,
             model: &model,
-            calculix,
             presses: self.presses,
         };
         study.run(self.units, self.json)

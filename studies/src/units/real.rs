@@ -10,7 +10,6 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::bench::Bench;
-use crate::calculix::Solver;
 use crate::page;
 use crate::press::{REACH_MM, Tally, Tared, TestedUnit, press_of_any};
 
@@ -48,8 +47,6 @@ pub struct RealFilms<'a> {
     pub weights: &'a Weights,
     /// The same as a model.
     pub model: &'a Model<'a>,
-    /// Who solves the films, if it is CalculiX.
-    pub calculix: Option<&'a Solver>,
     /// Presses of each film.
     pub presses: u32,
 }
@@ -67,7 +64,7 @@ impl RealFilms<'_> {
         });
         let tested: Vec<Tested> = tested.collect::<Result<_>>()?;
         let mut rows = vec![row("tare alone", &tested, |film| Some(&film.tared))];
-        for (k, (_, name)) in self.benches().iter().enumerate() {
+        for (k, (_, name)) in Bench::ALL.iter().enumerate() {
             rows.push(row(name, &tested, |film| film.calibrated[k].as_ref().ok()));
         }
         if json {
@@ -75,34 +72,22 @@ impl RealFilms<'_> {
         }
         let mut text = table(&rows)?;
         for (number, film) in tested.iter().enumerate() {
-            for (error, (_, name)) in film.calibrated.iter().zip(self.benches()) {
+            for (error, (_, name)) in film.calibrated.iter().zip(Bench::ALL) {
                 if let Err(error) = error {
                     writeln!(text, "\nFilm {number} after {name}: {error:#}.")?;
                 }
             }
         }
         print!("{text}");
-        match self.calculix {
-            None => page::write("real-films.md", include_str!("real.md"), &text),
-            Some(_) => page::write("calculix-films.md", include_str!("calculix.md"), &text),
-        }
-    }
-
-    /// Films of CalculiX are pressed ten times: each press takes it a minute.
-    fn benches(&self) -> &'static [(Bench, &'static str)] {
-        match self.calculix {
-            None => &Bench::ALL,
-            Some(_) => &Bench::ALL[..1],
-        }
+        page::write("real-films.md", include_str!("real.md"), &text)
     }
 
     fn test(&self, number: u64) -> Result<Tested> {
         let conditions = &self.model.conditions;
-        let unit = TestedUnit::with_real_film(conditions, number, self.calculix)?;
+        let unit = TestedUnit::with_real_film(conditions, number)?;
         let mut tared = unit.tare(self.model)?;
         let of_tare = answers(&unit, &mut tared, number, self.presses)?;
-        let benches = self.benches().iter();
-        let calibrated = benches.map(|(bench, _)| {
+        let calibrated = Bench::ALL.iter().map(|(bench, _)| {
             let own = export(&bench.calibrate(self.weights, &unit, &mut tared, number)?)?;
             let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
             answers(&unit, &mut unit.tare(&own)?, number, self.presses)

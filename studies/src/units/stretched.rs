@@ -29,7 +29,7 @@ fn a_stretched_unit_is_written() {
     let weights = Weights::load(&root.join(WEIGHTS)).unwrap();
     let file = export(&weights).unwrap();
     let model = Model::parse(&file).unwrap();
-    let unit = TestedUnit::with_real_film(&model.conditions, NUMBER, None).unwrap();
+    let unit = TestedUnit::with_real_film(&model.conditions, NUMBER).unwrap();
     let mut tared = unit.tare(&model).unwrap();
     let own = export(&own_weights(&weights, &unit, &mut tared, NUMBER).unwrap()).unwrap();
     let loads = FORCES_N.map(|force_n| {

@@ -50,24 +50,6 @@ pub fn inverse<const N: usize>(a: &[[f64; N]; N]) -> Result<[[f64; N]; N]> {
     }))
 }
 
-/// The x that makes Σ (a·x − b)² least over rows (a, b), by the normal equations; columns should be
-/// of like size.
-///
-/// # Errors
-/// When the rows do not determine x.
-pub fn least_squares<const N: usize>(rows: &[([f64; N], f64)]) -> Result<[f64; N]> {
-    let (mut normal, mut side) = ([[0.0; N]; N], [0.0; N]);
-    for (a, b) in rows {
-        for i in 0..N {
-            for j in 0..N {
-                normal[i][j] += a[i] * a[j];
-            }
-            side[i] += a[i] * b;
-        }
-    }
-    Ok(inverse(&normal)?.map(|row| dot(&row, &side)))
-}
-
 /// Σ a·b.
 pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
@@ -76,20 +58,6 @@ pub fn dot<const N: usize>(a: &[f64; N], b: &[f64; N]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_cubic_is_found() {
-        let row = |i: i32| {
-            let x = f64::from(i) / 10.0;
-            ([1.0, x, x * x, x * x * x], 0.5 - 2.0 * x + 3.0 * x * x * x)
-        };
-        let rows: Vec<_> = (0..11).map(row).collect();
-        let found = least_squares(&rows).unwrap();
-        for (found, expected) in found.iter().zip([0.5, -2.0, 0.0, 3.0]) {
-            assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-        }
-        assert!(least_squares(&[([1.0, 2.0], 1.0), ([2.0, 4.0], 2.0)]).is_err());
-    }
 
     #[test]
     fn an_inverse_times_its_matrix_is_one() {
