@@ -217,9 +217,9 @@ impl Tared<'_> {
         self.sensor.set_motion(motion);
     }
 
-    /// What the sensor says of a frame.
+    /// What the sensor says of a frame, whatever its format.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
-        self.sensor.measure_frame(&frame.words())
+        self.sensor.measure_frame(&frame.to_rgb565())
     }
 
     /// Where it rests.

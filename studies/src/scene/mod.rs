@@ -1,12 +1,8 @@
 //! `hivtac-studies scene …`: pictures and figures of the simulated sensor (`docs/scene.md`).
 
 mod canvas;
-mod cases;
 mod figures;
 mod film;
-mod guide;
-mod overlay;
-mod pipeline;
 mod render;
 
 use anyhow::Result;
@@ -19,22 +15,16 @@ pub enum SceneCommand {
     Render(render::RenderArgs),
     /// Press the film once: where tip and markers go, and where the markers are seen.
     Film(film::FilmArgs),
-    /// Draw all hard cases on one sheet, with what the sensing makes of them.
-    Cases(cases::CasesArgs),
-    /// Draw the pictures of the documentation.
+    /// Draw the pictures of the documentation: frames, hard cases, and the guide's.
     Figures(figures::FiguresArgs),
 }
 
 impl SceneCommand {
     /// Does it.
-    ///
-    /// # Errors
-    /// When the arguments ask for what there is not, or a file cannot be read or written.
     pub fn run(&self) -> Result<()> {
         match self {
             SceneCommand::Render(args) => args.run(),
             SceneCommand::Film(args) => args.run(),
-            SceneCommand::Cases(args) => args.run(),
             SceneCommand::Figures(args) => args.run(),
         }
     }
