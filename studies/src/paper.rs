@@ -12,14 +12,13 @@ use hivtac_data::dataset::{Dataset, Loads, Observation, Recipe, generate};
 use hivtac_data::loads::norm;
 use hivtac_data::range::Range;
 use hivtac_evaluation::answer::Chip;
-use hivtac_evaluation::errors::angle_deg;
 use hivtac_sensing::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
 use crate::page;
-use crate::press::{FORCES_MN, REACH_MM};
+use crate::press::{self, Errors, FORCES_MN, REACH_MM};
 
 /// Columns and rows.
 const SIZE: [u16; 2] = [800, 600];
@@ -61,19 +60,13 @@ struct Judged {
 #[derive(Serialize)]
 struct Row {
     pipeline: &'static str,
-    force_mn: u32,
-    direction_deg: f64,
-    magnitude_mn: f64,
-    /// Of each coordinate.
-    place_um: f64,
+    #[serde(flatten)]
+    row: press::Row,
     frames: u32,
 }
 
 impl Paper {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When frames cannot be rendered, training fails, or the page cannot be written.
     pub fn run(&self) -> Result<()> {
         let theirs = self.theirs()?;
         let ours = self.ours()?;
@@ -147,9 +140,6 @@ impl Paper {
 }
 
 /// A small network with the nominal film, from as many frames as are asked for.
-///
-/// # Errors
-/// When frames cannot be rendered, or training fails.
 fn small(frames: usize) -> Result<Weights> {
     let dataset = dataset(CentroidEstimator::RednessWeighted, frames, 1)?;
     let options = Training {
@@ -165,9 +155,6 @@ fn small(frames: usize) -> Result<Weights> {
 }
 
 /// So many presses anywhere, seen at 800×600.
-///
-/// # Errors
-/// When they cannot be rendered.
 fn dataset(centroid: CentroidEstimator, frames: usize, seed: u64) -> Result<Dataset> {
     let [width, height] = SIZE;
     let recipe = Recipe {
@@ -203,36 +190,19 @@ fn judged(dataset: &Dataset, mut says: impl FnMut(&Observation) -> Option<Answer
 impl Row {
     fn of(pipeline: &'static str, force_mn: u32, judged: &[&Judged]) -> Row {
         let around_n = f64::from(force_mn) * 1e-3;
-        let (mut squares, mut frames) = ([0.0; 3], 0);
+        let mut errors = Errors::default();
         for one in judged {
             let (force_n, place_mm) = one.truth;
-            let Some((found_n, found_mm)) = one.found else {
-                continue;
-            };
-            let size_n = norm(force_n);
             let is_inside = place_mm.iter().all(|part| part.abs() <= REACH_MM);
-            if !is_inside || (size_n - around_n).abs() > NEAR * around_n {
-                continue;
+            let is_near = (norm(force_n) - around_n).abs() <= NEAR * around_n;
+            if let (Some((found_n, found_mm)), true, true) = (one.found, is_inside, is_near) {
+                errors.take((found_n, norm(found_n), found_mm), one.truth, [0.0; 3]);
             }
-            let errors = [
-                angle_deg(found_n, force_n).unwrap_or(180.0),
-                1e3 * (norm(found_n) - size_n),
-                1e3 * (found_mm[0] - place_mm[0]).hypot(found_mm[1] - place_mm[1]),
-            ];
-            for (square, error) in squares.iter_mut().zip(errors) {
-                *square += error * error;
-            }
-            frames += 1;
         }
-        let [direction_deg, magnitude_mn, far_um] =
-            squares.map(|square| (square / f64::from(frames)).sqrt());
         Row {
             pipeline,
-            force_mn,
-            direction_deg,
-            magnitude_mn,
-            place_um: far_um / std::f64::consts::SQRT_2,
-            frames,
+            row: errors.row(force_mn),
+            frames: errors.count,
         }
     }
 
@@ -240,10 +210,10 @@ impl Row {
         format!(
             "| {} | {} mN | {:.3}° | {:.3} mN | {:.1} µm | {} |\n",
             self.pipeline,
-            self.force_mn,
-            self.direction_deg,
-            self.magnitude_mn,
-            self.place_um,
+            self.row.force_mn,
+            self.row.direction_deg,
+            self.row.magnitude_mn,
+            self.row.place_um,
             self.frames
         )
     }

@@ -38,15 +38,6 @@ pub struct Unseen {
     json: bool,
 }
 
-/// The worst that is not refused at a place of the tip.
-#[derive(Clone, Copy, Default)]
-struct Worst {
-    /// The largest displacement of a marker that is not refused, px.
-    off_px: f64,
-    /// The largest error of the direction, degrees, of |F|, mN, and of the place, mm.
-    errors: [f64; 3],
-}
-
 /// Places at one force.
 #[derive(Serialize)]
 struct Row {
@@ -64,33 +55,29 @@ struct Row {
     at_mm: [f64; 2],
 }
 
-/// A place, with how many displacements matter and how many of those are refused.
+/// A place of the tip, with how many displacements matter and how many of those are refused.
+#[derive(Default)]
 struct Cell {
     place_mm: [f64; 2],
-    worst: Worst,
+    /// The largest displacement of a marker that is not refused, px.
+    off_px: f64,
+    /// The largest error then: of the direction, degrees, of |F|, mN, and of the place, mm.
+    errors: [f64; 3],
     matter: u32,
     refused: u32,
 }
 
 impl Unseen {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When a file cannot be read or written.
     pub fn run(&self) -> Result<()> {
         let bytes = export(&Weights::load(&self.weights)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let film = Film::new(&model).context("the model has no film")?;
-        let maps: Vec<(u32, Vec<Cell>)> = FORCES_MN
-            .into_iter()
-            .map(|force_mn| {
-                let cells = (0..PLACES * PLACES).into_par_iter();
-                (
-                    force_mn,
-                    cells.map(|number| cell(&film, force_mn, number)).collect(),
-                )
-            })
-            .collect();
+        let maps = FORCES_MN.map(|force_mn| -> (u32, Vec<Cell>) {
+            let cells = (0..PLACES * PLACES).into_par_iter();
+            let cells = cells.map(|number| cell(&film, force_mn, number));
+            (force_mn, cells.collect())
+        });
         let rows: Vec<Row> = maps
             .iter()
             .map(|(force_mn, cells)| Row::of(*force_mn, cells))
@@ -171,9 +158,7 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
     let contact = film.contact(f64::from(force_mn) * 1e-3, place_mm);
     let mut cell = Cell {
         place_mm,
-        worst: Worst::default(),
-        matter: 0,
-        refused: 0,
+        ..Cell::default()
     };
     for marker in 0..4 {
         for way in 0..WAYS {
@@ -207,9 +192,8 @@ impl Cell {
         self.matter += u32::from(matters);
         self.refused += u32::from(matters && refused);
         if !refused {
-            let worst = &mut self.worst;
-            worst.off_px = worst.off_px.max(off_px);
-            for (worst, error) in worst.errors.iter_mut().zip(errors) {
+            self.off_px = self.off_px.max(off_px);
+            for (worst, error) in self.errors.iter_mut().zip(errors) {
                 *worst = worst.max(error);
             }
         }
@@ -242,18 +226,16 @@ impl Row {
             all.sort_by(f64::total_cmp);
             [all[all.len() / 2], all[all.len() - 1]]
         };
-        let direction_deg = both(&|cell| cell.worst.errors[0]);
-        let worst = cells
-            .iter()
-            .find(|cell| cell.worst.errors[0] >= direction_deg[1]);
+        let direction_deg = both(&|cell| cell.errors[0]);
+        let worst = cells.iter().find(|cell| cell.errors[0] >= direction_deg[1]);
         let sum = |of: fn(&Cell) -> u32| f64::from(cells.iter().map(|cell| of(cell)).sum::<u32>());
         Row {
             force_mn,
             refused: 100.0 * sum(|cell| cell.refused) / sum(|cell| cell.matter),
-            off_px: both(&|cell| cell.worst.off_px),
+            off_px: both(&|cell| cell.off_px),
             direction_deg,
-            magnitude_mn: both(&|cell| cell.worst.errors[1]),
-            place_mm: both(&|cell| cell.worst.errors[2]),
+            magnitude_mn: both(&|cell| cell.errors[1]),
+            place_mm: both(&|cell| cell.errors[2]),
             at_mm: worst.map_or([0.0; 2], |cell| cell.place_mm),
         }
     }
@@ -278,23 +260,15 @@ impl Row {
 
 /// The largest displacement that is not refused, and the direction's error with it.
 fn panels(maps: &[(u32, Vec<Cell>)]) -> Vec<Map> {
-    let mut panels = Vec::new();
-    for (force_mn, cells) in maps {
-        panels.push(Map {
-            title: format!("displaced unseen, px, {force_mn} mN"),
-            levels: &[0.04, 0.06, 0.08, 0.12, 0.25, 0.4, 0.8],
-            values: cells.iter().map(|cell| Some(cell.worst.off_px)).collect(),
-        });
-    }
-    for (force_mn, cells) in maps {
-        panels.push(Map {
-            title: format!("direction then off, degrees, {force_mn} mN"),
-            levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
-            values: cells
-                .iter()
-                .map(|cell| Some(cell.worst.errors[0]))
-                .collect(),
-        });
-    }
-    panels
+    let displaced = maps.iter().map(|(force_mn, cells)| Map {
+        title: format!("displaced unseen, px, {force_mn} mN"),
+        levels: &[0.04, 0.06, 0.08, 0.12, 0.25, 0.4, 0.8],
+        values: cells.iter().map(|cell| cell.off_px).collect(),
+    });
+    let errors = maps.iter().map(|(force_mn, cells)| Map {
+        title: format!("direction then off, degrees, {force_mn} mN"),
+        levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
+        values: cells.iter().map(|cell| cell.errors[0]).collect(),
+    });
+    displaced.chain(errors).collect()
 }

@@ -2,18 +2,15 @@
 
 mod bound;
 mod drawn;
-mod held;
-mod matrix;
 mod real;
 mod rows;
 mod unit;
 
-use bound::{Bound, Noise};
+pub use bound::Information;
 use drawn::Drawn;
 pub use drawn::{normal, seeded};
-pub use held::Held;
 pub use real::RealFilm;
-pub use rows::{Errors, Row, Tally};
+pub use rows::{Errors, Row};
 pub use unit::{Answer, Tared, TestedUnit};
 
 use hivtac_scene::{FilmError, Load};
@@ -26,27 +23,13 @@ pub const REACH_MM: f64 = 4.0;
 /// The largest α and β, degrees.
 pub const ANGLE_DEG: f64 = 8.0;
 
-/// The press with this number of a force: places and angles evenly within their limits.
-///
-/// # Errors
-/// When the force is none.
-pub fn press(number: u32, force_n: f64, reach_mm: f64) -> Result<Load, FilmError> {
-    let part = |base| 2.0 * part(number, base) - 1.0;
-    Load::from_angles(force_n, ANGLE_DEG * part(2), ANGLE_DEG * part(3))?
-        .with_offset_mm([5, 7].map(|base| reach_mm * part(base)))
-}
-
-/// A press with this number of any force within limits, N.
-///
-/// # Errors
-/// When the force is none.
-pub fn press_of_any(
-    number: u32,
-    [least_n, most_n]: [f64; 2],
-    reach_mm: f64,
-) -> Result<Load, FilmError> {
-    let force_n = least_n + (most_n - least_n) * part(number, 11);
-    press(number, force_n, reach_mm)
+/// The press with this number of a force from one to another, N: force, places and angles evenly
+/// within their limits.
+pub fn press(number: u32, [from_n, to_n]: [f64; 2], reach_mm: f64) -> Result<Load, FilmError> {
+    let either = |base| 2.0 * part(number, base) - 1.0;
+    let force_n = from_n + (to_n - from_n) * part(number, 11);
+    Load::from_angles(force_n, ANGLE_DEG * either(2), ANGLE_DEG * either(3))?
+        .with_offset_mm([5, 7].map(|base| reach_mm * either(base)))
 }
 
 /// A part of one for a press with this number, evenly spread; another base is another coordinate.

@@ -29,9 +29,6 @@ pub struct RealFilm {
 impl RealFilm {
     /// The film with this number, on the posts and with the dots of these options, under a tip of a
     /// radius, mm.
-    ///
-    /// # Errors
-    /// When it finds no rest position.
     pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
         let film = Film::new(&drawn(number, options, tip_radius_mm))?;
         Ok(Self {
@@ -43,9 +40,6 @@ impl RealFilm {
     }
 
     /// The film under a load.
-    ///
-    /// # Errors
-    /// When it finds no equilibrium.
     pub fn press(&self, load: &Load) -> Result<Pressed> {
         let mut known = locked(&self.pressed);
         if let Some((_, pressed)) = known.iter().find(|(other, _)| other == load) {

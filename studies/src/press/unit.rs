@@ -48,9 +48,6 @@ pub struct Answer {
 impl TestedUnit {
     /// Of these options, as a camera of these conditions sees it, pressed by a tip of a radius in
     /// mm.
-    ///
-    /// # Errors
-    /// When an option is out of range.
     pub fn new(
         conditions: &Conditions,
         options: Options,
@@ -69,9 +66,6 @@ impl TestedUnit {
     }
 
     /// The unit with this number of those that people build.
-    ///
-    /// # Errors
-    /// When there is no such camera.
     pub fn drawn(conditions: &Conditions, number: u64) -> Result<Self> {
         let focal_px = conditions.geometry.focal.to_f64();
         let Drawn {
@@ -82,9 +76,6 @@ impl TestedUnit {
     }
 
     /// The same with the film of this number of those that people mount.
-    ///
-    /// # Errors
-    /// When there is no such camera, or the film finds no rest position.
     pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
         let unit = Self::drawn(conditions, number)?;
         let options = unit.scene.options();
@@ -96,9 +87,6 @@ impl TestedUnit {
     }
 
     /// A frame under a press; the number selects its noise.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
     pub fn frame(&self, load: &Load, number: u64) -> Result<Frame> {
         let load = self.with_tip(*load)?;
         match &self.real {
@@ -133,9 +121,6 @@ impl TestedUnit {
     }
 
     /// A press with this unit's tip.
-    ///
-    /// # Errors
-    /// When there is no such tip.
     pub fn with_tip(&self, load: Load) -> Result<Load> {
         Ok(load.with_tip_radius_mm(self.tip_radius_mm)?)
     }
@@ -143,9 +128,6 @@ impl TestedUnit {
     /// Whether the simulated film holds a press, and all markers are wholly in the picture under
     /// it. A soft film's tables end before the largest force: there the simulation would stay where
     /// it is.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
     pub fn shows_all(&self, load: &Load) -> Result<bool> {
         if self.real.is_none() && !self.scene_holds(load) {
             return Ok(false);
@@ -177,9 +159,6 @@ impl TestedUnit {
     }
 
     /// A sensor with this model, tared on the unit at rest.
-    ///
-    /// # Errors
-    /// When the model's frames cannot be read, or no markers are found at rest.
     pub fn tare<'m>(&self, model: &Model<'m>) -> Result<Tared<'m>> {
         let mut sensor = Box::new(Sensor::new());
         let settings = model.conditions.settings(ByteOrder::Native);
@@ -197,17 +176,6 @@ impl TestedUnit {
             }
         }
         Err(anyhow!("no rest position: too few frames show the markers"))
-    }
-}
-
-impl Answer {
-    /// Why there is no force.
-    pub fn refusals(&self) -> impl Iterator<Item = &'static str> {
-        let status = self.status;
-        Status::NAMES
-            .iter()
-            .filter(move |(bit, _)| Status::NO_FORCE.contains(*bit) && status.contains(*bit))
-            .map(|(_, name)| *name)
     }
 }
 
@@ -229,9 +197,6 @@ impl Tared<'_> {
 
     /// Where markers are seen under a press, the mean of some frames; the number selects their
     /// noise.
-    ///
-    /// # Errors
-    /// When the film cannot take the press, or markers are not found.
     pub fn seen_px(
         &mut self,
         unit: &TestedUnit,
@@ -253,9 +218,6 @@ impl Tared<'_> {
     }
 
     /// What the sensor says of a press on its unit, alone; the number selects the noise.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
         self.sensor.forget_frame();
         let frame = unit.frame(&load, number)?;

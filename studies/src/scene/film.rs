@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::{Args, ValueEnum};
 use hivtac_film::Film;
 use hivtac_scene::{Camera, Contact, Load, MARKERS, Preset};
-use serde::Serialize;
+use serde_json::{Value, json};
 
 /// The frame size whose pixels are printed.
 const SIZE: [u32; 2] = [800, 600];
@@ -60,26 +60,12 @@ fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
 }
 
 /// The film under a load.
-#[derive(Serialize)]
 struct Answer {
-    tip_depth_mm: f64,
-    #[serde(skip)]
     tip_mm: [f64; 3],
     /// The tip's force on the film, N.
-    #[serde(skip)]
     force_n: [f64; 3],
-    markers: [Marker; 4],
-}
-
-/// How one marker moved, the mean over its disc, and the centroid of its image.
-#[derive(Serialize)]
-struct Marker {
-    id: usize,
-    dx_mm: f64,
-    dy_mm: f64,
-    dz_mm: f64,
-    x_px: f64,
-    y_px: f64,
+    /// How each marker moved, the mean over its disc, mm, and the centroid of its image, px.
+    markers: [([f64; 3], [f64; 2]); 4],
 }
 
 impl FilmArgs {
@@ -93,7 +79,7 @@ impl FilmArgs {
             Solver::Full => full(&load, self.down, &camera)?,
         };
         if self.json {
-            println!("{}", serde_json::to_string_pretty(&answer)?);
+            println!("{}", serde_json::to_string_pretty(&answer.to_json())?);
         } else {
             print!("{}", answer.to_text());
         }
@@ -105,12 +91,15 @@ fn reduced(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answe
     let film = Film::default().with_down(down)?;
     film.check(load)?;
     let pressed = film.press(load);
-    let marker = |id: usize| {
-        let seen_px = MARKERS[id].centroid_px(|rest| pressed.displacement(rest), camera);
-        Marker::new(id, pressed.discs[id].moved_mm, seen_px)
+    let seen_px = |id: usize| {
+        let rest = MARKERS[id];
+        rest.centroid_px(|rest| pressed.displacement(rest), camera)
     };
-    let markers = std::array::from_fn(marker);
-    Ok(Answer::new(pressed.tip_mm, pressed.force_n, markers))
+    Ok(Answer {
+        tip_mm: pressed.tip_mm,
+        force_n: pressed.force_n,
+        markers: std::array::from_fn(|id| (pressed.discs[id].moved_mm, seen_px(id))),
+    })
 }
 
 fn full(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> {
@@ -121,34 +110,24 @@ fn full(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> 
         ..Design::default()
     })?;
     let state = press_load(&mut film, load)?.state;
-    let seen = markers(&film, &state, camera);
-    let marker = |id: usize| Marker::new(id, seen[id].moved_mm, seen[id].seen_px);
-    let markers = std::array::from_fn(marker);
-    Ok(Answer::new(state.tip_mm, state.force_n, markers))
-}
-
-impl Marker {
-    fn new(id: usize, [dx_mm, dy_mm, dz_mm]: [f64; 3], [x_px, y_px]: [f64; 2]) -> Marker {
-        Marker {
-            id,
-            dx_mm,
-            dy_mm,
-            dz_mm,
-            x_px,
-            y_px,
-        }
-    }
+    let markers = markers(&film, &state, camera);
+    Ok(Answer {
+        tip_mm: state.tip_mm,
+        force_n: state.force_n,
+        markers: markers.map(|marker| (marker.moved_mm, marker.seen_px)),
+    })
 }
 
 impl Answer {
-    fn new(tip_mm: [f64; 3], force_n: [f64; 3], markers: [Marker; 4]) -> Answer {
-        Answer {
-            // Not −0 at rest.
-            tip_depth_mm: 0.0 - tip_mm[2],
-            tip_mm,
-            force_n,
-            markers,
-        }
+    fn tip_depth_mm(&self) -> f64 {
+        // Not −0 at rest.
+        0.0 - self.tip_mm[2]
+    }
+
+    fn to_json(&self) -> Value {
+        let marker = |(id, ([dx, dy, dz], [x, y])): (usize, &([f64; 3], [f64; 2]))| json!({ "id": id, "dx_mm": dx, "dy_mm": dy, "dz_mm": dz, "x_px": x, "y_px": y });
+        let markers: Vec<Value> = self.markers.iter().enumerate().map(marker).collect();
+        json!({ "tip_depth_mm": self.tip_depth_mm(), "markers": markers })
     }
 
     fn to_text(&self) -> String {
@@ -158,15 +137,12 @@ impl Answer {
         let mut text = format!(
             "tip depth      {:.4} mm; the tip moved {} mm\nforce on film  {} N\n\n\
              marker   dx, mm   dy, mm   dz, mm  at 800×600: x, px    y, px\n",
-            self.tip_depth_mm,
+            self.tip_depth_mm(),
             three(self.tip_mm, 4),
             three(self.force_n, 5)
         );
-        for m in &self.markers {
-            text += &format!(
-                "{:6} {:8.4} {:8.4} {:8.4} {:18.3} {:8.3}\n",
-                m.id, m.dx_mm, m.dy_mm, m.dz_mm, m.x_px, m.y_px
-            );
+        for (id, ([dx, dy, dz], [x, y])) in self.markers.iter().enumerate() {
+            text += &format!("{id:6} {dx:8.4} {dy:8.4} {dz:8.4} {x:18.3} {y:8.3}\n");
         }
         text
     }

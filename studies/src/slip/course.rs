@@ -119,9 +119,6 @@ impl Course {
     }
 
     /// What presses at a time, s.
-    ///
-    /// # Errors
-    /// When a number is none of a load.
     pub fn load(&self, time_s: f64) -> Result<Load> {
         let meeting = self.meeting(time_s);
         let along = self.toward.map(|part| meeting.pull_n * part);

@@ -19,13 +19,14 @@ use hivtac_sensing::temporal::{Moment, Temporal};
 use hivtac_terms::status::Status;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
 use crate::page;
 use crate::press::{Tared, TestedUnit, seeded};
-use crate::units::own_weights;
+use crate::units::Bench;
 use course::{Course, Kind};
-use score::{Frame, Row, Score};
+use score::{Frame, Score};
 
 /// Lines of an OV7725's frame, of which 240 are rows, and its frames a second.
 const LINES: u16 = 278;
@@ -57,14 +58,20 @@ pub struct Slip {
     json: bool,
 }
 
+/// A row of the table: how the unit was made ready, and what happened; all of it when none.
+#[derive(Serialize)]
+struct Row {
+    unit: &'static str,
+    kind: Option<Kind>,
+    #[serde(flatten)]
+    score: Score,
+}
+
 /// Contacts and slips by how the unit was made ready and by what happened.
 type Scores = BTreeMap<(usize, Kind), [Score; 2]>;
 
 impl Slip {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When a file cannot be read or written, or no course can be shown.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
@@ -91,7 +98,8 @@ impl Slip {
         let conditions = &model.conditions;
         let nominal = TestedUnit::new(conditions, Options::default(), 0.5, number)?;
         let drawn = TestedUnit::drawn(conditions, number)?;
-        let own = own_weights(weights, &drawn, &mut drawn.tare(model)?, number)
+        let own = (Bench::Ten)
+            .calibrate(weights, &drawn, &mut drawn.tare(model)?, number)
             .and_then(|own| export(&own))
             .with_context(|| format!("unit {number}"))?;
         let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
@@ -186,11 +194,17 @@ fn rows(all: &Scores, which: usize) -> Vec<Row> {
         let mut together = Score::default();
         for kind in Kind::ALL {
             if let Some(scores) = all.get(&(nth, kind)) {
-                rows.push(scores[which].row(unit, Some(kind)));
-                together.merge(&scores[which]);
+                let score = scores[which].clone();
+                together.merge(&score);
+                let kind = Some(kind);
+                rows.push(Row { unit, kind, score });
             }
         }
-        rows.push(together.row(unit, None));
+        rows.push(Row {
+            unit,
+            kind: None,
+            score: together,
+        });
     }
     rows
 }
@@ -200,26 +214,25 @@ fn table(name: &str, rows: &[Row]) -> Result<String> {
         "\n## {name}\n\n| unit | what happens | true | told | precision | recall | missed, of them \
          where frames had no force | delay: median, 95 % |\n|---|---|--:|--:|--:|--:|---|---|\n"
     );
-    let percent = |part: Option<f64>| match part {
-        Some(part) => format!("{:.0} %", 100.0 * part),
-        None => "–".to_owned(),
+    let percent = |part: u32, of: u32| match of {
+        0 => "–".to_owned(),
+        _ => format!("{:.0} %", 100.0 * f64::from(part) / f64::from(of)),
     };
-    for row in rows {
-        let delay = match (row.delay_ms, row.delay_95_ms) {
+    for Row { unit, kind, score } in rows {
+        let delay = match (score.delay_ms(50), score.delay_ms(95)) {
             (Some(median), Some(most)) => format!("{median:.0}, {most:.0} ms"),
             _ => "–".to_owned(),
         };
         writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {}, {} | {delay} |",
-            row.unit,
-            row.kind.map_or("all", Kind::name),
-            row.events,
-            row.told,
-            percent(row.precision),
-            percent(row.recall),
-            row.missed,
-            row.missed_without_force,
+            "| {unit} | {} | {} | {} | {} | {} | {}, {} | {delay} |",
+            kind.map_or("all", Kind::name),
+            score.true_events,
+            score.told,
+            percent(score.told - score.invented, score.told),
+            percent(score.found, score.true_events),
+            score.true_events - score.found,
+            score.missed_without_force,
         )?;
     }
     Ok(text)

@@ -8,14 +8,12 @@ use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_data::conditions::Conditions;
 use hivtac_data::dataset::{Loads, Recipe, generate};
 use hivtac_data::range::Range;
 use hivtac_evaluation::check::check;
-use hivtac_terms::conditions::CentroidEstimator;
 use serde_json::json;
 
-use super::{Centroid, Configuration, Numbers};
+use super::Configuration;
 
 /// Frames that the network is trained on, and frames that tell the markers' noise and their seed:
 /// as for the default model.
@@ -38,9 +36,6 @@ const CHECKED: (usize, u64) = (4000, 1_000_001);
 /// rendered frame.
 ///
 /// Gives what to do with them, in words.
-///
-/// # Errors
-/// When the frames cannot be rendered, training fails, or a file cannot be written.
 pub(super) fn write(
     picked: &Configuration,
     folder: &Path,
@@ -49,7 +44,7 @@ pub(super) fn write(
     let recipe = Recipe {
         width: picked.width,
         height: picked.height,
-        centroid: picked.centroid.estimator(),
+        centroid: picked.estimator(),
         loads: Loads::Random(ROWS),
         range: RENDERED,
         ..Recipe::default()
@@ -59,9 +54,9 @@ pub(super) fn write(
     let options = Options {
         meaning: Meaning::ForceAndPlace,
         hidden: widths.collect::<Result<_, _>>()?,
-        arithmetic: match picked.numbers {
-            Numbers::Int8PerChannel => Arithmetic::Int8PerChannel,
-            Numbers::F32 | Numbers::Int16 => Arithmetic::Int16,
+        arithmetic: match picked.numbers.as_str() {
+            "int16" => Arithmetic::Int16,
+            _ => Arithmetic::Int8PerChannel,
         },
         ..Options::default()
     };
@@ -78,52 +73,24 @@ pub(super) fn write(
     let bytes = export(&weights)?;
     fs::create_dir_all(folder)?;
     let folder = folder.canonicalize()?;
-    let file = |name: &str| folder.join(name);
-    weights.save(&file("model.weights"))?;
-    let save = |name: &str, bytes: &[u8]| {
-        fs::write(file(name), bytes)
-            .with_context(|| format!("cannot write {}", file(name).display()))
-    };
-    save("model.hvtm", &bytes)?;
-    let settings = settings(&weights.conditions);
-    save(
-        "settings.json",
-        (serde_json::to_string_pretty(&settings)? + "\n").as_bytes(),
-    )?;
+    weights.save(&folder.join("model.weights"))?;
+    let settings = json!({ "conditions": weights.conditions, "commands": ["hivtac tare"] });
+    let settings = serde_json::to_string_pretty(&settings)? + "\n";
+    for (name, bytes) in [
+        ("model.hvtm", &bytes[..]),
+        ("settings.json", settings.as_bytes()),
+    ] {
+        let file = folder.join(name);
+        fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))?;
+    }
     let (samples, seed) = CHECKED;
     // The contact reading is `force`: no friction has a part in it.
     let report = check(&bytes, samples, seed, || ())?;
+    let folder = folder.display();
     Ok(format!(
-        "{report}\n\nwrote model.hvtm, model.weights and settings.json into {}\n\n{}",
-        folder.display(),
-        orders(&file("model.hvtm"))
-    ))
-}
-
-fn settings(conditions: &Conditions) -> serde_json::Value {
-    json!({
-        "conditions": conditions,
-        "commands": ["hivtac tare"],
-    })
-}
-
-/// What to type. The model file carries all settings of the sensing; the firmware takes them from
-/// it at the start.
-fn orders(model: &Path) -> String {
-    format!(
-        "flash it, from the root of the repository:\n\n  HIVTAC_MODEL={} \\\n    cargo run \
+        "{report}\n\nwrote model.hvtm, model.weights and settings.json into {folder}\n\nflash it, \
+         from the root of the repository:\n\n  HIVTAC_MODEL={folder}/model.hvtm \\\n    cargo run \
          --release -p hivtac-firmware --target thumbv7em-none-eabihf\n\nthen, while nothing \
-         touches the film:\n\n  hivtac tare",
-        model.display()
-    )
-}
-
-impl Centroid {
-    /// As the sensing has it.
-    pub(super) fn estimator(self) -> CentroidEstimator {
-        match self {
-            Centroid::Binary => CentroidEstimator::BinaryMask,
-            Centroid::Weighted => CentroidEstimator::RednessWeighted,
-        }
-    }
+         touches the film:\n\n  hivtac tare"
+    ))
 }

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 
-use super::{Configuration, Reach};
+use super::Configuration;
 
 /// Errors count as equal within this part of themselves: training again changes them as much.
 const EQUAL: f64 = 0.05;
@@ -24,16 +24,13 @@ pub struct Limits {
 /// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
 /// error from 50 mN up, error of |F| and error of the place are within a twentieth of the least of
 /// each, and time within a twentieth of the fastest's, the one that refuses least.
-///
-/// # Errors
-/// When there is none; says what comes nearest.
 pub(super) fn best<'c>(
     configurations: &'c [Configuration],
     limits: &Limits,
 ) -> Result<&'c Configuration> {
     let reachable: Vec<&Configuration> = configurations
         .iter()
-        .filter(|c| c.reach == Reach::Firmware)
+        .filter(|c| c.reach == "firmware")
         .collect();
     let fitting: Vec<_> = reachable
         .iter()
@@ -42,8 +39,8 @@ pub(super) fn best<'c>(
         .collect();
     if fitting.is_empty() {
         bail!(
-            "nothing that the firmware does is within these limits{}",
-            nearest(&reachable, limits)
+            "nothing that the firmware does is within these limits; {}",
+            nearest(&reachable).unwrap_or_default()
         );
     }
     let fastest = |among: &[&'c Configuration]| among.iter().copied().min_by_key(|c| cycles(c));
@@ -85,28 +82,18 @@ fn cycles(configuration: &Configuration) -> i64 {
     configuration.modelled_cycles.unwrap_or(i64::MAX)
 }
 
-fn nearest(reachable: &[&Configuration], limits: &Limits) -> String {
-    let fastest = reachable.iter().min_by_key(|c| cycles(c));
-    let by_error = |a: &&&Configuration, b: &&&Configuration| {
-        a.limit_error_deg().total_cmp(&b.limit_error_deg())
-    };
-    let mut text = String::new();
-    let wants_time = limits.budget_us.is_some() || limits.min_rate.is_some();
-    if let Some(fastest) = fastest.filter(|_| wants_time) {
-        text += &format!(
-            "; the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second)",
-            fastest.microseconds().unwrap_or(f64::NAN),
-            fastest.rate().unwrap_or(f64::NAN)
-        );
-    }
-    let accurate = reachable.iter().min_by(by_error);
-    if let Some(accurate) = accurate.filter(|_| limits.max_error_deg.is_some()) {
-        text += &format!(
-            "; the most accurate, {accurate}, is within {:.3}°",
-            accurate.limit_error_deg()
-        );
-    }
-    text
+/// What comes nearest to limits of time, and to one of the error.
+fn nearest(reachable: &[&Configuration]) -> Option<String> {
+    let fastest = reachable.iter().min_by_key(|c| cycles(c))?;
+    let by_error = |c: &&&Configuration| (1e6 * c.limit_error_deg()) as u64;
+    let accurate = reachable.iter().min_by_key(by_error)?;
+    Some(format!(
+        "the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second); the most accurate, \
+         {accurate}, is within {:.3}°",
+        fastest.microseconds()?,
+        fastest.rate()?,
+        accurate.limit_error_deg()
+    ))
 }
 
 impl Limits {
@@ -126,19 +113,18 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tradeoff::{Centroid, Numbers};
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
     /// (mN).
-    fn made(reach: Reach, cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
+    fn made(reach: &str, cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         Configuration {
             width: 320,
             height: 240,
-            centroid: Centroid::Weighted,
+            centroid: "weighted".to_owned(),
             network: "16-16".to_owned(),
-            numbers: Numbers::Int16,
+            numbers: "int16".to_owned(),
             steps: 1,
-            reach,
+            reach: reach.to_owned(),
             direction_deg: 3.0 * direction,
             strong_direction_deg: direction,
             strong_direction_deg_95: Some(0.1 * direction),
@@ -150,80 +136,58 @@ mod tests {
         }
     }
 
-    /// By cycles: rough; good; as good; a little better; much better in |F|; then one without a
-    /// firmware, and one without a camera.
+    /// Rough; good; as good; a little better; much better in |F|; then one without a firmware, and
+    /// one without a camera.
     fn several() -> Vec<Configuration> {
         vec![
-            made(Reach::Firmware, 96_000, [0.5, 0.3]),
-            made(Reach::Firmware, 144_000, [0.20, 0.1]),
-            made(Reach::Firmware, 240_000, [0.20, 0.1]),
-            made(Reach::Firmware, 288_000, [0.195, 0.1]),
-            made(Reach::Firmware, 480_000, [0.198, 0.01]),
-            made(Reach::Camera, 960_000, [0.1, 0.01]),
-            made(Reach::None, 1_440_000, [0.05, 0.01]),
+            made("firmware", 96_000, [0.5, 0.3]),
+            made("firmware", 144_000, [0.20, 0.1]),
+            made("firmware", 240_000, [0.20, 0.1]),
+            made("firmware", 288_000, [0.195, 0.1]),
+            made("firmware", 480_000, [0.198, 0.01]),
+            made("camera", 960_000, [0.1, 0.01]),
+            made("none", 1_440_000, [0.05, 0.01]),
         ]
     }
 
-    fn picked(limits: Limits) -> i64 {
-        let all = several();
-        cycles(best(&all, &limits).unwrap())
-    }
-
     #[test]
-    fn without_limits_the_most_accurate_that_the_firmware_does_is_best() {
-        assert_eq!(picked(Limits::default()), 480_000);
-    }
-
-    #[test]
-    fn among_equals_the_fastest_is_best() {
-        let budget = |us| Limits {
-            budget_us: Some(us),
-            ..Limits::default()
+    fn the_best_is_picked_under_each_limit() {
+        let picked = |budget_us, min_rate, max_error_deg| {
+            let limits = Limits {
+                budget_us,
+                min_rate,
+                max_error_deg,
+            };
+            cycles(best(&several(), &limits).unwrap())
         };
-        assert_eq!(picked(budget(600.0)), 144_000);
-        assert_eq!(picked(budget(299.0)), 96_000);
-        assert_eq!(picked(budget(200.0)), 96_000);
-        let rate = Limits {
-            min_rate: Some(2000.0),
-            ..Limits::default()
-        };
-        assert_eq!(picked(rate), 144_000);
+        assert_eq!(picked(None, None, None), 480_000);
+        assert_eq!(picked(Some(600.0), None, None), 144_000);
+        assert_eq!(picked(Some(299.0), None, None), 96_000);
+        assert_eq!(picked(None, Some(2000.0), None), 144_000);
+        // The upper end of the interval counts: 0.22°.
+        assert_eq!(picked(None, None, Some(0.23)), 144_000);
+        assert_eq!(picked(None, None, Some(0.216)), 288_000);
     }
 
     #[test]
     fn among_equals_as_fast_the_one_that_refuses_least_is_best() {
         let mut all = several();
-        let mut other = made(Reach::Firmware, 500_000, [0.198, 0.01]);
-        other.unexplained = 0.0005;
-        all.push(other.clone());
-        assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, 0.0005);
-        all.pop();
-        other.modelled_cycles = Some(510_000);
-        all.push(other);
-        assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, 0.001);
-    }
-
-    #[test]
-    fn with_a_limit_on_the_error_the_fastest_is_best() {
-        // The upper end of the interval counts: 0.22°.
-        let error = |most| Limits {
-            max_error_deg: Some(most),
-            ..Limits::default()
-        };
-        assert_eq!(picked(error(0.23)), 144_000);
-        assert_eq!(picked(error(0.216)), 288_000);
-        assert_eq!(picked(error(1.0)), 96_000);
+        for (cycles, least) in [(510_000, 0.001), (500_000, 0.0005)] {
+            let mut other = made("firmware", cycles, [0.198, 0.01]);
+            other.unexplained = 0.0005;
+            all.push(other);
+            assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, least);
+        }
     }
 
     #[test]
     fn what_cannot_be_is_refused_with_what_comes_nearest() {
-        let all = several();
         let limits = Limits {
             budget_us: Some(100.0),
             max_error_deg: Some(0.1),
             ..Limits::default()
         };
-        let error = best(&all, &limits).unwrap_err().to_string();
+        let error = best(&several(), &limits).unwrap_err().to_string();
         for words in ["200 µs", "is within 0.21"] {
             assert!(error.contains(words), "no `{words}` in: {error}");
         }

@@ -64,9 +64,6 @@ impl Bench {
     ];
 
     /// The weights for a unit after these loads; the number draws gauge and stage.
-    ///
-    /// # Errors
-    /// When markers are not found, or no unit explains the loads.
     pub fn calibrate(
         self,
         weights: &Weights,

@@ -10,7 +10,7 @@ use hivtac_scene::Load;
 use hivtac_sensing::model::Model;
 use serde_json::{Value, json};
 
-use super::own_weights;
+use super::Bench;
 use crate::anywhere::WEIGHTS;
 use crate::press::TestedUnit;
 
@@ -31,7 +31,12 @@ fn a_stretched_unit_is_written() {
     let model = Model::parse(&file).unwrap();
     let unit = TestedUnit::with_real_film(&model.conditions, NUMBER).unwrap();
     let mut tared = unit.tare(&model).unwrap();
-    let own = export(&own_weights(&weights, &unit, &mut tared, NUMBER).unwrap()).unwrap();
+    let own = export(
+        &Bench::Ten
+            .calibrate(&weights, &unit, &mut tared, NUMBER)
+            .unwrap(),
+    )
+    .unwrap();
     let loads = FORCES_N.map(|force_n| {
         let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
         load.with_offset_mm(PLACE_MM).unwrap()
