@@ -76,9 +76,8 @@ struct Held {
     /// Root mean squares.
     #[serde(flatten)]
     row: Row,
-    direction_bounds: f64,
-    magnitude_bounds: f64,
-    place_bounds: f64,
+    /// Of direction, |F| and place.
+    times_the_bound: [f64; 3],
     #[serde(skip)]
     errors: Errors,
     /// Why there was no force, by status.
@@ -117,9 +116,11 @@ impl Held {
         let row = errors.row(force_mn);
         let bounds = bounds.map(|sum| (sum / f64::from(errors.count)).sqrt());
         Ok(Held {
-            direction_bounds: row.direction_deg.to_radians() / bounds[0],
-            magnitude_bounds: row.magnitude_mn / (1e3 * bounds[1]),
-            place_bounds: row.place_um / (1e3 * bounds[2]),
+            times_the_bound: [
+                row.direction_deg.to_radians() / bounds[0],
+                row.magnitude_mn / (1e3 * bounds[1]),
+                row.place_um / (1e3 * bounds[2]),
+            ],
             row,
             errors,
             reasons,
@@ -135,19 +136,18 @@ impl Held {
             direction_deg,
             magnitude_mn,
             place_um,
+            ..
         } = self.row;
         let [direction, force, place] = self.errors.covered();
+        let [a, b, c] = self.times_the_bound;
         let reasons = self.reasons.iter();
         let reasons: String = reasons
             .map(|(reason, count)| format!(", {count} `{reason}`"))
             .collect();
         format!(
             "{force_mn} mN | {direction_deg:.3}° | {magnitude_mn:.3} mN | {place_um:.1} µm | \
-             {:.2}, {:.2}, {:.2} | {direction:.1}, {force:.1}, {place:.1} % | \
+             {a:.2}, {b:.2}, {c:.2} | {direction:.1}, {force:.1}, {place:.1} % | \
              {} of {}{reasons}; {} more with a marker out of the picture |",
-            self.direction_bounds,
-            self.magnitude_bounds,
-            self.place_bounds,
             self.errors.refused,
             self.errors.refused + self.errors.count,
             self.hidden

@@ -25,21 +25,13 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Press anywhere within ±4 mm and hold the errors against the Cramér–Rao bound.
     Anywhere(anywhere::Anywhere),
-    /// Train the paper's network with the place as two more outputs, and judge it beside ours.
     Paper(paper::Paper),
-    /// Look at the simulated sensor: its frames and its film.
     #[command(subcommand)]
     Scene(scene::SceneCommand),
-    /// Press, drag, release, grasp and catch, and count what contact and slip miss, invent, and how
-    /// late they come.
     Slip(slip::Slip),
-    /// Pick the configuration that is best under limits of time and error.
     Tradeoff(tradeoff::TradeoffArgs),
-    /// Displace one marker and see what the residual does not tell.
     Unseen(unseen::Unseen),
-    /// Draw units as people build them; measure them with a tare alone, and after ten loads.
     Units(units::Units),
 }
 

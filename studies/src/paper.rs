@@ -56,13 +56,12 @@ struct Judged {
     found: Option<Answer>,
 }
 
-/// Root mean squares near a force.
+/// What a pipeline says near a force.
 #[derive(Serialize)]
 struct Row {
     pipeline: &'static str,
     #[serde(flatten)]
-    row: press::Row,
-    frames: u32,
+    of: press::Row,
 }
 
 impl Paper {
@@ -71,15 +70,16 @@ impl Paper {
         let theirs = self.theirs()?;
         let ours = self.ours()?;
         // Frames that either refuses count for neither.
-        let both: Vec<(&Judged, &Judged)> = (theirs.iter().zip(&ours))
-            .filter(|(theirs, ours)| theirs.found.is_some() && ours.found.is_some())
-            .collect();
-        let of_theirs: Vec<&Judged> = both.iter().map(|(theirs, _)| *theirs).collect();
-        let of_ours: Vec<&Judged> = both.iter().map(|(_, ours)| *ours).collect();
-        let mut rows = Vec::new();
-        for (pipeline, judged) in [("the paper's", of_theirs), ("ours", of_ours)] {
-            rows.extend(FORCES_MN.map(|force_mn| Row::of(pipeline, force_mn, &judged)));
-        }
+        let both = || {
+            let both = theirs.iter().zip(&ours);
+            both.filter(|(theirs, ours)| theirs.found.is_some() && ours.found.is_some())
+        };
+        let near = |judged: &[&Judged]| FORCES_MN.map(|force_mn| row(force_mn, judged));
+        let of_theirs = near(&both().map(|(theirs, _)| theirs).collect::<Vec<_>>());
+        let of_ours = near(&both().map(|(_, ours)| ours).collect::<Vec<_>>());
+        let named = |pipeline| move |of| Row { pipeline, of };
+        let rows = of_theirs.into_iter().map(named("the paper's"));
+        let rows: Vec<Row> = rows.chain(of_ours.map(named("ours"))).collect();
         if self.json {
             return page::print_rows(&rows);
         }
@@ -87,7 +87,12 @@ impl Paper {
             "| pipeline | force | direction, rms | \\|F\\|, rms | place, rms | frames \
              |\n|---|--:|--:|--:|--:|--:|\n",
         );
-        text.extend(rows.iter().map(Row::line));
+        for Row { pipeline, of } in &rows {
+            text += &format!(
+                "| {pipeline} | {} mN | {:.3}° | {:.3} mN | {:.1} µm | {} |\n",
+                of.force_mn, of.direction_deg, of.magnitude_mn, of.place_um, of.frames
+            );
+        }
         let refused = |all: &[Judged]| all.iter().filter(|one| one.found.is_none()).count();
         text += &format!(
             "\nOf {} frames, the paper's pipeline refused {}, ours {}.\n",
@@ -187,34 +192,17 @@ fn judged(dataset: &Dataset, mut says: impl FnMut(&Observation) -> Option<Answer
     judge.collect()
 }
 
-impl Row {
-    fn of(pipeline: &'static str, force_mn: u32, judged: &[&Judged]) -> Row {
-        let around_n = f64::from(force_mn) * 1e-3;
-        let mut errors = Errors::default();
-        for one in judged {
-            let (force_n, place_mm) = one.truth;
-            let is_inside = place_mm.iter().all(|part| part.abs() <= REACH_MM);
-            let is_near = (norm(force_n) - around_n).abs() <= NEAR * around_n;
-            if let (Some((found_n, found_mm)), true, true) = (one.found, is_inside, is_near) {
-                errors.take((found_n, norm(found_n), found_mm), one.truth, [0.0; 3]);
-            }
-        }
-        Row {
-            pipeline,
-            row: errors.row(force_mn),
-            frames: errors.count,
+/// Errors near a force.
+fn row(force_mn: u32, judged: &[&Judged]) -> press::Row {
+    let around_n = f64::from(force_mn) * 1e-3;
+    let mut errors = Errors::default();
+    for one in judged {
+        let (force_n, place_mm) = one.truth;
+        let is_inside = place_mm.iter().all(|part| part.abs() <= REACH_MM);
+        let is_near = (norm(force_n) - around_n).abs() <= NEAR * around_n;
+        if let (Some((found_n, found_mm)), true, true) = (one.found, is_inside, is_near) {
+            errors.take((found_n, norm(found_n), found_mm), one.truth, [0.0; 3]);
         }
     }
-
-    fn line(&self) -> String {
-        format!(
-            "| {} | {} mN | {:.3}° | {:.3} mN | {:.1} µm | {} |\n",
-            self.pipeline,
-            self.row.force_mn,
-            self.row.direction_deg,
-            self.row.magnitude_mn,
-            self.row.place_um,
-            self.frames
-        )
-    }
+    errors.row(force_mn)
 }

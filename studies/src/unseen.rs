@@ -6,6 +6,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
+use hivtac_evaluation::errors::angle_deg;
 use hivtac_sensing::forward::{Estimate, Forward, Mounting, Observed, Pose};
 use hivtac_sensing::model::Model;
 use rayon::prelude::*;
@@ -103,12 +104,6 @@ struct Film<'m> {
     mounting: Mounting,
 }
 
-/// A straight press, and the markers that show it.
-struct Contact {
-    pose: Pose,
-    observed: Observed<'static>,
-}
-
 impl<'m> Film<'m> {
     /// Of a model; `None` when it has no film.
     fn new(model: &Model<'m>) -> Option<Film<'m>> {
@@ -120,55 +115,44 @@ impl<'m> Film<'m> {
         Some(Film { forward, mounting })
     }
 
-    /// A straight press, N, at a place, mm, as markers without noise show it.
-    fn contact(&self, force_n: f64, place_mm: [f64; 2]) -> Contact {
+    /// A straight press, N, at a place, mm, and markers without noise that show it.
+    fn contact(&self, force_n: f64, place_mm: [f64; 2]) -> (Pose, Observed<'static>) {
         let Film { forward, mounting } = self;
         let force_n = [0.0, 0.0, -force_n as f32];
         let place_mm = place_mm.map(|part| part as f32);
         let pose = Pose::of_force(force_n, place_mm, &forward.stiffness, &forward.limits);
-        let shown = forward
-            .tables
-            .predict(&pose, &forward.limits, &mounting.beside_mm);
-        let variances = forward.noise.at_rest_px.map(|part| {
-            let noise = mounting.scale() * part;
-            noise * noise
-        });
+        let tables = &forward.tables;
+        let shown = tables.predict(&pose, &forward.limits, &mounting.beside_mm);
+        let noise = forward.noise.at_rest_px.map(|part| mounting.scale() * part);
+        let variances = noise.map(|noise| noise * noise);
         let observed = Observed {
             hanging: None,
             drift: None,
             moved: shown.moved,
             noise: std::array::from_fn(|k| forward.rest_image.noise(k, variances)),
         };
-        Contact { pose, observed }
-    }
-
-    /// What the sensor makes of a marker that is seen farther along x and y, focal lengths.
-    fn estimate(&self, contact: &Contact, marker: usize, off: [f32; 2]) -> Estimate {
-        let Film { forward, mounting } = self;
-        let mut observed = contact.observed;
-        for (moved, off) in observed.moved[2 * marker..].iter_mut().zip(off) {
-            *moved += off;
-        }
-        forward.estimate(&observed, mounting, forward.unknown(true), contact.pose)
+        (pose, observed)
     }
 }
 
 fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
+    let Film { forward, mounting } = film;
     let place_mm = place_mm(number);
-    let contact = film.contact(f64::from(force_mn) * 1e-3, place_mm);
+    let (pose, shown) = film.contact(f64::from(force_mn) * 1e-3, place_mm);
     let mut cell = Cell {
         place_mm,
         ..Cell::default()
     };
-    for marker in 0..4 {
-        for way in 0..WAYS {
-            let turn = std::f32::consts::TAU * way as f32 / WAYS as f32;
-            for off_px in OFF_PX {
-                let focal = off_px as f32 * film.mounting.scale();
-                let off = [turn.cos(), turn.sin()].map(|part| focal * part);
-                let found = film.estimate(&contact, marker, off);
-                cell.take(&film.forward, &contact.pose, off_px, &found);
-            }
+    for (marker, way) in (0..4).flat_map(|marker| (0..WAYS).map(move |way| (marker, way))) {
+        let turn = std::f32::consts::TAU * way as f32 / WAYS as f32;
+        for off_px in OFF_PX {
+            let mut observed = shown;
+            // In focal lengths.
+            let focal = off_px as f32 * mounting.scale();
+            observed.moved[2 * marker] += focal * turn.cos();
+            observed.moved[2 * marker + 1] += focal * turn.sin();
+            let found = forward.estimate(&observed, mounting, forward.unknown(true), pose);
+            cell.take(forward, &pose, off_px, &found);
         }
     }
     cell
@@ -198,29 +182,24 @@ impl Cell {
             }
         }
     }
-
-    fn is_calibrated(&self) -> bool {
-        self.place_mm.iter().all(|part| part.abs() <= CALIBRATED_MM)
-    }
 }
 
 /// Of the direction, degrees, of |F|, mN, and of the place, mm.
 fn errors(forward: &Forward<'_>, found: &Pose, truth: &Pose) -> [f64; 3] {
     let [a, b] = [found, truth].map(|pose| pose.direction().map(f64::from));
-    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-    let off_n =
-        forward.stiffness.magnitude_n(found.size) - forward.stiffness.magnitude_n(truth.size);
+    let [found_n, truth_n] = [found, truth].map(|pose| forward.stiffness.magnitude_n(pose.size));
     let [x, y] = [0, 1].map(|i| f64::from(found.place_mm[i] - truth.place_mm[i]));
     [
-        dot.clamp(-1.0, 1.0).acos().to_degrees(),
-        1e3 * f64::from(off_n).abs(),
+        angle_deg(a, b).unwrap_or(180.0),
+        1e3 * f64::from(found_n - truth_n).abs(),
         x.hypot(y),
     ]
 }
 
 impl Row {
     fn of(force_mn: u32, cells: &[Cell]) -> Row {
-        let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.is_calibrated()).collect();
+        let is_inside = |cell: &&Cell| cell.place_mm.iter().all(|part| part.abs() <= CALIBRATED_MM);
+        let cells: Vec<&Cell> = cells.iter().filter(is_inside).collect();
         let both = |of: &dyn Fn(&Cell) -> f64| {
             let mut all: Vec<f64> = cells.iter().map(|cell| of(cell)).collect();
             all.sort_by(f64::total_cmp);

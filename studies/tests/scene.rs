@@ -17,10 +17,11 @@ fn run(directory: &Path, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-fn stdout(output: &Output) -> String {
+fn stdout(directory: &Path, arguments: &[&str]) -> String {
+    let output = run(directory, arguments);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{error}");
-    String::from_utf8(output.stdout.clone()).unwrap()
+    String::from_utf8(output.stdout).unwrap()
 }
 
 /// What is said of a mistake; all of `words` are in it.
@@ -47,12 +48,12 @@ fn a_picture_is_the_frame_and_an_overlay_marks_the_true_centroids() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let plain = ["render", "static", "--out", "a.png", "--number", "7"];
-    let said = stdout(&run(here, &plain));
+    let said = stdout(here, &plain);
     assert!(said.contains("320×240 rgb565"), "{said}");
-    stdout(&run(here, &[&plain[..], &["--scale", "3"]].concat()));
+    stdout(here, &[&plain[..], &["--scale", "3"]].concat());
     let over = ["render", "static", "--out", "b.png", "--number", "7"];
     let over = [&over[..], &["--scale", "3", "--overlay"]].concat();
-    stdout(&run(here, &over));
+    stdout(here, &over);
     let (width, height, before) = png(&here.join("a.png"));
     let (_, _, after) = png(&here.join("b.png"));
     assert_eq!((width, height), (960, 720));
@@ -94,8 +95,8 @@ fn mistakes_are_named() {
 /// Tip depth and the markers' (x, y) of `scene film --json`.
 fn film(more: &[&str]) -> (f64, [[f64; 2]; 4]) {
     let pressed = ["film", "--force-n", "0.1", "--alpha-deg", "5", "--json"];
-    let output = run(Path::new("."), &[&pressed[..], more].concat());
-    let answer: Value = serde_json::from_str(&stdout(&output)).unwrap();
+    let said = stdout(Path::new("."), &[&pressed[..], more].concat());
+    let answer: Value = serde_json::from_str(&said).unwrap();
     let number = |value: &Value| value.as_f64().unwrap();
     let seen = |id: usize| ["x_px", "y_px"].map(|key| number(&answer["markers"][id][key]));
     (number(&answer["tip_depth_mm"]), [0, 1, 2, 3].map(seen))

@@ -81,7 +81,7 @@ fn jacobian(unit: &TestedUnit, load: &Load) -> Result<[[f64; COORDINATES]; UNKNO
 
 /// The true centroids under a load, px: x0, y0, x1, …
 fn centroids(unit: &TestedUnit, load: Load) -> Result<[f64; COORDINATES]> {
-    let truth = unit.scene().truth_under(&unit.with_tip(load)?)?;
+    let truth = unit.scene.truth_under(&unit.with_tip(load)?)?;
     let mut px = [0.0; COORDINATES];
     for (pair, marker) in px.chunks_exact_mut(2).zip(&truth.markers) {
         pair.copy_from_slice(&marker.context("a marker is out of sight")?.centroid_px);

@@ -33,6 +33,8 @@ pub struct Row {
     pub magnitude_mn: f64,
     /// Of each coordinate of the place, µm.
     pub place_um: f64,
+    /// Forces.
+    pub frames: u32,
 }
 
 impl Errors {
@@ -112,6 +114,7 @@ impl Errors {
             direction_deg,
             magnitude_mn,
             place_um,
+            frames: self.count,
         }
     }
 }

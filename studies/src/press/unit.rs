@@ -1,14 +1,13 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
+use hivtac_film::Pressed;
 use hivtac_film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_scene::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensing::force::Force;
 use hivtac_sensing::forward::Drift;
 use hivtac_sensing::model::{Conditions, Model};
-use hivtac_sensing::motion::Motion;
 use hivtac_sensing::pipeline::{Measurement, Sensor};
-use hivtac_sensing::rest::Rest;
 use hivtac_sensing::tare::TareBuilder;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
@@ -20,15 +19,15 @@ const TARE_FRAMES: u16 = 64;
 
 /// A simulated sensor as somebody built it.
 pub struct TestedUnit {
-    scene: Scene,
-    tip_radius_mm: f64,
+    pub scene: Scene,
+    pub tip_radius_mm: f64,
     /// Its film, where it is not the scene's.
     real: Option<RealFilm>,
 }
 
 /// A sensor with a model, tared on a unit.
 pub struct Tared<'m> {
-    sensor: Box<Sensor<'m>>,
+    pub sensor: Box<Sensor<'m>>,
 }
 
 /// What a sensor said of a press.
@@ -89,35 +88,24 @@ impl TestedUnit {
     /// A frame under a press; the number selects its noise.
     pub fn frame(&self, load: &Load, number: u64) -> Result<Frame> {
         let load = self.with_tip(*load)?;
-        match &self.real {
-            None => Ok(self.scene.render_load(&load, number)?),
-            Some(film) => Ok(self.scene.render_pressed(film.press(&load)?, &load, number)),
-        }
-    }
-
-    /// The film under a press, where it is not the scene's.
-    #[cfg(test)]
-    pub fn pressed(&self, load: &Load) -> Option<Result<hivtac_film::Pressed>> {
-        let film = self.real.as_ref()?;
-        Some(self.with_tip(*load).and_then(|load| film.press(&load)))
+        Ok(match self.pressed(&load)? {
+            None => self.scene.render_load(&load, number)?,
+            Some(pressed) => self.scene.render_pressed(pressed, &load, number),
+        })
     }
 
     fn truth(&self, load: &Load) -> Result<Truth> {
         let load = self.with_tip(*load)?;
-        match &self.real {
-            None => Ok(self.scene.truth_under(&load)?),
-            Some(film) => Ok(self.scene.truth_of_pressed(film.press(&load)?, &load)),
-        }
+        Ok(match self.pressed(&load)? {
+            None => self.scene.truth_under(&load)?,
+            Some(pressed) => self.scene.truth_of_pressed(pressed, &load),
+        })
     }
 
-    /// The scene.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    /// Its tip's radius, mm.
-    pub fn tip_radius_mm(&self) -> f64 {
-        self.tip_radius_mm
+    /// The film under a press with this unit's tip, where it is not the scene's.
+    pub fn pressed(&self, load: &Load) -> Result<Option<Pressed>> {
+        let film = self.real.as_ref();
+        film.map(|film| film.press(load)).transpose()
     }
 
     /// A press with this unit's tip.
@@ -180,19 +168,9 @@ impl TestedUnit {
 }
 
 impl Tared<'_> {
-    /// Says when which row of its frames is exposed.
-    pub fn set_motion(&mut self, motion: Motion) {
-        self.sensor.set_motion(motion);
-    }
-
     /// What the sensor says of a frame, whatever its format.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
         self.sensor.measure_frame(&frame.to_rgb565())
-    }
-
-    /// Where it rests.
-    pub fn rest(&self) -> Option<&Rest> {
-        self.sensor.tare()
     }
 
     /// Where markers are seen under a press, the mean of some frames; the number selects their

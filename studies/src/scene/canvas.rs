@@ -44,11 +44,10 @@ impl Canvas {
             rgb: frame.to_rgb888(),
         };
         let mut canvas = Canvas::new(scale * frame.width, scale * frame.height, BLACK);
-        for y in 0..canvas.height {
-            for x in 0..canvas.width {
-                let colour = small.pixel(x / scale, y / scale);
-                canvas.set(x.into(), y.into(), colour);
-            }
+        let side = i64::from(scale);
+        for (x, y) in (0..frame.height).flat_map(|y| (0..frame.width).map(move |x| (x, y))) {
+            let at = [x, y].map(|part| side * i64::from(part));
+            canvas.fill(at, [side, side], small.pixel(x, y));
         }
         canvas
     }
@@ -105,14 +104,13 @@ impl Canvas {
     pub fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
         let side = i64::from(scale);
         let advance = side * i64::from(CHARACTER);
-        let mut left = x;
-        for character in text.chars() {
+        for (nth, character) in (0..).zip(text.chars()) {
+            let left = x + advance * nth;
             for (row, bits) in (0..).zip(glyph(character)) {
                 for column in (0..8).filter(|column| bits >> column & 1 == 1) {
                     self.fill([left + side * column, y + side * row], [side, side], colour);
                 }
             }
-            left += advance;
         }
     }
 

@@ -8,7 +8,7 @@ mod render;
 use anyhow::Result;
 use clap::Subcommand;
 
-/// Look at the simulated sensor.
+/// Look at the simulated sensor: its frames and its film.
 #[derive(Subcommand)]
 pub enum SceneCommand {
     /// Render one frame of a scene as a PNG picture.

@@ -19,19 +19,11 @@ const TABLE: &str = include_str!("../../tradeoff/configurations.csv");
 /// The core's cycles in a microsecond.
 const CYCLES_PER_US: f64 = 480.0;
 
-/// Under which limits to pick, and whether to train what is picked.
+/// Pick the configuration that is best under limits of time and error.
 #[derive(Args)]
 pub struct TradeoffArgs {
-    /// Pick the best that takes at most so many µs a frame, at 480 MHz, modelled.
-    #[arg(long)]
-    budget_us: Option<f64>,
-    /// Pick the best that the core can do at least so often a second, modelled.
-    #[arg(long)]
-    min_rate: Option<f64>,
-    /// Pick the fastest whose mean direction error from 50 mN up is at most this, simulated; the
-    /// upper end of its interval counts.
-    #[arg(long)]
-    max_error_deg: Option<f64>,
+    #[command(flatten)]
+    limits: Limits,
     /// Train the pick on as many frames as the default model, and write its model and settings into
     /// this folder. Without any limit the pick is the default.
     #[arg(long)]
@@ -52,9 +44,6 @@ struct Configuration {
     numbers: String,
     /// Gauss–Newton steps from the network's answer, at the least; 0: it stands alone.
     steps: u8,
-    /// How far it is from use: `firmware` does it; a `camera` delivers it, but the firmware captures
-    /// another size; `none`: the chip runs no floats, or no camera has the size.
-    reach: String,
     /// Mean angle between found and true force, degrees.
     direction_deg: f64,
     /// The same from 50 mN up, and half of the interval that holds the true mean with 95 %.
@@ -65,22 +54,17 @@ struct Configuration {
     place_rmse_um: f64,
     /// Frames that no single contact explains, in parts of those that are judged.
     unexplained: f64,
-    /// Of a frame; none of floats, which the chip does not run.
-    modelled_cycles: Option<i64>,
+    /// Of a frame.
+    modelled_cycles: i64,
     /// From the last pixel to the sample, µs.
-    latency_microseconds: Option<f64>,
+    latency_microseconds: f64,
 }
 
 impl TradeoffArgs {
     /// Picks, says what, and trains it when a folder is given.
     pub fn run(&self) -> Result<()> {
-        let limits = Limits {
-            budget_us: self.budget_us,
-            min_rate: self.min_rate,
-            max_error_deg: self.max_error_deg,
-        };
         let all = configurations()?;
-        let picked = best(&all, &limits)?;
+        let picked = best(&all, &self.limits)?;
         println!("{}", told(picked));
         if let Some(folder) = &self.out {
             let rendering = bar("rendering", model::FRAMES);
@@ -90,10 +74,20 @@ impl TradeoffArgs {
     }
 }
 
+/// Those that the firmware does as it is.
 fn configurations() -> Result<Vec<Configuration>> {
-    let rows = csv::Reader::from_reader(TABLE.as_bytes()).into_deserialize();
-    let rows: Result<_, csv::Error> = rows.collect();
-    rows.context("studies/tradeoff/configurations.csv")
+    let mut reader = csv::Reader::from_reader(TABLE.as_bytes());
+    let titles = reader.headers()?.clone();
+    let reach = titles.iter().position(|title| title == "reach");
+    let reach = reach.context("the table has no reach")?;
+    let mut all = Vec::new();
+    for row in reader.records() {
+        let row = row?;
+        if &row[reach] == "firmware" {
+            all.push(row.deserialize(Some(&titles))?);
+        }
+    }
+    Ok(all)
 }
 
 impl Configuration {
@@ -105,13 +99,13 @@ impl Configuration {
         }
     }
 
-    fn microseconds(&self) -> Option<f64> {
-        Some(self.modelled_cycles? as f64 / CYCLES_PER_US)
+    fn microseconds(&self) -> f64 {
+        self.modelled_cycles as f64 / CYCLES_PER_US
     }
 
     /// Frames a second.
-    fn rate(&self) -> Option<f64> {
-        Some(1e6 / self.microseconds()?)
+    fn rate(&self) -> f64 {
+        1e6 / self.microseconds()
     }
 
     /// The upper end of the interval of the direction error from 50 mN up, degrees.
@@ -140,27 +134,20 @@ impl fmt::Display for Configuration {
 }
 
 fn told(picked: &Configuration) -> String {
-    let mut text = format!(
+    format!(
         "picked: {picked}\n  simulated: direction {:.3}° ± {:.3}° from 50 mN up, {:.3}° over all; \
-         |F| {:.3} mN RMSE; place {:.1} µm along x and y each",
+         |F| {:.3} mN RMSE; place {:.1} µm along x and y each\n  modelled: {} cycles, {:.0} µs, \
+         {:.0} frames a second, {:.0} µs from the last pixel to the sample",
         picked.strong_direction_deg,
         picked.strong_direction_deg_95.unwrap_or(0.0),
         picked.direction_deg,
         picked.force_rmse_mn,
-        picked.place_rmse_um
-    );
-    if let (Some(cycles), Some(us), Some(rate), Some(latency)) = (
+        picked.place_rmse_um,
         picked.modelled_cycles,
         picked.microseconds(),
         picked.rate(),
-        picked.latency_microseconds,
-    ) {
-        text += &format!(
-            "\n  modelled: {cycles} cycles, {us:.0} µs, {rate:.0} frames a second, {latency:.0} µs \
-             from the last pixel to the sample"
-        );
-    }
-    text
+        picked.latency_microseconds
+    )
 }
 
 #[cfg(test)]

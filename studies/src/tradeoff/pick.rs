@@ -1,6 +1,7 @@
 //! Which configuration is best under a user's limits.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use clap::Args;
 
 use super::Configuration;
 
@@ -8,105 +9,76 @@ use super::Configuration;
 const EQUAL: f64 = 0.05;
 
 /// A user's limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Args, Default)]
 pub struct Limits {
-    /// Longest time of a frame, µs at 480 MHz, modelled.
+    /// Pick the best that takes at most so many µs a frame, at 480 MHz, modelled.
+    #[arg(long)]
     pub budget_us: Option<f64>,
-    /// Least frames a second that the core can do, modelled.
+    /// Pick the best that the core can do at least so often a second, modelled.
+    #[arg(long)]
     pub min_rate: Option<f64>,
-    /// Largest mean direction error from 50 mN up, degrees, simulated: the upper end of its
-    /// interval.
+    /// Pick the fastest whose mean direction error from 50 mN up is at most this, simulated; the
+    /// upper end of its interval counts.
+    #[arg(long)]
     pub max_error_deg: Option<f64>,
 }
 
-/// The best configuration within the limits that the firmware does as it is.
+/// The best configuration within the limits.
 ///
 /// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
 /// error from 50 mN up, error of |F| and error of the place are within a twentieth of the least of
 /// each, and time within a twentieth of the fastest's, the one that refuses least.
-pub(super) fn best<'c>(
-    configurations: &'c [Configuration],
-    limits: &Limits,
-) -> Result<&'c Configuration> {
-    let reachable: Vec<&Configuration> = configurations
-        .iter()
-        .filter(|c| c.reach == "firmware")
-        .collect();
-    let fitting: Vec<_> = reachable
-        .iter()
-        .copied()
-        .filter(|c| limits.hold(c))
-        .collect();
-    if fitting.is_empty() {
-        bail!(
-            "nothing that the firmware does is within these limits; {}",
-            nearest(&reachable).unwrap_or_default()
-        );
-    }
-    let fastest = |among: &[&'c Configuration]| among.iter().copied().min_by_key(|c| cycles(c));
+pub(super) fn best<'c>(all: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
+    let fitting: Vec<_> = all.iter().filter(|c| limits.hold(c)).collect();
     let best = match limits.max_error_deg {
-        Some(_) => fastest(&fitting),
-        None => refuses_least(&as_fast(&as_accurate(&fitting))),
+        Some(_) => fitting.into_iter().min_by_key(|c| c.modelled_cycles),
+        None => {
+            let left = equals(&fitting, |c| c.strong_direction_deg);
+            let left = equals(&left, |c| c.force_rmse_mn);
+            let left = equals(&left, |c| c.place_rmse_um);
+            let left = equals(&left, |c| c.modelled_cycles as f64);
+            left.into_iter().min_by(|a, b| {
+                let by_cycles = a.modelled_cycles.cmp(&b.modelled_cycles);
+                (a.unexplained.total_cmp(&b.unexplained)).then(by_cycles)
+            })
+        }
     };
-    best.context("no configuration has a cost")
+    best.with_context(|| {
+        let nearest = nearest(all).unwrap_or_default();
+        format!("nothing that the firmware does is within these limits; {nearest}")
+    })
 }
 
-/// The most accurate and their equals.
-fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
-    let equals = |among: &[&'c Configuration], of: fn(&Configuration) -> f64| {
-        let least = among.iter().map(|c| of(c)).fold(f64::INFINITY, f64::min);
-        let near = |c: &&&Configuration| of(c) <= least * (1.0 + EQUAL);
-        among.iter().filter(near).copied().collect::<Vec<_>>()
-    };
-    let by_direction = equals(fitting, |c| c.strong_direction_deg);
-    let by_force = equals(&by_direction, |c| c.force_rmse_mn);
-    equals(&by_force, |c| c.place_rmse_um)
-}
-
-/// The fastest and their equals.
-fn as_fast<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
-    let least = fitting.iter().map(|c| cycles(c)).min().unwrap_or(i64::MAX);
-    let near = |c: &&&Configuration| cycles(c) as f64 <= least as f64 * (1.0 + EQUAL);
-    fitting.iter().filter(near).copied().collect()
-}
-
-/// The one that refuses the fewest frames; of several the fastest.
-fn refuses_least<'c>(fitting: &[&'c Configuration]) -> Option<&'c Configuration> {
-    let by_both = |a: &&&'c Configuration, b: &&&'c Configuration| {
-        (a.unexplained.total_cmp(&b.unexplained)).then(cycles(a).cmp(&cycles(b)))
-    };
-    fitting.iter().min_by(by_both).copied()
-}
-
-fn cycles(configuration: &Configuration) -> i64 {
-    configuration.modelled_cycles.unwrap_or(i64::MAX)
+/// The one with the least of something, and its equals.
+fn equals<'c>(
+    among: &[&'c Configuration],
+    of: fn(&Configuration) -> f64,
+) -> Vec<&'c Configuration> {
+    let least = among.iter().map(|c| of(c)).fold(f64::INFINITY, f64::min);
+    let near = |c: &&&Configuration| of(c) <= least * (1.0 + EQUAL);
+    among.iter().filter(near).copied().collect()
 }
 
 /// What comes nearest to limits of time, and to one of the error.
-fn nearest(reachable: &[&Configuration]) -> Option<String> {
-    let fastest = reachable.iter().min_by_key(|c| cycles(c))?;
-    let by_error = |c: &&&Configuration| (1e6 * c.limit_error_deg()) as u64;
-    let accurate = reachable.iter().min_by_key(by_error)?;
+fn nearest(all: &[Configuration]) -> Option<String> {
+    let fastest = all.iter().min_by_key(|c| c.modelled_cycles)?;
+    let by_error = |c: &&Configuration| (1e6 * c.limit_error_deg()) as u64;
+    let accurate = all.iter().min_by_key(by_error)?;
     Some(format!(
         "the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second); the most accurate, \
          {accurate}, is within {:.3}°",
-        fastest.microseconds()?,
-        fastest.rate()?,
+        fastest.microseconds(),
+        fastest.rate(),
         accurate.limit_error_deg()
     ))
 }
 
 impl Limits {
     /// Whether a configuration is within them.
-    fn hold(&self, configuration: &Configuration) -> bool {
-        let (Some(us), Some(rate)) = (configuration.microseconds(), configuration.rate()) else {
-            return false;
-        };
-        self.budget_us.is_none_or(|most| us <= most)
-            && self.min_rate.is_none_or(|least| rate >= least)
-            && self
-                .max_error_deg
-                .is_none_or(|most| configuration.limit_error_deg() <= most)
+    fn hold(&self, c: &Configuration) -> bool {
+        self.budget_us.is_none_or(|most| c.microseconds() <= most)
+            && self.min_rate.is_none_or(|least| c.rate() >= least)
+            && (self.max_error_deg).is_none_or(|most| c.limit_error_deg() <= most)
     }
 }
 
@@ -116,7 +88,7 @@ mod tests {
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
     /// (mN).
-    fn made(reach: &str, cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
+    fn made(cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         Configuration {
             width: 320,
             height: 240,
@@ -124,29 +96,25 @@ mod tests {
             network: "16-16".to_owned(),
             numbers: "int16".to_owned(),
             steps: 1,
-            reach: reach.to_owned(),
             direction_deg: 3.0 * direction,
             strong_direction_deg: direction,
             strong_direction_deg_95: Some(0.1 * direction),
             force_rmse_mn: force,
             place_rmse_um: 10.0,
             unexplained: 0.001,
-            modelled_cycles: Some(cycles),
-            latency_microseconds: Some(10.0),
+            modelled_cycles: cycles,
+            latency_microseconds: 10.0,
         }
     }
 
-    /// Rough; good; as good; a little better; much better in |F|; then one without a firmware, and
-    /// one without a camera.
+    /// Rough; good; as good; a little better; much better in |F|.
     fn several() -> Vec<Configuration> {
         vec![
-            made("firmware", 96_000, [0.5, 0.3]),
-            made("firmware", 144_000, [0.20, 0.1]),
-            made("firmware", 240_000, [0.20, 0.1]),
-            made("firmware", 288_000, [0.195, 0.1]),
-            made("firmware", 480_000, [0.198, 0.01]),
-            made("camera", 960_000, [0.1, 0.01]),
-            made("none", 1_440_000, [0.05, 0.01]),
+            made(96_000, [0.5, 0.3]),
+            made(144_000, [0.20, 0.1]),
+            made(240_000, [0.20, 0.1]),
+            made(288_000, [0.195, 0.1]),
+            made(480_000, [0.198, 0.01]),
         ]
     }
 
@@ -158,7 +126,7 @@ mod tests {
                 min_rate,
                 max_error_deg,
             };
-            cycles(best(&several(), &limits).unwrap())
+            best(&several(), &limits).unwrap().modelled_cycles
         };
         assert_eq!(picked(None, None, None), 480_000);
         assert_eq!(picked(Some(600.0), None, None), 144_000);
@@ -173,7 +141,7 @@ mod tests {
     fn among_equals_as_fast_the_one_that_refuses_least_is_best() {
         let mut all = several();
         for (cycles, least) in [(510_000, 0.001), (500_000, 0.0005)] {
-            let mut other = made("firmware", cycles, [0.198, 0.01]);
+            let mut other = made(cycles, [0.198, 0.01]);
             other.unexplained = 0.0005;
             all.push(other);
             assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, least);

@@ -41,12 +41,9 @@ fn a_stretched_unit_is_written() {
         let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
         load.with_offset_mm(PLACE_MM).unwrap()
     });
-    let states: Vec<Value> = [Load::REST]
-        .iter()
-        .chain(&loads)
-        .map(|load| state(&unit, load))
-        .collect();
-    let options = unit.scene().options();
+    let states = [Load::REST].iter().chain(&loads);
+    let states: Vec<Value> = states.map(|load| state(&unit, load)).collect();
+    let options = unit.scene.options();
     let told = json!({
         "shift_px": options.mounting.shift_px,
         "roll_deg": options.mounting.roll_deg,
@@ -62,10 +59,9 @@ fn a_stretched_unit_is_written() {
 
 /// How the film is under a load.
 fn state(unit: &TestedUnit, load: &Load) -> Value {
-    let pressed = unit
-        .pressed(load)
-        .expect("a film that is not the scene's")
-        .unwrap();
+    let load = unit.with_tip(*load).unwrap();
+    let pressed = unit.pressed(&load).unwrap();
+    let pressed = pressed.expect("a film that is not the scene's");
     let motion = |disc: DiscMotion| [disc.moved_mm, disc.along_x, disc.along_y];
     json!({
         "force_n": pressed.force_n,
