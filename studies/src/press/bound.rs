@@ -118,11 +118,9 @@ mod tests {
     fn an_inverse_times_its_matrix_is_one() {
         let a = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.25], [0.5, -0.25, 2.0]];
         let b = inverse(a).unwrap();
-        for i in 0..3 {
-            for j in 0..3 {
-                let product: f64 = (0..3).map(|k| a[i][k] * b[k][j]).sum();
-                assert!((product - f64::from(u8::from(i == j))).abs() < 1e-12);
-            }
+        for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
+            let product: f64 = (0..3).map(|k| a[i][k] * b[k][j]).sum();
+            assert!((product - f64::from(u8::from(i == j))).abs() < 1e-12);
         }
         assert!(inverse([[1.0, 2.0], [2.0, 1.0]]).is_none());
     }
