@@ -196,7 +196,7 @@ fn rows(all: &Scores, which: usize) -> Vec<Row> {
 
 fn table(name: &str, rows: &[Row]) -> Result<String> {
     let mut text = format!(
-        "\n## {name}\n\n| unit | what happens | true | told | precision | recall | missed, of them \
+        "\n{name}:\n\n| unit | what happens | true | reported | precision | recall | missed, of them \
          where frames had no force | delay: median, 95 % |\n|---|---|--:|--:|--:|--:|---|---|\n"
     );
     let percent = |part: u32, of: u32| match of {
