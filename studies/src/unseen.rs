@@ -245,7 +245,7 @@ fn panels(maps: &[(u32, Vec<Cell>)]) -> Vec<Map> {
         values: cells.iter().map(|cell| cell.off_px).collect(),
     });
     let errors = maps.iter().map(|(force_mn, cells)| Map {
-        title: format!("direction then off, degrees, {force_mn} mN"),
+        title: format!("error of the direction then, degrees, {force_mn} mN"),
         levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
         values: cells.iter().map(|cell| cell.errors[0]).collect(),
     });
