@@ -37,8 +37,8 @@ pub fn paper_camera() -> Result<Camera, ShellError> {
 pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4] {
     let moved = |rest| film.displacement(state, rest);
     MARKERS.map(|disc| Marker {
-        moved_mm: disc_motion(&moved, &disc).moved_mm,
-        seen_px: disc.centroid_px(&moved, camera),
+        moved_mm: disc_motion(moved, &disc).moved_mm,
+        seen_px: disc.centroid_px(moved, camera),
     })
 }
 
@@ -58,7 +58,7 @@ pub fn pressed(
     let places = pressed.centres_mm.iter_mut().zip(&mut pressed.discs);
     for ((centre_mm, motion), disc) in places.zip(discs) {
         *centre_mm = disc.centre_mm;
-        *motion = seen_motion(&moved, &disc, &camera);
+        *motion = seen_motion(moved, &disc, &camera);
     }
     Ok(pressed)
 }
