@@ -1,5 +1,6 @@
 //! How near the sensor comes to what four markers can tell, wherever the tip presses.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -7,11 +8,13 @@ use anyhow::{Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::model::Model;
+use hivtac_calibration::data::dataset::reasons as refusals;
 use hivtac_twin::Options;
+use hivtac_sensor::force::model::Model;
+use serde::Serialize;
 
 use crate::page;
-use crate::press::{FORCES_MN, Held, REACH_MM, TestedUnit, press};
+use crate::press::{Errors, FORCES_MN, Information, REACH_MM, Row, TestedUnit, press};
 
 /// The weights file of the sensor that tells places.
 pub const WEIGHTS: &str = "calibration/models/default.weights";
@@ -33,9 +36,6 @@ pub struct Anywhere {
 
 impl Anywhere {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When a file cannot be read or written, or a press cannot be made.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         if self.json {
@@ -48,13 +48,7 @@ impl Anywhere {
         );
         for steps in 0..=hivtac_sensor::force::forward::MOST_STEPS {
             for held in self.held(&weights, Some(steps))? {
-                writeln!(
-                    text,
-                    "| {steps} | {} mN | {} | {} |",
-                    held.row.force_mn,
-                    held.cells(),
-                    held.refused()
-                )?;
+                writeln!(text, "| {steps} | {}", held.cells())?;
             }
         }
         print!("{text}");
@@ -71,12 +65,92 @@ impl Anywhere {
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let unit = TestedUnit::new(&model.conditions, Options::default(), 0.5, 1)?;
         let forces = FORCES_MN.into_iter();
-        let held = forces.map(|force_mn| {
-            let force_n = f64::from(force_mn) * 1e-3;
-            let numbers = 0..self.presses;
-            let loads = numbers.map(|number| Ok(press(number, force_n, REACH_MM)?));
-            Held::of(&unit, &model, force_mn, loads)
-        });
+        let held = forces.map(|force_mn| Held::of(&unit, &model, force_mn, self.presses));
         held.collect()
+    }
+}
+
+/// Errors of presses on a unit, and how many times the Cramér–Rao bound they are.
+#[derive(Serialize)]
+struct Held {
+    /// Root mean squares.
+    #[serde(flatten)]
+    row: Row,
+    /// Of direction, |F| and place.
+    times_the_bound: [f64; 3],
+    #[serde(skip)]
+    errors: Errors,
+    /// Why there was no force, by status.
+    #[serde(skip)]
+    reasons: BTreeMap<String, u32>,
+    /// Presses that move a marker out of the picture, or are beyond the simulated film: they are
+    /// left out.
+    #[serde(skip)]
+    hidden: u32,
+}
+
+impl Held {
+    /// What a model says of so many presses of one |F|, mN, on a unit.
+    fn of(unit: &TestedUnit, model: &Model<'_>, force_mn: u32, presses: u32) -> Result<Held> {
+        let mut tared = unit.tare(model)?;
+        let mut answers = Vec::new();
+        for number in 0..presses {
+            let load = press(number, [f64::from(force_mn) * 1e-3; 2], REACH_MM)?;
+            if unit.shows_all(&load)? {
+                answers.push(tared.answer(unit, load, number.into())?);
+            }
+        }
+        let information = Information::of(&answers)?;
+        let (mut errors, mut bounds) = (Errors::default(), [0.0; 3]);
+        let mut reasons = BTreeMap::new();
+        for answer in &answers {
+            errors.add(answer.force.as_ref(), &answer.load)?;
+            if answer.force.is_some() {
+                let bound = information.bound(unit, &answer.load)?;
+                bounds = std::array::from_fn(|k| bounds[k] + bound[k]);
+            }
+            if answer.force.is_none() {
+                *reasons.entry(refusals(answer.status)).or_insert(0) += 1;
+            }
+        }
+        let row = errors.row(force_mn);
+        let bounds = bounds.map(|sum| (sum / f64::from(errors.count)).sqrt());
+        Ok(Held {
+            times_the_bound: [
+                row.direction_deg.to_radians() / bounds[0],
+                row.magnitude_mn / (1e3 * bounds[1]),
+                row.place_um / (1e3 * bounds[2]),
+            ],
+            row,
+            errors,
+            reasons,
+            hidden: presses - answers.len() as u32,
+        })
+    }
+
+    /// Cells of a table: root mean squares, how many times the bound they are, how many errors are
+    /// within their stated bounds, and how many presses have no force, why, and are left out.
+    fn cells(&self) -> String {
+        let Row {
+            force_mn,
+            direction_deg,
+            magnitude_mn,
+            place_um,
+            ..
+        } = self.row;
+        let [direction, force, place] = self.errors.covered();
+        let [a, b, c] = self.times_the_bound;
+        let reasons = self.reasons.iter();
+        let reasons: String = reasons
+            .map(|(reason, count)| format!(", {count} `{reason}`"))
+            .collect();
+        format!(
+            "{force_mn} mN | {direction_deg:.3}° | {magnitude_mn:.3} mN | {place_um:.1} µm | \
+             {a:.2}, {b:.2}, {c:.2} | {direction:.1}, {force:.1}, {place:.1} % | \
+             {} of {}{reasons}; {} more with a marker out of the picture |",
+            self.errors.refused,
+            self.errors.refused + self.errors.count,
+            self.hidden
+        )
     }
 }

@@ -11,9 +11,6 @@ use serde::Serialize;
 const PLACE: &str = "<!-- results -->";
 
 /// Writes a page: its text with the results in their place.
-///
-/// # Errors
-/// When the text has no such place, or the page cannot be written.
 pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     let (before, after) = text
         .split_once(PLACE)
@@ -22,18 +19,7 @@ pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     write_file(&Path::new("docs/results").join(name), &text)
 }
 
-/// A page's text with each figure in the place of its name in braces.
-pub fn filled(template: &str, figures: &[(&str, String)]) -> String {
-    let text = template.to_owned();
-    figures.iter().fold(text, |text, (name, figure)| {
-        text.replace(&format!("{{{name}}}"), figure.trim_end())
-    })
-}
-
 /// Writes a file of the project and says so.
-///
-/// # Errors
-/// When it cannot be written.
 pub fn write_file(path: &Path, text: &str) -> Result<()> {
     fs::write(path, text).with_context(|| {
         format!(
@@ -46,9 +32,6 @@ pub fn write_file(path: &Path, text: &str) -> Result<()> {
 }
 
 /// Prints `{"rows":[…]}` on one line.
-///
-/// # Errors
-/// When a row has no JSON.
 pub fn print_rows(rows: &[impl Serialize]) -> Result<()> {
     let report = BTreeMap::from([("rows", rows)]);
     println!("{}", serde_json::to_string(&report)?);

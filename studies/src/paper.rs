@@ -3,23 +3,27 @@
 
 use anyhow::{Result, anyhow};
 use clap::Args;
-use hivtac_calibration::data::dataset::{Dataset, Observation};
-use hivtac_calibration::data::loads::norm;
-use hivtac_calibration::evaluation::answer::Chip;
-use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
+use hivtac_calibration::weights::Weights;
+use hivtac_calibration::data::dataset::{Dataset, Loads, Observation, Recipe, generate};
+use hivtac_calibration::data::loads::norm;
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::evaluation::answer::Chip;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
-use crate::large::{Large, dataset};
 use crate::page;
-use crate::press::{FORCES_MN, REACH_MM};
+use crate::press::{self, Errors, FORCES_MN, REACH_MM};
 
+/// Columns and rows.
+const SIZE: [u16; 2] = [800, 600];
+/// Steps from the answer of our network.
+const STEPS: u8 = 1;
 /// The seed of the frames that are judged.
 const TEST_SEED: u64 = 77;
 /// Frames within this of a force, in parts of it, count for it.
@@ -52,36 +56,30 @@ struct Judged {
     found: Option<Answer>,
 }
 
-/// Root mean squares near a force.
+/// What a pipeline says near a force.
 #[derive(Serialize)]
 struct Row {
     pipeline: &'static str,
-    force_mn: u32,
-    direction_deg: f64,
-    magnitude_mn: f64,
-    /// Of each coordinate.
-    place_um: f64,
-    frames: u32,
+    #[serde(flatten)]
+    of: press::Row,
 }
 
 impl Paper {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When frames cannot be rendered, training fails, or the page cannot be written.
     pub fn run(&self) -> Result<()> {
         let theirs = self.theirs()?;
         let ours = self.ours()?;
         // Frames that either refuses count for neither.
-        let both: Vec<(&Judged, &Judged)> = (theirs.iter().zip(&ours))
-            .filter(|(theirs, ours)| theirs.found.is_some() && ours.found.is_some())
-            .collect();
-        let of_theirs: Vec<&Judged> = both.iter().map(|(theirs, _)| *theirs).collect();
-        let of_ours: Vec<&Judged> = both.iter().map(|(_, ours)| *ours).collect();
-        let mut rows = Vec::new();
-        for (pipeline, judged) in [("the paper's", of_theirs), ("ours", of_ours)] {
-            rows.extend(FORCES_MN.map(|force_mn| Row::of(pipeline, force_mn, &judged)));
-        }
+        let both = || {
+            let both = theirs.iter().zip(&ours);
+            both.filter(|(theirs, ours)| theirs.found.is_some() && ours.found.is_some())
+        };
+        let near = |judged: &[&Judged]| FORCES_MN.map(|force_mn| row(force_mn, judged));
+        let of_theirs = near(&both().map(|(theirs, _)| theirs).collect::<Vec<_>>());
+        let of_ours = near(&both().map(|(_, ours)| ours).collect::<Vec<_>>());
+        let named = |pipeline| move |of| Row { pipeline, of };
+        let rows = of_theirs.into_iter().map(named("the paper's"));
+        let rows: Vec<Row> = rows.chain(of_ours.map(named("ours"))).collect();
         if self.json {
             return page::print_rows(&rows);
         }
@@ -89,7 +87,12 @@ impl Paper {
             "| pipeline | force | direction, rms | \\|F\\|, rms | place, rms | frames \
              |\n|---|--:|--:|--:|--:|--:|\n",
         );
-        text.extend(rows.iter().map(Row::line));
+        for Row { pipeline, of } in &rows {
+            text += &format!(
+                "| {pipeline} | {} mN | {:.3}° | {:.3} mN | {:.1} µm | {} |\n",
+                of.force_mn, of.direction_deg, of.magnitude_mn, of.place_um, of.frames
+            );
+        }
         let refused = |all: &[Judged]| all.iter().filter(|one| one.found.is_none()).count();
         text += &format!(
             "\nOf {} frames, the paper's pipeline refused {}, ours {}.\n",
@@ -127,12 +130,7 @@ impl Paper {
 
     /// Weighted centroids, a small network and steps, as the chip computes them.
     fn ours(&self) -> Result<Vec<Judged>> {
-        let large = Large {
-            frames: self.frames,
-            presses: 0,
-            json: false,
-        };
-        let bytes = export(&large.weights()?)?;
+        let bytes = export(&small(self.frames)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let test = dataset(CentroidEstimator::RednessWeighted, self.judged, TEST_SEED)?;
         let mut chip = Chip::new(model, &test.rest()?)?;
@@ -144,6 +142,41 @@ impl Paper {
             (!status.contains(Status::UNEXPLAINED)).then_some((force_n, place_mm))
         }))
     }
+}
+
+/// A small network with the nominal film, from as many frames as are asked for.
+fn small(frames: usize) -> Result<Weights> {
+    let dataset = dataset(CentroidEstimator::RednessWeighted, frames, 1)?;
+    let options = Training {
+        hidden: vec![32, 32],
+        meaning: Meaning::ForceAndPlace,
+        epochs: 150,
+        rounded_epochs: 100,
+        direction_weight: None,
+        ..Training::default()
+    };
+    let network = fit(&dataset, &options, |_| ())?.weights;
+    network.with_film(STEPS, &dataset)
+}
+
+/// So many presses anywhere, seen at 800×600.
+fn dataset(centroid: CentroidEstimator, frames: usize, seed: u64) -> Result<Dataset> {
+    let [width, height] = SIZE;
+    let recipe = Recipe {
+        width,
+        height,
+        centroid,
+        loads: Loads::Random(frames),
+        range: Range {
+            force_n: 0.25,
+            alpha_deg: 10.0,
+            beta_deg: 10.0,
+            place_mm: 1.05 * REACH_MM,
+        },
+        seed,
+        ..Recipe::default()
+    };
+    generate(&recipe, || ())
 }
 
 /// What is said of the frames with a press.
@@ -159,51 +192,17 @@ fn judged(dataset: &Dataset, mut says: impl FnMut(&Observation) -> Option<Answer
     judge.collect()
 }
 
-impl Row {
-    fn of(pipeline: &'static str, force_mn: u32, judged: &[&Judged]) -> Row {
-        let around_n = f64::from(force_mn) * 1e-3;
-        let (mut squares, mut frames) = ([0.0; 3], 0);
-        for one in judged {
-            let (force_n, place_mm) = one.truth;
-            let Some((found_n, found_mm)) = one.found else {
-                continue;
-            };
-            let size_n = norm(force_n);
-            let is_inside = place_mm.iter().all(|part| part.abs() <= REACH_MM);
-            if !is_inside || (size_n - around_n).abs() > NEAR * around_n {
-                continue;
-            }
-            let errors = [
-                angle_deg(found_n, force_n).unwrap_or(180.0),
-                1e3 * (norm(found_n) - size_n),
-                1e3 * (found_mm[0] - place_mm[0]).hypot(found_mm[1] - place_mm[1]),
-            ];
-            for (square, error) in squares.iter_mut().zip(errors) {
-                *square += error * error;
-            }
-            frames += 1;
-        }
-        let [direction_deg, magnitude_mn, far_um] =
-            squares.map(|square| (square / f64::from(frames)).sqrt());
-        Row {
-            pipeline,
-            force_mn,
-            direction_deg,
-            magnitude_mn,
-            place_um: far_um / std::f64::consts::SQRT_2,
-            frames,
+/// Errors near a force.
+fn row(force_mn: u32, judged: &[&Judged]) -> press::Row {
+    let around_n = f64::from(force_mn) * 1e-3;
+    let mut errors = Errors::default();
+    for one in judged {
+        let (force_n, place_mm) = one.truth;
+        let is_inside = place_mm.iter().all(|part| part.abs() <= REACH_MM);
+        let is_near = (norm(force_n) - around_n).abs() <= NEAR * around_n;
+        if let (Some((found_n, found_mm)), true, true) = (one.found, is_inside, is_near) {
+            errors.take((found_n, norm(found_n), found_mm), one.truth, [0.0; 3]);
         }
     }
-
-    fn line(&self) -> String {
-        format!(
-            "| {} | {} mN | {:.3}° | {:.3} mN | {:.1} µm | {} |\n",
-            self.pipeline,
-            self.force_mn,
-            self.direction_deg,
-            self.magnitude_mn,
-            self.place_um,
-            self.frames
-        )
-    }
+    errors.row(force_mn)
 }

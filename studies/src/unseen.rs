@@ -6,13 +6,13 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::forward::{Estimate, Forward, Pose};
+use hivtac_calibration::evaluation::errors::angle_deg;
+use hivtac_sensor::force::forward::{Estimate, Forward, Mounting, Observed, Pose};
 use hivtac_sensor::force::model::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
-use crate::convergence::ways::{Contact, Film};
 use crate::maps::{self, CALIBRATED_MM, Map, PLACES, place_mm};
 use crate::page;
 
@@ -39,15 +39,6 @@ pub struct Unseen {
     json: bool,
 }
 
-/// The worst that is not refused at a place of the tip.
-#[derive(Clone, Copy, Default)]
-struct Worst {
-    /// The largest displacement of a marker that is not refused, px.
-    off_px: f64,
-    /// The largest error of the direction, degrees, of |F|, mN, and of the place, mm.
-    errors: [f64; 3],
-}
-
 /// Places at one force.
 #[derive(Serialize)]
 struct Row {
@@ -65,33 +56,29 @@ struct Row {
     at_mm: [f64; 2],
 }
 
-/// A place, with how many displacements matter and how many of those are refused.
+/// A place of the tip, with how many displacements matter and how many of those are refused.
+#[derive(Default)]
 struct Cell {
     place_mm: [f64; 2],
-    worst: Worst,
+    /// The largest displacement of a marker that is not refused, px.
+    off_px: f64,
+    /// The largest error then: of the direction, degrees, of |F|, mN, and of the place, mm.
+    errors: [f64; 3],
     matter: u32,
     refused: u32,
 }
 
 impl Unseen {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When a file cannot be read or written.
     pub fn run(&self) -> Result<()> {
         let bytes = export(&Weights::load(&self.weights)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        let film = Film::new(&model, model).context("the model has no film")?;
-        let maps: Vec<(u32, Vec<Cell>)> = FORCES_MN
-            .into_iter()
-            .map(|force_mn| {
-                let cells = (0..PLACES * PLACES).into_par_iter();
-                (
-                    force_mn,
-                    cells.map(|number| cell(&film, force_mn, number)).collect(),
-                )
-            })
-            .collect();
+        let film = Film::new(&model).context("the model has no film")?;
+        let maps = FORCES_MN.map(|force_mn| -> (u32, Vec<Cell>) {
+            let cells = (0..PLACES * PLACES).into_par_iter();
+            let cells = cells.map(|number| cell(&film, force_mn, number));
+            (force_mn, cells.collect())
+        });
         let rows: Vec<Row> = maps
             .iter()
             .map(|(force_mn, cells)| Row::of(*force_mn, cells))
@@ -111,36 +98,69 @@ impl Unseen {
     }
 }
 
+/// A model's film.
+struct Film<'m> {
+    forward: Forward<'m>,
+    mounting: Mounting,
+}
+
+impl<'m> Film<'m> {
+    /// Of a model; `None` when it has no film.
+    fn new(model: &Model<'m>) -> Option<Film<'m>> {
+        let forward = model.forward?;
+        let mounting = Mounting {
+            beside_mm: [[0.0; 2]; 4],
+            ..forward.rest_image.mounting(&model.rest)
+        };
+        Some(Film { forward, mounting })
+    }
+
+    /// A straight press, N, at a place, mm, and markers without noise that show it.
+    fn contact(&self, force_n: f64, place_mm: [f64; 2]) -> (Pose, Observed<'static>) {
+        let Film { forward, mounting } = self;
+        let force_n = [0.0, 0.0, -force_n as f32];
+        let place_mm = place_mm.map(|part| part as f32);
+        let pose = Pose::of_force(force_n, place_mm, &forward.stiffness, &forward.limits);
+        let tables = &forward.tables;
+        let shown = tables.predict(&pose, &forward.limits, &mounting.beside_mm);
+        let noise = forward.noise.at_rest_px.map(|part| mounting.scale() * part);
+        let variances = noise.map(|noise| noise * noise);
+        let observed = Observed {
+            hanging: None,
+            drift: None,
+            moved: shown.moved,
+            noise: std::array::from_fn(|k| forward.rest_image.noise(k, variances)),
+        };
+        (pose, observed)
+    }
+}
+
 fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
+    let Film { forward, mounting } = film;
     let place_mm = place_mm(number);
-    let contact = film.contact(f64::from(force_mn) * 1e-3, place_mm, None);
+    let (pose, shown) = film.contact(f64::from(force_mn) * 1e-3, place_mm);
     let mut cell = Cell {
         place_mm,
-        worst: Worst::default(),
-        matter: 0,
-        refused: 0,
+        ..Cell::default()
     };
-    for marker in 0..4 {
-        for way in 0..WAYS {
-            let turn = std::f32::consts::TAU * way as f32 / WAYS as f32;
-            for off_px in OFF_PX {
-                let focal = off_px as f32 * film.per_px();
-                let off = [turn.cos(), turn.sin()].map(|part| focal * part);
-                cell.take(
-                    film.forward(),
-                    &contact,
-                    off_px,
-                    &contact.with_marker_off(marker, off),
-                );
-            }
+    for (marker, way) in (0..4).flat_map(|marker| (0..WAYS).map(move |way| (marker, way))) {
+        let turn = std::f32::consts::TAU * way as f32 / WAYS as f32;
+        for off_px in OFF_PX {
+            let mut observed = shown;
+            // In focal lengths.
+            let focal = off_px as f32 * mounting.scale();
+            observed.moved[2 * marker] += focal * turn.cos();
+            observed.moved[2 * marker + 1] += focal * turn.sin();
+            let found = forward.estimate(&observed, mounting, forward.unknown(true), pose);
+            cell.take(forward, &pose, off_px, &found);
         }
     }
     cell
 }
 
 impl Cell {
-    fn take(&mut self, forward: &Forward<'_>, truth: &Contact<'_>, off_px: f64, found: &Estimate) {
-        let errors = errors(forward, &found.pose, truth.pose());
+    fn take(&mut self, forward: &Forward<'_>, truth: &Pose, off_px: f64, found: &Estimate) {
+        let errors = errors(forward, &found.pose, truth);
         let refused = !found.is_explained() || found.pose.size >= forward.limits.size;
         let matters = found.sigma(&forward.strength(true)).is_none_or(|sigma| {
             let stated = [
@@ -156,53 +176,45 @@ impl Cell {
         self.matter += u32::from(matters);
         self.refused += u32::from(matters && refused);
         if !refused {
-            let worst = &mut self.worst;
-            worst.off_px = worst.off_px.max(off_px);
-            for (worst, error) in worst.errors.iter_mut().zip(errors) {
+            self.off_px = self.off_px.max(off_px);
+            for (worst, error) in self.errors.iter_mut().zip(errors) {
                 *worst = worst.max(error);
             }
         }
-    }
-
-    fn is_calibrated(&self) -> bool {
-        self.place_mm.iter().all(|part| part.abs() <= CALIBRATED_MM)
     }
 }
 
 /// Of the direction, degrees, of |F|, mN, and of the place, mm.
 fn errors(forward: &Forward<'_>, found: &Pose, truth: &Pose) -> [f64; 3] {
     let [a, b] = [found, truth].map(|pose| pose.direction().map(f64::from));
-    let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
-    let off_n =
-        forward.stiffness.magnitude_n(found.size) - forward.stiffness.magnitude_n(truth.size);
+    let [found_n, truth_n] = [found, truth].map(|pose| forward.stiffness.magnitude_n(pose.size));
     let [x, y] = [0, 1].map(|i| f64::from(found.place_mm[i] - truth.place_mm[i]));
     [
-        dot.clamp(-1.0, 1.0).acos().to_degrees(),
-        1e3 * f64::from(off_n).abs(),
+        angle_deg(a, b).unwrap_or(180.0),
+        1e3 * f64::from(found_n - truth_n).abs(),
         x.hypot(y),
     ]
 }
 
 impl Row {
     fn of(force_mn: u32, cells: &[Cell]) -> Row {
-        let cells: Vec<&Cell> = cells.iter().filter(|cell| cell.is_calibrated()).collect();
+        let is_inside = |cell: &&Cell| cell.place_mm.iter().all(|part| part.abs() <= CALIBRATED_MM);
+        let cells: Vec<&Cell> = cells.iter().filter(is_inside).collect();
         let both = |of: &dyn Fn(&Cell) -> f64| {
             let mut all: Vec<f64> = cells.iter().map(|cell| of(cell)).collect();
             all.sort_by(f64::total_cmp);
             [all[all.len() / 2], all[all.len() - 1]]
         };
-        let direction_deg = both(&|cell| cell.worst.errors[0]);
-        let worst = cells
-            .iter()
-            .find(|cell| cell.worst.errors[0] >= direction_deg[1]);
+        let direction_deg = both(&|cell| cell.errors[0]);
+        let worst = cells.iter().find(|cell| cell.errors[0] >= direction_deg[1]);
         let sum = |of: fn(&Cell) -> u32| f64::from(cells.iter().map(|cell| of(cell)).sum::<u32>());
         Row {
             force_mn,
             refused: 100.0 * sum(|cell| cell.refused) / sum(|cell| cell.matter),
-            off_px: both(&|cell| cell.worst.off_px),
+            off_px: both(&|cell| cell.off_px),
             direction_deg,
-            magnitude_mn: both(&|cell| cell.worst.errors[1]),
-            place_mm: both(&|cell| cell.worst.errors[2]),
+            magnitude_mn: both(&|cell| cell.errors[1]),
+            place_mm: both(&|cell| cell.errors[2]),
             at_mm: worst.map_or([0.0; 2], |cell| cell.place_mm),
         }
     }
@@ -227,23 +239,15 @@ impl Row {
 
 /// The largest displacement that is not refused, and the direction's error with it.
 fn panels(maps: &[(u32, Vec<Cell>)]) -> Vec<Map> {
-    let mut panels = Vec::new();
-    for (force_mn, cells) in maps {
-        panels.push(Map {
-            title: format!("displaced unseen, px, {force_mn} mN"),
-            levels: &[0.04, 0.06, 0.08, 0.12, 0.25, 0.4, 0.8],
-            values: cells.iter().map(|cell| Some(cell.worst.off_px)).collect(),
-        });
-    }
-    for (force_mn, cells) in maps {
-        panels.push(Map {
-            title: format!("direction then off, degrees, {force_mn} mN"),
-            levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
-            values: cells
-                .iter()
-                .map(|cell| Some(cell.worst.errors[0]))
-                .collect(),
-        });
-    }
-    panels
+    let displaced = maps.iter().map(|(force_mn, cells)| Map {
+        title: format!("displaced unseen, px, {force_mn} mN"),
+        levels: &[0.04, 0.06, 0.08, 0.12, 0.25, 0.4, 0.8],
+        values: cells.iter().map(|cell| cell.off_px).collect(),
+    });
+    let errors = maps.iter().map(|(force_mn, cells)| Map {
+        title: format!("error of the direction then, degrees, {force_mn} mN"),
+        levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
+        values: cells.iter().map(|cell| cell.errors[0]).collect(),
+    });
+    displaced.chain(errors).collect()
 }

@@ -51,22 +51,11 @@ impl<'m> Chip<'m> {
     /// # Errors
     /// When the features do not fit the chip's numbers.
     pub fn force(&mut self, seen: &Observation) -> Result<(Force, Status)> {
-        let (force, status, _) = self.force_and_looks(seen)?;
-        Ok((force, status))
-    }
-
-    /// The same, and the number of evaluations of the film model: 0 for a model without
-    /// Gauss–Newton steps.
-    ///
-    /// # Errors
-    /// When the features do not fit the chip's numbers.
-    pub fn force_and_looks(&mut self, seen: &Observation) -> Result<(Force, Status, u8)> {
         let features = features_from_q16(&seen.features_q16)?;
         let output = self.network.run(&self.model, &features, &self.tare);
         let forward = self.model.forward.as_ref().zip(self.resting.as_ref());
         let Some((forward, resting)) = forward else {
-            let (force, status) = force::of_outputs(&self.model, &output);
-            return Ok((force, status, 0));
+            return Ok(force::of_outputs(&self.model, &output));
         };
         let marker = |k: usize| {
             let (x, y) = features.centroids[k];
@@ -76,7 +65,6 @@ impl<'m> Chip<'m> {
         let markers = std::array::from_fn(marker);
         let noise = FrameNoise::AS_MODELLED;
         let estimate = resting.estimate(forward, &markers, noise, &output);
-        let (force, status) = resting.told(forward, &self.model.range, noise, &estimate);
-        Ok((force, status, estimate.looks))
+        Ok(resting.told(forward, &self.model.range, noise, &estimate))
     }
 }

@@ -1,102 +1,58 @@
 //! The Cramér–Rao bound of a force and its place that are read from the centroids of four markers.
 
-use crate::peers::limit::matrix::{cholesky, dot, forward, inverse};
 use anyhow::{Context, Result};
 use hivtac_twin::Load;
 
-use super::TestedUnit;
+use super::{Answer, TestedUnit};
 
 /// Unknowns: F_x, F_y, F_z (N) and p_x, p_y (mm).
 const UNKNOWNS: usize = 5;
 /// Coordinates of the four centroids.
 const COORDINATES: usize = 8;
-/// Covariances of centroids, px².
-pub type Noise = [[f64; COORDINATES]; COORDINATES];
-
 /// Part of |F| by which a load is changed to see how the centroids follow, and how far a tip, mm.
 const STEP: f64 = 0.005;
 const STEP_MM: f64 = 0.01;
-/// How far the tip's radius is changed, mm.
-const RADIUS_STEP_MM: f64 = 0.02;
 
-/// The least mean squares that any unbiased reading can have.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Bound {
-    /// Of the angle between found and true force, square radians, to first order.
-    pub direction: f64,
-    /// Of |F|, N².
-    pub force: f64,
-    /// Of each coordinate of the place, mm², their mean.
-    pub place: f64,
-}
+/// The inverse of the covariance of centroids, px⁻².
+pub struct Information([[f64; COORDINATES]; COORDINATES]);
 
-impl Bound {
-    /// The sum with another one.
-    pub fn plus(&self, other: &Bound) -> Bound {
-        Bound {
-            direction: self.direction + other.direction,
-            force: self.force + other.force,
-            place: self.place + other.place,
-        }
+impl Information {
+    /// Of how centroids scatter around where the markers truly are, in these very frames.
+    pub fn of(answers: &[Answer]) -> Result<Information> {
+        let off: Vec<[f64; COORDINATES]> = (answers.iter())
+            .filter_map(|answer| answer.off_px?.as_flattened().try_into().ok())
+            .collect();
+        let mean_of = |of: &dyn Fn(&[f64; COORDINATES]) -> f64| {
+            off.iter().map(of).sum::<f64>() / off.len() as f64
+        };
+        let mean: [f64; COORDINATES] = std::array::from_fn(|i| mean_of(&|off| off[i]));
+        let covariance =
+            |i: usize, j: usize| mean_of(&|off| (off[i] - mean[i]) * (off[j] - mean[j]));
+        let covariance = std::array::from_fn(|i| std::array::from_fn(|j| covariance(i, j)));
+        Ok(Information(inverse(covariance).context("too few frames")?))
     }
 
-    /// For a press on a unit whose centroids' coordinates have these covariances, px².
-    ///
-    /// # Errors
-    /// When a marker is out of sight, or the centroids leave an unknown undetermined.
-    pub fn of(unit: &TestedUnit, load: &Load, noise: &Noise) -> Result<Bound> {
-        let covariance = covariance(jacobian(unit, load)?, noise)?;
-        Ok(Bound::of_covariance(load, |i, j| covariance[i][j]))
-    }
-
-    /// The same where nobody knows the tip's radius either; and the radius' mean square, mm².
-    ///
-    /// # Errors
-    /// As [`Bound::of`].
-    pub fn with_radius(unit: &TestedUnit, load: &Load, noise: &Noise) -> Result<(Bound, f64)> {
-        let [x, y, z, right, down] = jacobian(unit, load)?;
-        let by_radius = by_radius(unit, load)?;
-        let covariance = covariance([x, y, z, right, down, by_radius], noise)?;
-        let bound = Bound::of_covariance(load, |i, j| covariance[i][j]);
-        Ok((bound, covariance[UNKNOWNS][UNKNOWNS]))
-    }
-
-    /// Of the covariance of force, N, and place, mm.
-    fn of_covariance(load: &Load, covariance: impl Fn(usize, usize) -> f64) -> Bound {
+    /// The least mean squares that any unbiased reading of a press on a unit can have: of the angle
+    /// between found and true force, square radians, to first order; of |F|, N²; of each coordinate
+    /// of the place, mm².
+    pub fn bound(&self, unit: &TestedUnit, load: &Load) -> Result<[f64; 3]> {
+        let columns = jacobian(unit, load)?;
+        let information = |a: usize, b: usize| -> f64 {
+            let row =
+                |i: usize| -> f64 { (0..COORDINATES).map(|j| self.0[i][j] * columns[b][j]).sum() };
+            (0..COORDINATES).map(|i| columns[a][i] * row(i)).sum()
+        };
+        let information = std::array::from_fn(|a| std::array::from_fn(|b| information(a, b)));
+        let covariance: [[f64; UNKNOWNS]; UNKNOWNS] =
+            inverse(information).context("the centroids leave an unknown undetermined")?;
         let size = load.magnitude_n();
         let toward = load.vector_n().map(|part| part / size);
-        let both = |i: usize, j: usize| toward[i] * toward[j] * covariance(i, j);
+        let both = |i: usize, j: usize| toward[i] * toward[j] * covariance[i][j];
         let along: f64 = (0..9).map(|k| both(k / 3, k % 3)).sum();
-        let whole: f64 = (0..3).map(|i| covariance(i, i)).sum();
-        Bound {
-            direction: (whole - along) / (size * size),
-            force: along,
-            place: (covariance(3, 3) + covariance(4, 4)) / 2.0,
-        }
+        let whole: f64 = (0..3).map(|i| covariance[i][i]).sum();
+        let place = (covariance[3][3] + covariance[4][4]) / 2.0;
+        Ok([(whole - along) / (size * size), along, place])
     }
-}
-
-/// The least covariance of unknowns that centroids follow so, px per each.
-fn covariance<const N: usize>(
-    columns: [[f64; COORDINATES]; N],
-    noise: &Noise,
-) -> Result<[[f64; N]; N]> {
-    let whitening = cholesky(noise)?;
-    let columns = columns.map(|column| forward(&whitening, column));
-    let information: [[f64; N]; N] =
-        std::array::from_fn(|i| std::array::from_fn(|j| dot(&columns[i], &columns[j])));
-    inverse(&information)
-}
-
-/// How the centroids follow the tip's radius, px per mm: central differences.
-fn by_radius(unit: &TestedUnit, load: &Load) -> Result<[f64; COORDINATES]> {
-    let radius_mm = unit.with_tip(*load)?.tip_radius_mm();
-    let [more, less] =
-        [RADIUS_STEP_MM, -RADIUS_STEP_MM].map(|step| load.with_tip_radius_mm(radius_mm + step));
-    let (more, less) = (seen(unit, &more?)?, seen(unit, &less?)?);
-    Ok(std::array::from_fn(|i| {
-        (more[i] - less[i]) / (2.0 * RADIUS_STEP_MM)
-    }))
 }
 
 /// How the centroids follow each unknown, px per N and px per mm: central differences.
@@ -125,15 +81,47 @@ fn jacobian(unit: &TestedUnit, load: &Load) -> Result<[[f64; COORDINATES]; UNKNO
 
 /// The true centroids under a load, px: x0, y0, x1, …
 fn centroids(unit: &TestedUnit, load: Load) -> Result<[f64; COORDINATES]> {
-    seen(unit, &unit.with_tip(load)?)
-}
-
-/// The same, of a load that says its tip.
-fn seen(unit: &TestedUnit, load: &Load) -> Result<[f64; COORDINATES]> {
-    let truth = unit.scene().truth_under(load)?;
+    let truth = unit.scene.truth_under(&unit.with_tip(load)?)?;
     let mut px = [0.0; COORDINATES];
     for (pair, marker) in px.chunks_exact_mut(2).zip(&truth.markers) {
         pair.copy_from_slice(&marker.context("a marker is out of sight")?.centroid_px);
     }
     Ok(px)
+}
+
+/// A⁻¹ by Gauss and Jordan; `None` when A is not positive definite.
+fn inverse<const N: usize>(mut a: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
+    let mut b: [[f64; N]; N] =
+        std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
+    for k in 0..N {
+        let pivot = a[k][k];
+        if pivot.is_nan() || pivot <= 0.0 {
+            return None;
+        }
+        let [row_a, row_b] = [a[k], b[k]].map(|row| row.map(|part| part / pivot));
+        for i in 0..N {
+            let part = if i == k { pivot - 1.0 } else { a[i][k] };
+            for j in 0..N {
+                a[i][j] -= part * row_a[j];
+                b[i][j] -= part * row_b[j];
+            }
+        }
+    }
+    Some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_inverse_times_its_matrix_is_one() {
+        let a = [[4.0, 1.0, 0.5], [1.0, 3.0, -0.25], [0.5, -0.25, 2.0]];
+        let b = inverse(a).unwrap();
+        for (i, j) in (0..9).map(|k| (k / 3, k % 3)) {
+            let product: f64 = (0..3).map(|k| a[i][k] * b[k][j]).sum();
+            assert!((product - f64::from(u8::from(i == j))).abs() < 1e-12);
+        }
+        assert!(inverse([[1.0, 2.0], [2.0, 1.0]]).is_none());
+    }
 }

@@ -2,21 +2,19 @@
 
 mod bound;
 mod drawn;
-mod held;
 mod real;
 mod rows;
 mod unit;
 
-pub use bound::{Bound, Noise};
+pub use bound::Information;
 use drawn::Drawn;
 pub use drawn::{normal, seeded};
-pub use held::{Held, noise_of};
 pub use real::RealFilm;
-pub use rows::{Errors, Off, Row, Tally};
+pub use rows::{Errors, Row};
 pub use unit::{Answer, Tared, TestedUnit};
 
-use hivtac_shell::halton;
 use hivtac_twin::{FilmError, Load};
+use hivtac_shell::halton;
 
 /// Forces, mN.
 pub const FORCES_MN: [u32; 3] = [50, 100, 200];
@@ -25,45 +23,13 @@ pub const REACH_MM: f64 = 4.0;
 /// The largest α and β, degrees.
 pub const ANGLE_DEG: f64 = 8.0;
 
-/// The press with this number of a force: places and angles evenly within their limits.
-///
-/// # Errors
-/// When the force is none.
-pub fn press(number: u32, force_n: f64, reach_mm: f64) -> Result<Load, FilmError> {
-    let part = |base| 2.0 * part(number, base) - 1.0;
-    Load::from_angles(force_n, ANGLE_DEG * part(2), ANGLE_DEG * part(3))?
-        .with_offset_mm([5, 7].map(|base| reach_mm * part(base)))
-}
-
-/// A press with this number of any force within limits, N.
-///
-/// # Errors
-/// When the force is none.
-pub fn press_of_any(
-    number: u32,
-    [least_n, most_n]: [f64; 2],
-    reach_mm: f64,
-) -> Result<Load, FilmError> {
-    let force_n = least_n + (most_n - least_n) * part(number, 11);
-    press(number, force_n, reach_mm)
-}
-
-/// The press with this number whose tangential force is so many times its normal one, and turned
-/// anywhere.
-///
-/// # Errors
-/// When the force is none.
-pub fn tilted_press(
-    number: u32,
-    force_n: f64,
-    ratio: f64,
-    reach_mm: f64,
-) -> Result<Load, FilmError> {
-    let (sin, cos) = (std::f64::consts::TAU * part(number, 2)).sin_cos();
-    let normal_n = force_n / ratio.hypot(1.0);
-    let vector_n = [normal_n * ratio * cos, normal_n * ratio * sin, -normal_n];
-    Load::from_vector(vector_n)?
-        .with_offset_mm([5, 7].map(|base| reach_mm * (2.0 * part(number, base) - 1.0)))
+/// The press with this number of a force from one to another, N: force, places and angles evenly
+/// within their limits.
+pub fn press(number: u32, [from_n, to_n]: [f64; 2], reach_mm: f64) -> Result<Load, FilmError> {
+    let either = |base| 2.0 * part(number, base) - 1.0;
+    let force_n = from_n + (to_n - from_n) * part(number, 11);
+    Load::from_angles(force_n, ANGLE_DEG * either(2), ANGLE_DEG * either(3))?
+        .with_offset_mm([5, 7].map(|base| reach_mm * either(base)))
 }
 
 /// A part of one for a press with this number, evenly spread; another base is another coordinate.

@@ -1,16 +1,15 @@
 //! Films as people mount them, solved by finite elements: stretched, cut otherwise, of other
 //! rubber.
 
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
-use hivtac_shell::{Design, Equilibrium, Film, Law, Material, ShellError, pressed};
-use hivtac_twin::film::Pressed;
+use hivtac_twin::film::{MARKER_CENTRES_MM, Pressed};
 use hivtac_twin::{Disc, Load, Options};
+use hivtac_shell::{Design, Equilibrium, Film, Law, Material, pressed};
 use rand::Rng;
 
 use super::seeded;
-use crate::calculix::{CalculixFilm, RUBBERS_POISSON, Solver};
 
 /// States that are kept to start others from.
 const MOST_STATES: usize = 40;
@@ -19,75 +18,17 @@ const FINENESS: f64 = 0.7;
 
 /// A film on its posts.
 pub struct RealFilm {
-    solved: Solved,
-    /// What a scene shows under loads that were asked for before.
-    pressed: Mutex<Vec<(Load, Pressed)>>,
-}
-
-/// Who solves it.
-enum Solved {
-    Here(Box<ShellFilm>),
-    ByCalculix(Box<CalculixFilm>),
-}
-
-/// A film of the project's own solver.
-struct ShellFilm {
     film: Film,
     rest: Equilibrium,
-    /// The states that were found last.
-    states: Mutex<Vec<(Load, Equilibrium)>>,
+    /// The states that were found last, and what a scene shows of them.
+    states: Mutex<Vec<(Load, Equilibrium, Pressed)>>,
 }
 
 impl RealFilm {
     /// The film with this number, on the posts and with the dots of these options, under a tip of a
-    /// radius, mm; by CalculiX where its solver is given.
-    ///
-    /// # Errors
-    /// When it finds no rest position.
-    pub fn drawn(
-        number: u64,
-        options: &Options,
-        tip_radius_mm: f64,
-        calculix: Option<&Solver>,
-    ) -> Result<Self> {
-        let mut design = drawn(number, options, tip_radius_mm);
-        let solved = match calculix {
-            None => Solved::Here(Box::new(ShellFilm::new(&design)?)),
-            Some(solver) => {
-                // Solids of St Venant's law give way under a tip.
-                design.law.neo_hooke = 1.0;
-                design.material.poisson = RUBBERS_POISSON;
-                let solver = solver.within(&format!("film-{number}"));
-                Solved::ByCalculix(Box::new(CalculixFilm::new(&solver, design)?))
-            }
-        };
-        Ok(Self {
-            solved,
-            pressed: Mutex::default(),
-        })
-    }
-
-    /// The film under a load.
-    ///
-    /// # Errors
-    /// When it finds no equilibrium.
-    pub fn press(&self, load: &Load) -> Result<Pressed> {
-        let mut known = locked(&self.pressed);
-        if let Some((_, pressed)) = known.iter().find(|(other, _)| other == load) {
-            return Ok(*pressed);
-        }
-        let pressed = match &self.solved {
-            Solved::Here(film) => film.press(load)?,
-            Solved::ByCalculix(film) => film.press(load)?,
-        };
-        known.push((*load, pressed));
-        Ok(pressed)
-    }
-}
-
-impl ShellFilm {
-    fn new(design: &Design) -> Result<Self, ShellError> {
-        let film = Film::new(design)?;
+    /// radius, mm.
+    pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
+        let film = Film::new(&drawn(number, options, tip_radius_mm))?;
         Ok(Self {
             rest: film.rest(),
             film,
@@ -95,13 +36,20 @@ impl ShellFilm {
         })
     }
 
-    fn press(&self, load: &Load) -> Result<Pressed, ShellError> {
-        let mut states = locked(&self.states);
+    /// The film under a load.
+    pub fn press(&self, load: &Load) -> Result<Pressed> {
+        let mut states = self.states.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((.., pressed)) = states.iter().find(|(other, ..)| other == load) {
+            return Ok(*pressed);
+        }
         let state = match load.magnitude_n() {
             0.0 => self.rest.clone(),
             _ => {
                 let at_mm = self.film.material_point(&self.rest, load.offset_mm());
-                let start = nearest(&states, load).unwrap_or(&self.rest);
+                // From the state under the load that is nearest to this one.
+                let far = |(other, ..): &&(Load, _, _)| far(load, other);
+                let nearest = states.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
+                let start = nearest.map_or(&self.rest, |(_, state, _)| state);
                 self.film.press_force(at_mm, load.vector_n(), start)?
             }
         };
@@ -115,28 +63,16 @@ impl ShellFilm {
         if states.len() >= MOST_STATES {
             states.remove(0);
         }
-        states.push((*load, state));
+        states.push((*load, state, pressed));
         Ok(pressed)
     }
 }
 
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex
-        .lock()
-        .unwrap_or_else(|poisoned| poisoned.into_inner())
-}
-
-/// The state under the load that is nearest to this one.
-fn nearest<'a>(states: &'a [(Load, Equilibrium)], load: &Load) -> Option<&'a Equilibrium> {
-    let far = |other: &Load| {
-        let apart =
-            |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum() };
-        // A millimetre of place is as far as 20 mN.
-        apart(&load.vector_n(), &other.vector_n())
-            + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
-    };
-    let nearest = states.iter().min_by(|a, b| far(&a.0).total_cmp(&far(&b.0)));
-    nearest.map(|(_, state)| state)
+/// How far a load is from another one: a millimetre of place is as far as 20 mN.
+fn far(load: &Load, other: &Load) -> f64 {
+    let apart =
+        |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum() };
+    apart(&load.vector_n(), &other.vector_n()) + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
 }
 
 /// The film with this number.
@@ -170,7 +106,10 @@ fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
             break vector.map(|part| part / length);
         }
     };
-    let dots_mm = dots_mm(options).to_vec();
+    let dots_mm = MARKER_CENTRES_MM.iter().zip(options.glued_mm);
+    let dots_mm = dots_mm
+        .map(|([x, y], [right, down])| [x + right, y + down])
+        .collect();
     Design {
         material: Material {
             youngs_mpa: unit.stiffness * nominal.material.youngs_mpa,
@@ -191,12 +130,4 @@ fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
         fineness: FINENESS,
         ..nominal
     }
-}
-
-/// Where the dots of a scene are glued, mm.
-fn dots_mm(options: &Options) -> [[f64; 2]; 4] {
-    std::array::from_fn(|k| {
-        let at = hivtac_twin::film::MARKER_CENTRES_MM[k];
-        [0, 1].map(|i| at[i] + options.glued_mm[k][i])
-    })
 }

@@ -3,53 +3,9 @@
 use anyhow::{Context, Result};
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::evaluation::errors::angle_deg;
-use hivtac_sensor::force::Force;
 use hivtac_twin::Load;
+use hivtac_sensor::force::Force;
 use serde::Serialize;
-
-/// How far an answer is off, and its stated 95 % bounds: of the direction, degrees, of |F|, mN, and
-/// of the place, µm.
-#[derive(Clone, Copy, Debug)]
-pub struct Off {
-    /// Without sign.
-    pub errors: [f64; 3],
-    /// What 95 of 100 errors shall lie within.
-    pub bounds: [f64; 3],
-}
-
-impl Off {
-    /// Of a force that was found, by what it truly is.
-    ///
-    /// # Errors
-    /// When the force comes without a place.
-    pub fn of(force: &Force, truth: &Load) -> Result<Off> {
-        let found = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
-        let direction = angle_deg(found, truth.vector_n()).unwrap_or(180.0);
-        let magnitude = f64::from(force.magnitude.0) * 1e-3 - 1e3 * truth.magnitude_n();
-        let place = force.place.context("the model tells no places")?;
-        let [x, y] = truth.offset_mm();
-        let far = (f64::from(place.x.0) - 1e3 * x).hypot(f64::from(place.y.0) - 1e3 * y);
-        Ok(Off {
-            errors: [direction, magnitude.abs(), far],
-            bounds: [
-                DIRECTION_BOUND * f64::from(force.direction_sigma.0) * 1e-3,
-                MAGNITUDE_BOUND * f64::from(force.magnitude_sigma.0) * 1e-3,
-                PLACE_BOUND * f64::from(place.sigma.0),
-            ],
-        })
-    }
-
-    /// Whether an error is beyond three standard uncertainties: so much more than its 95 % bound.
-    pub fn is_far(&self) -> bool {
-        let far = 3.0 / MAGNITUDE_BOUND;
-        (0..3).any(|k| self.errors[k] > far * self.bounds[k])
-    }
-
-    /// Which errors lie within their bounds.
-    pub fn within(&self) -> [bool; 3] {
-        std::array::from_fn(|k| self.errors[k] <= self.bounds[k])
-    }
-}
 
 /// Sums of squares of errors, and how many of them are within what was stated.
 #[derive(Clone, Copy, Debug, Default)]
@@ -58,39 +14,12 @@ pub struct Errors {
     pub count: u32,
     /// Answers without one.
     pub refused: u32,
+    /// Forces of which direction, |F| or place is beyond three stated standard uncertainties.
+    pub beyond: u32,
     /// Of the direction, square degrees; of |F|, mN²; of each coordinate of the place, µm².
     squares: [f64; 3],
     /// How many of them are within their 95 % bounds.
     within: [u32; 3],
-}
-
-/// Errors, and how many forces are far beyond what they state.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Tally {
-    /// The errors.
-    pub errors: Errors,
-    /// Forces of which direction, |F| or place is beyond three stated standard uncertainties.
-    pub beyond: u32,
-}
-
-impl Tally {
-    /// Takes an answer.
-    ///
-    /// # Errors
-    /// When the force comes without a place.
-    pub fn add(&mut self, force: Option<&Force>, truth: &Load) -> Result<()> {
-        self.errors.add(force, truth)?;
-        if let Some(force) = force {
-            self.beyond += u32::from(Off::of(force, truth)?.is_far());
-        }
-        Ok(())
-    }
-
-    /// Takes another tally with its own.
-    pub fn merge(&mut self, other: &Tally) {
-        self.errors.merge(&other.errors);
-        self.beyond += other.beyond;
-    }
 }
 
 /// Root mean squares at a force.
@@ -104,28 +33,53 @@ pub struct Row {
     pub magnitude_mn: f64,
     /// Of each coordinate of the place, µm.
     pub place_um: f64,
+    /// Forces.
+    pub frames: u32,
 }
 
 impl Errors {
-    /// Takes an answer.
-    ///
-    /// # Errors
-    /// When the force comes without a place.
+    /// Takes an answer; it is an error when its force comes without a place.
     pub fn add(&mut self, force: Option<&Force>, truth: &Load) -> Result<()> {
-        match force {
-            Some(force) => self.take(&Off::of(force, truth)?),
-            None => self.refused += 1,
-        }
+        let Some(force) = force else {
+            self.refused += 1;
+            return Ok(());
+        };
+        let found_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+        let place = force.place.context("the model tells no places")?;
+        let found_mm = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
+        let bounds = [
+            DIRECTION_BOUND * f64::from(force.direction_sigma.0) * 1e-3,
+            MAGNITUDE_BOUND * f64::from(force.magnitude_sigma.0) * 1e-3,
+            PLACE_BOUND * f64::from(place.sigma.0),
+        ];
+        let magnitude_n = f64::from(force.magnitude.0) * 1e-6;
+        let truth = (truth.vector_n(), truth.offset_mm());
+        self.take((found_n, magnitude_n, found_mm), truth, bounds);
         Ok(())
     }
 
-    /// Takes an answer with a force.
-    pub fn take(&mut self, off: &Off) {
+    /// Takes a force, N, with its size, N, and its place, mm, beside the true force and place; and
+    /// the 95 % bounds that it states: of the direction, degrees, of |F|, mN, and of the place, µm.
+    pub fn take(
+        &mut self,
+        (found_n, magnitude_n, found_mm): ([f64; 3], f64, [f64; 2]),
+        (truth_n, truth_mm): ([f64; 3], [f64; 2]),
+        bounds: [f64; 3],
+    ) {
+        let true_size_n = truth_n.iter().map(|part| part * part).sum::<f64>().sqrt();
+        let errors = [
+            angle_deg(found_n, truth_n).unwrap_or(180.0),
+            1e3 * (magnitude_n - true_size_n).abs(),
+            1e3 * (found_mm[0] - truth_mm[0]).hypot(found_mm[1] - truth_mm[1]),
+        ];
         self.count += 1;
-        for (k, (error, within)) in off.errors.into_iter().zip(off.within()).enumerate() {
+        // Three standard uncertainties are so much more than a 95 % bound.
+        let far = 3.0 / MAGNITUDE_BOUND;
+        self.beyond += u32::from((0..3).any(|k| errors[k] > far * bounds[k]));
+        for k in 0..3 {
             // A place has two coordinates.
-            self.squares[k] += error * error / if k == 2 { 2.0 } else { 1.0 };
-            self.within[k] += u32::from(within);
+            self.squares[k] += errors[k] * errors[k] / if k == 2 { 2.0 } else { 1.0 };
+            self.within[k] += u32::from(errors[k] <= bounds[k]);
         }
     }
 
@@ -133,6 +87,7 @@ impl Errors {
     pub fn merge(&mut self, other: &Errors) {
         self.count += other.count;
         self.refused += other.refused;
+        self.beyond += other.beyond;
         for k in 0..3 {
             self.squares[k] += other.squares[k];
             self.within[k] += other.within[k];
@@ -159,6 +114,7 @@ impl Errors {
             direction_deg,
             magnitude_mn,
             place_um,
+            frames: self.count,
         }
     }
 }

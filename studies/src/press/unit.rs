@@ -1,38 +1,33 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
-use hivtac_calibration::data::dataset::measure;
+use hivtac_twin::film::Pressed;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
+use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
-use hivtac_sensor::force::rest::Rest;
-use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
-use hivtac_sensor::tare::{Refusal, TareBuilder};
-use hivtac_sensor::temporal::{Followed, Moment};
+use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::ByteOrder;
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
-use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 
 use super::{Drawn, RealFilm};
-use crate::calculix::Solver;
 
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
 
 /// A simulated sensor as somebody built it.
 pub struct TestedUnit {
-    scene: Scene,
-    tip_radius_mm: f64,
+    pub scene: Scene,
+    pub tip_radius_mm: f64,
     /// Its film, where it is not the scene's.
     real: Option<RealFilm>,
 }
 
 /// A sensor with a model, tared on a unit.
 pub struct Tared<'m> {
-    sensor: Box<Sensor<'m>>,
+    pub sensor: Box<Sensor<'m>>,
 }
 
 /// What a sensor said of a press.
@@ -52,9 +47,6 @@ pub struct Answer {
 impl TestedUnit {
     /// Of these options, as a camera of these conditions sees it, pressed by a tip of a radius in
     /// mm.
-    ///
-    /// # Errors
-    /// When an option is out of range.
     pub fn new(
         conditions: &Conditions,
         options: Options,
@@ -73,9 +65,6 @@ impl TestedUnit {
     }
 
     /// The unit with this number of those that people build.
-    ///
-    /// # Errors
-    /// When there is no such camera.
     pub fn drawn(conditions: &Conditions, number: u64) -> Result<Self> {
         let focal_px = conditions.geometry.focal.to_f64();
         let Drawn {
@@ -85,19 +74,11 @@ impl TestedUnit {
         Self::new(conditions, options, tip_radius_mm, number)
     }
 
-    /// The same with the film of this number of those that people mount; by CalculiX where its
-    /// solver is given.
-    ///
-    /// # Errors
-    /// When there is no such camera, or the film finds no rest position.
-    pub fn with_real_film(
-        conditions: &Conditions,
-        number: u64,
-        calculix: Option<&Solver>,
-    ) -> Result<Self> {
+    /// The same with the film of this number of those that people mount.
+    pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
         let unit = Self::drawn(conditions, number)?;
         let options = unit.scene.options();
-        let film = RealFilm::drawn(number, options, unit.tip_radius_mm, calculix)?;
+        let film = RealFilm::drawn(number, options, unit.tip_radius_mm)?;
         Ok(Self {
             real: Some(film),
             ..unit
@@ -105,46 +86,29 @@ impl TestedUnit {
     }
 
     /// A frame under a press; the number selects its noise.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
     pub fn frame(&self, load: &Load, number: u64) -> Result<Frame> {
         let load = self.with_tip(*load)?;
-        match &self.real {
-            None => Ok(self.scene.render_load(&load, number)?),
-            Some(film) => Ok(self.scene.render_pressed(film.press(&load)?, &load, number)),
-        }
-    }
-
-    /// The film under a press, where it is not the scene's.
-    #[cfg(test)]
-    pub fn pressed(&self, load: &Load) -> Option<Result<hivtac_twin::film::Pressed>> {
-        let film = self.real.as_ref()?;
-        Some(self.with_tip(*load).and_then(|load| film.press(&load)))
+        Ok(match self.pressed(&load)? {
+            None => self.scene.render_load(&load, number)?,
+            Some(pressed) => self.scene.render_pressed(pressed, &load, number),
+        })
     }
 
     fn truth(&self, load: &Load) -> Result<Truth> {
         let load = self.with_tip(*load)?;
-        match &self.real {
-            None => Ok(self.scene.truth_under(&load)?),
-            Some(film) => Ok(self.scene.truth_of_pressed(film.press(&load)?, &load)),
-        }
+        Ok(match self.pressed(&load)? {
+            None => self.scene.truth_under(&load)?,
+            Some(pressed) => self.scene.truth_of_pressed(pressed, &load),
+        })
     }
 
-    /// The scene.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
-    /// Its tip's radius, mm.
-    pub fn tip_radius_mm(&self) -> f64 {
-        self.tip_radius_mm
+    /// The film under a press with this unit's tip, where it is not the scene's.
+    pub fn pressed(&self, load: &Load) -> Result<Option<Pressed>> {
+        let film = self.real.as_ref();
+        film.map(|film| film.press(load)).transpose()
     }
 
     /// A press with this unit's tip.
-    ///
-    /// # Errors
-    /// When there is no such tip.
     pub fn with_tip(&self, load: Load) -> Result<Load> {
         Ok(load.with_tip_radius_mm(self.tip_radius_mm)?)
     }
@@ -152,9 +116,6 @@ impl TestedUnit {
     /// Whether the simulated film holds a press, and all markers are wholly in the picture under
     /// it. A soft film's tables end before the largest force: there the simulation would stay where
     /// it is.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
     pub fn shows_all(&self, load: &Load) -> Result<bool> {
         if self.real.is_none() && !self.scene_holds(load) {
             return Ok(false);
@@ -186,101 +147,34 @@ impl TestedUnit {
     }
 
     /// A sensor with this model, tared on the unit at rest.
-    ///
-    /// # Errors
-    /// When the model's frames cannot be read, or no markers are found at rest.
     pub fn tare<'m>(&self, model: &Model<'m>) -> Result<Tared<'m>> {
         let mut sensor = Box::new(Sensor::new());
         let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(*model));
         configured.map_err(|error| anyhow!("{error}"))?;
         let mut tared = Tared { sensor };
-        let outcome = tared.judge_tare(self, &Load::REST, false)?;
-        let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
-        tared.set_rest(rest);
-        Ok(tared)
-    }
-}
-
-impl Answer {
-    /// Why there is no force.
-    pub fn refusals(&self) -> impl Iterator<Item = &'static str> {
-        let status = self.status;
-        Status::NAMES
-            .iter()
-            .filter(move |(bit, _)| Status::NO_FORCE.contains(*bit) && status.contains(*bit))
-            .map(|(_, name)| *name)
+        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
+        // Every second frame may be bad.
+        for number in 0..2 * TARE_FRAMES {
+            let seen = tared.measure(&self.frame(&Load::REST, 1_000_000 + u64::from(number))?);
+            if let Some(outcome) = tared.sensor.tare_with(&mut tare, &seen) {
+                let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
+                tared.sensor.set_tare(Some(rest), Drift::NONE);
+                return Ok(tared);
+            }
+        }
+        Err(anyhow!("no rest position: too few frames show the markers"))
     }
 }
 
 impl Tared<'_> {
-    /// Says when which row of its frames is exposed.
-    pub fn set_motion(&mut self, motion: Motion) {
-        self.sensor.set_motion(motion);
-    }
-
-    /// What the sensor says of a frame.
+    /// What the sensor says of a frame, whatever its format.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
-        measure(&mut self.sensor, frame)
-    }
-
-    /// The rest position that a tare of a unit finds under a load, or why it is refused; it is not
-    /// set.
-    ///
-    /// # Errors
-    /// When the film cannot take the load, or too few frames show the markers.
-    pub fn judge_tare(
-        &mut self,
-        unit: &TestedUnit,
-        load: &Load,
-        insists: bool,
-    ) -> Result<Result<Rest, Refusal>> {
-        let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
-        if insists {
-            tare = tare.insisting();
-        }
-        // Every second frame may be bad.
-        for number in 0..2 * TARE_FRAMES {
-            let seen = self.measure(&unit.frame(load, 1_000_000 + u64::from(number))?);
-            if let Some(outcome) = self.sensor.tare_with(&mut tare, &seen) {
-                return Ok(outcome);
-            }
-        }
-        if tare.saw_implausible() {
-            return Ok(Err(Refusal::MarkersImplausible));
-        }
-        Err(anyhow!("no rest position: too few frames show the markers"))
-    }
-
-    /// How forces are followed from now on.
-    ///
-    /// # Errors
-    /// A setting out of its range.
-    pub fn set_temporal(&mut self, settings: TemporalSettings) -> Result<()> {
-        let set = self.sensor.set_temporal(settings);
-        set.map_err(|error| anyhow!("{error}"))
-    }
-
-    /// What follows from a frame, measured last, and those before it.
-    pub fn follow(&mut self, at: Moment, measurement: &Measurement) -> Followed {
-        self.sensor.follow(at, measurement)
-    }
-
-    /// Measures from now on against another rest position.
-    pub fn set_rest(&mut self, rest: Rest) {
-        self.sensor.set_tare(Some(rest), Drift::NONE);
-    }
-
-    /// Where it rests.
-    pub fn rest(&self) -> Option<&Rest> {
-        self.sensor.tare()
+        self.sensor.measure_frame(&frame.to_rgb565())
     }
 
     /// Where markers are seen under a press, the mean of some frames; the number selects their
     /// noise.
-    ///
-    /// # Errors
-    /// When the film cannot take the press, or markers are not found.
     pub fn seen_px(
         &mut self,
         unit: &TestedUnit,
@@ -291,7 +185,7 @@ impl Tared<'_> {
         let mut mean = [[0.0; 2]; 4];
         for frame in 0..frames {
             let picture = unit.frame(&load, number + frame)?;
-            let markers = measure(&mut self.sensor, &picture).markers;
+            let markers = self.measure(&picture).markers;
             let markers = markers.ok_or_else(|| anyhow!("no markers under a load"))?;
             for (mean, marker) in mean.iter_mut().zip(markers) {
                 mean[0] += marker.x.to_f64() / frames as f64;
@@ -302,34 +196,10 @@ impl Tared<'_> {
     }
 
     /// What the sensor says of a press on its unit, alone; the number selects the noise.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
         self.sensor.forget_frame();
-        self.said(unit, load, number, measure)
-    }
-
-    /// The same of a press that follows the one before, by a sensor that looks again at a frame
-    /// that it refuses.
-    ///
-    /// # Errors
-    /// When the film cannot take the press.
-    pub fn answer_next(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
-        self.said(unit, load, number, |sensor, frame| {
-            sensor.measure_frame_closely(&frame.words())
-        })
-    }
-
-    fn said(
-        &mut self,
-        unit: &TestedUnit,
-        load: Load,
-        number: u64,
-        measure: impl Fn(&mut Sensor<'_>, &Frame) -> Measurement,
-    ) -> Result<Answer> {
         let frame = unit.frame(&load, number)?;
-        let seen = measure(&mut self.sensor, &frame);
+        let seen = self.measure(&frame);
         let off = |k: usize| {
             let [x, y] = frame.truth.markers[k]?.centroid_px;
             let marker = seen.markers?[k];

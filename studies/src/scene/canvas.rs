@@ -44,11 +44,10 @@ impl Canvas {
             rgb: frame.to_rgb888(),
         };
         let mut canvas = Canvas::new(scale * frame.width, scale * frame.height, BLACK);
-        for y in 0..canvas.height {
-            for x in 0..canvas.width {
-                let colour = small.pixel(x / scale, y / scale);
-                canvas.set(x.into(), y.into(), colour);
-            }
+        let side = i64::from(scale);
+        for (x, y) in (0..frame.height).flat_map(|y| (0..frame.width).map(move |x| (x, y))) {
+            let at = [x, y].map(|part| side * i64::from(part));
+            canvas.fill(at, [side, side], small.pixel(x, y));
         }
         canvas
     }
@@ -67,14 +66,6 @@ impl Canvas {
             }
         }
         small
-    }
-
-    pub fn width(&self) -> u32 {
-        self.width
-    }
-
-    pub fn height(&self) -> u32 {
-        self.height
     }
 
     fn pixel(&self, x: u32, y: u32) -> Colour {
@@ -113,14 +104,13 @@ impl Canvas {
     pub fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
         let side = i64::from(scale);
         let advance = side * i64::from(CHARACTER);
-        let mut left = x;
-        for character in text.chars() {
+        for (nth, character) in (0..).zip(text.chars()) {
+            let left = x + advance * nth;
             for (row, bits) in (0..).zip(glyph(character)) {
                 for column in (0..8).filter(|column| bits >> column & 1 == 1) {
                     self.fill([left + side * column, y + side * row], [side, side], colour);
                 }
             }
-            left += advance;
         }
     }
 
@@ -134,9 +124,6 @@ impl Canvas {
     }
 
     /// Writes it as a PNG file.
-    ///
-    /// # Errors
-    /// When the file cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let said = || format!("cannot write {}", path.display());
         let file = File::create(path).with_context(said)?;
@@ -159,36 +146,4 @@ fn glyph(character: char) -> [u8; 8] {
         BASIC_FONTS.get('?'),
     ];
     fonts.into_iter().flatten().next().unwrap_or_default()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn text_is_drawn_where_it_is_asked_for_and_nothing_outside() {
-        let mut canvas = Canvas::new(40, 20, WHITE);
-        canvas.text([8, 4], 1, "iW", BLACK);
-        let dark = |canvas: &Canvas| -> Vec<[u32; 2]> {
-            let all = (0..canvas.height).flat_map(|y| (0..canvas.width).map(move |x| [x, y]));
-            all.filter(|&[x, y]| canvas.pixel(x, y) == BLACK).collect()
-        };
-        let drawn = dark(&canvas);
-        assert!(drawn.len() > 20);
-        for [x, y] in drawn {
-            assert!((8..24).contains(&x) && (4..12).contains(&y), "{x} {y}");
-        }
-        canvas.text([-4, -4], 9, "W", BLACK);
-        canvas.text([36, 18], 9, "W", BLACK);
-    }
-
-    #[test]
-    fn letters_are_not_mirrored() {
-        // An L has its bar at the left.
-        let rows = glyph('L');
-        let left: u32 = rows.iter().map(|row| (row & 0x0f).count_ones()).sum();
-        let right: u32 = rows.iter().map(|row| (row >> 4).count_ones()).sum();
-        assert!(left > right);
-        assert_eq!(glyph('\u{1f600}'), glyph('?'));
-    }
 }

@@ -1,14 +1,12 @@
 //! The film under one load: where tip and markers go, and where the markers are seen.
 
-use std::str::FromStr;
-
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use hivtac_twin::film::Film;
 use hivtac_twin::{Camera, Contact, Load, MARKERS, Preset};
 use serde_json::{Value, json};
 
-/// The frame size that pixels are told for.
+/// The frame size whose pixels are printed.
 const SIZE: [u32; 2] = [800, 600];
 
 /// Arguments of `scene film`.
@@ -30,19 +28,15 @@ pub struct FilmArgs {
     /// and the force along it) or slip:RATIO (the same, until the tip slides at that ratio of
     /// friction).
     #[arg(long, default_value = "force")]
-    contact: ContactArg,
+    contact: Contact,
     /// Where the tip first touches, mm from the middle.
-    #[arg(
-        long,
-        default_value = "0,0",
-        value_name = "X,Y",
-        allow_hyphen_values = true
-    )]
-    offset_mm: Offset,
+    #[arg(long, default_value = "0,0", value_name = "X,Y", allow_hyphen_values = true,
+          value_parser = numbers::<2>)]
+    offset_mm: [f64; 2],
     /// Where gravity pulls, a vector of length one in the film's frame; without it the film weighs
     /// nothing.
-    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
-    down: Option<Down>,
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
+    down: Option<[f64; 3]>,
     /// The tables that scenes use, or the finite elements that they were made from.
     #[arg(long, value_enum, default_value_t = Solver::Reduced)]
     solver: Solver,
@@ -59,54 +53,10 @@ enum Solver {
     Full,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct ContactArg(Contact);
-
-impl FromStr for ContactArg {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<ContactArg, String> {
-        let slip = |ratio: &str| {
-            Some(Contact::Slip {
-                mu: ratio.parse().ok()?,
-            })
-        };
-        let contact = match text {
-            "force" => Some(Contact::Force),
-            "stick" => Some(Contact::Stick),
-            _ => text.strip_prefix("slip:").and_then(slip),
-        };
-        let contact = contact.ok_or("use force, stick or slip:RATIO, such as slip:0.6")?;
-        Ok(ContactArg(contact))
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Offset([f64; 2]);
-
-impl FromStr for Offset {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Offset, String> {
-        let parsed = text
-            .split_once(',')
-            .and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]));
-        let offset = parsed.ok_or("use two numbers, such as 0.1,-0.2")?;
-        Ok(Offset(offset))
-    }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Down([f64; 3]);
-
-impl FromStr for Down {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Down, String> {
-        let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
-        let down = parts.ok().and_then(|parts| parts.try_into().ok());
-        Ok(Down(down.ok_or("use three numbers, such as 0,0.6,-0.8")?))
-    }
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parts: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let numbers = parts.ok().and_then(|parts| parts.try_into().ok());
+    numbers.ok_or_else(|| format!("use {N} numbers, such as 0.1,-0.2"))
 }
 
 /// The film under a load.
@@ -114,22 +64,15 @@ struct Answer {
     tip_mm: [f64; 3],
     /// The tip's force on the film, N.
     force_n: [f64; 3],
-    markers: [Marker; 4],
-}
-
-/// One marker.
-struct Marker {
-    /// How it moved, the mean over its disc, mm.
-    moved_mm: [f64; 3],
-    /// The centroid of its image, px.
-    seen_px: [f64; 2],
+    /// How each marker moved, the mean over its disc, mm, and the centroid of its image, px.
+    markers: [([f64; 3], [f64; 2]); 4],
 }
 
 impl FilmArgs {
     pub(super) fn run(&self) -> Result<()> {
         let load = Load::from_angles(self.force_n, self.alpha_deg, self.beta_deg)?;
-        let load = load.with_contact(self.contact.0)?;
-        let load = load.with_offset_mm(self.offset_mm.0)?;
+        let load = load.with_contact(self.contact)?;
+        let load = load.with_offset_mm(self.offset_mm)?;
         let camera = Camera::new(self.preset, SIZE[0], SIZE[1])?;
         let answer = match self.solver {
             Solver::Reduced => reduced(&load, self.down, &camera)?,
@@ -144,35 +87,34 @@ impl FilmArgs {
     }
 }
 
-fn reduced(load: &Load, down: Option<Down>, camera: &Camera) -> Result<Answer> {
-    let film = Film::default().with_down(down.map(|down| down.0))?;
+fn reduced(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> {
+    let film = Film::default().with_down(down)?;
     film.check(load)?;
     let pressed = film.press(load);
+    let seen_px = |id: usize| {
+        let rest = MARKERS[id];
+        rest.centroid_px(|rest| pressed.displacement(rest), camera)
+    };
     Ok(Answer {
         tip_mm: pressed.tip_mm,
         force_n: pressed.force_n,
-        markers: std::array::from_fn(|id| Marker {
-            moved_mm: pressed.discs[id].moved_mm,
-            seen_px: MARKERS[id].centroid_px(|rest| pressed.displacement(rest), camera),
-        }),
+        markers: std::array::from_fn(|id| (pressed.discs[id].moved_mm, seen_px(id))),
     })
 }
 
-fn full(load: &Load, down: Option<Down>, camera: &Camera) -> Result<Answer> {
+fn full(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> {
     use hivtac_shell::{Design, Film, markers, press_load};
 
     let mut film = Film::new(&Design {
-        down: down.map_or([0.0; 3], |down| down.0),
+        down: down.unwrap_or_default(),
         ..Design::default()
     })?;
     let state = press_load(&mut film, load)?.state;
+    let markers = markers(&film, &state, camera);
     Ok(Answer {
         tip_mm: state.tip_mm,
         force_n: state.force_n,
-        markers: markers(&film, &state, camera).map(|marker| Marker {
-            moved_mm: marker.moved_mm,
-            seen_px: marker.seen_px,
-        }),
+        markers: markers.map(|marker| (marker.moved_mm, marker.seen_px)),
     })
 }
 
@@ -183,14 +125,9 @@ impl Answer {
     }
 
     fn to_json(&self) -> Value {
-        let marker = |(id, marker): (usize, &Marker)| {
-            let ([dx, dy, dz], [x, y]) = (marker.moved_mm, marker.seen_px);
-            json!({ "id": id, "dx_mm": dx, "dy_mm": dy, "dz_mm": dz, "x_px": x, "y_px": y })
-        };
-        json!({
-            "tip_depth_mm": self.tip_depth_mm(),
-            "markers": self.markers.iter().enumerate().map(marker).collect::<Vec<_>>(),
-        })
+        let marker = |(id, ([dx, dy, dz], [x, y])): (usize, &([f64; 3], [f64; 2]))| json!({ "id": id, "dx_mm": dx, "dy_mm": dy, "dz_mm": dz, "x_px": x, "y_px": y });
+        let markers: Vec<Value> = self.markers.iter().enumerate().map(marker).collect();
+        json!({ "tip_depth_mm": self.tip_depth_mm(), "markers": markers })
     }
 
     fn to_text(&self) -> String {
@@ -204,8 +141,7 @@ impl Answer {
             three(self.tip_mm, 4),
             three(self.force_n, 5)
         );
-        for (id, marker) in self.markers.iter().enumerate() {
-            let ([dx, dy, dz], [x, y]) = (marker.moved_mm, marker.seen_px);
+        for (id, ([dx, dy, dz], [x, y])) in self.markers.iter().enumerate() {
             text += &format!("{id:6} {dx:8.4} {dy:8.4} {dz:8.4} {x:18.3} {y:8.3}\n");
         }
         text

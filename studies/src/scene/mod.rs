@@ -1,45 +1,30 @@
 //! `hivtac-studies scene …`: pictures and figures of the simulated sensor (`docs/scene.md`).
 
 mod canvas;
-mod cases;
-mod effects;
 mod figures;
 mod film;
-mod guide;
-mod overlay;
-mod pipeline;
 mod render;
-pub(crate) mod size;
 
 use anyhow::Result;
 use clap::Subcommand;
 
-/// Look at the simulated sensor.
+/// Look at the simulated sensor: its frames and its film.
 #[derive(Subcommand)]
 pub enum SceneCommand {
     /// Render one frame of a scene as a PNG picture.
     Render(render::RenderArgs),
     /// Press the film once: where tip and markers go, and where the markers are seen.
     Film(film::FilmArgs),
-    /// Switch each effect of the simulated sensor and measure what that changes.
-    Effects(effects::EffectsArgs),
-    /// Draw all hard cases on one sheet, with what the sensing makes of them.
-    Cases(cases::CasesArgs),
-    /// Draw the pictures of the documentation.
+    /// Draw the pictures of the documentation: frames, hard cases, and the guide's.
     Figures(figures::FiguresArgs),
 }
 
 impl SceneCommand {
     /// Does it.
-    ///
-    /// # Errors
-    /// When the arguments ask for what there is not, or a file cannot be read or written.
     pub fn run(&self) -> Result<()> {
         match self {
             SceneCommand::Render(args) => args.run(),
             SceneCommand::Film(args) => args.run(),
-            SceneCommand::Effects(args) => args.run(),
-            SceneCommand::Cases(args) => args.run(),
             SceneCommand::Figures(args) => args.run(),
         }
     }

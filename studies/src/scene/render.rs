@@ -6,16 +6,16 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use hivtac_twin::hard_cases::hard_cases;
-use hivtac_twin::{Preset, Scene};
+use hivtac_twin::{Preset, Scene, Truth};
 
-use super::canvas::Canvas;
-use super::{cases, overlay};
+use super::canvas::{BLACK, CHARACTER, CYAN, Canvas};
+use super::figures::{SHOWN_S, SIZE};
 
 /// Arguments of `scene render`.
 #[derive(Args)]
 pub struct RenderArgs {
     /// A scene file (docs/scene-file.md), or a name: of a motion of the usual sensor (rest, static,
-    /// demo, …), or of a hard case (see `scene cases`).
+    /// demo, …), or of a hard case (their picture is of `scene figures`).
     scene: String,
     /// The PNG file to write.
     #[arg(long)]
@@ -44,7 +44,7 @@ impl RenderArgs {
         let frame = scene.frame(self.number, self.at.unwrap_or(usual_s));
         let mut canvas = Canvas::of_frame(&frame, self.scale);
         if self.overlay {
-            overlay::draw(&mut canvas, &frame.truth, self.scale);
+            mark_truth(&mut canvas, &frame.truth, self.scale);
         }
         canvas.save(&self.out)?;
         let (out, load) = (self.out.display(), frame.truth.force);
@@ -72,12 +72,46 @@ fn scene(source: &str) -> Result<(Scene, f64)> {
             0.0,
         ));
     }
-    let [width, height] = cases::SIZE;
+    let [width, height] = SIZE;
     if let Some(case) = hard_cases().iter().find(|case| case.name == source) {
         let scene = case.scene(Preset::Ov7725, width, height, 1)?;
-        return Ok((scene, cases::SHOWN_S));
+        return Ok((scene, SHOWN_S));
     }
     let scene = Scene::preset(source, Preset::Ov7725, width, height, 1);
     let said = || format!("{source} is no scene file (*.toml), no motion and no hard case");
     Ok((scene.with_context(said)?, 0.0))
+}
+
+/// Draws a cross at each marker's true centroid and its identity beside it, into a picture of a
+/// frame at a scale.
+pub(super) fn mark_truth(canvas: &mut Canvas, truth: &Truth, scale: u32) {
+    for (id, marker) in truth.markers.iter().enumerate() {
+        if let Some(marker) = marker {
+            let at = marker.centroid_px.map(|px| in_picture(px, scale));
+            cross(canvas, at, scale);
+            // Towards the outside of the pattern, where no other marker is.
+            let width = i64::from(scale * CHARACTER);
+            let right = [1, 2].contains(&id);
+            let beside = 10 * i64::from(scale);
+            let x = at[0] + if right { beside } else { -beside - width };
+            canvas.edged_text([x, at[1] - width / 2], scale, &id.to_string(), CYAN);
+        }
+    }
+}
+
+/// The pixel of a picture at a scale in which a point of the frame lies.
+fn in_picture(px: f64, scale: u32) -> i64 {
+    ((px + 0.5) * f64::from(scale)).floor() as i64
+}
+
+/// A cross of one-pixel lines, whatever the scale, with a dark edge: its middle is the place.
+fn cross(canvas: &mut Canvas, [x, y]: [i64; 2], scale: u32) {
+    let arm = 3 * i64::from(scale);
+    let length = 2 * arm + 1;
+    if scale > 2 {
+        canvas.fill([x - arm - 1, y - 1], [length + 2, 3], BLACK);
+        canvas.fill([x - 1, y - arm - 1], [3, length + 2], BLACK);
+    }
+    canvas.fill([x - arm, y], [length, 1], CYAN);
+    canvas.fill([x, y - arm], [1, length], CYAN);
 }

@@ -4,7 +4,6 @@ use anyhow::Result;
 use hivtac_twin::Load;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
 
 use super::friction::{Friction, Meeting, STIFFNESS};
 
@@ -21,8 +20,7 @@ const GRAVITY: f64 = 9.806_65;
 const REACH_MM: f64 = 2.0;
 
 /// What happens.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug)]
 pub enum Kind {
     /// A tilted press that sticks.
     Press,
@@ -37,25 +35,14 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All of them.
-    pub const ALL: [Kind; 5] = [
-        Kind::Press,
-        Kind::Drag,
-        Kind::Release,
-        Kind::Grasp,
-        Kind::Catch,
+    /// All of them, with their names for people.
+    pub const ALL: [(Kind, &'static str); 5] = [
+        (Kind::Press, "press"),
+        (Kind::Drag, "drag"),
+        (Kind::Release, "release"),
+        (Kind::Grasp, "grasp and lift"),
+        (Kind::Catch, "catch"),
     ];
-
-    /// For people.
-    pub fn name(self) -> &'static str {
-        match self {
-            Kind::Press => "press",
-            Kind::Drag => "drag",
-            Kind::Release => "release",
-            Kind::Grasp => "grasp and lift",
-            Kind::Catch => "catch",
-        }
-    }
 }
 
 /// A contact in time.
@@ -119,9 +106,6 @@ impl Course {
     }
 
     /// What presses at a time, s.
-    ///
-    /// # Errors
-    /// When a number is none of a load.
     pub fn load(&self, time_s: f64) -> Result<Load> {
         let meeting = self.meeting(time_s);
         let along = self.toward.map(|part| meeting.pull_n * part);
@@ -166,19 +150,13 @@ impl Run<'_> {
     }
 
     fn press(&mut self) {
-        let (force_n, [rises_s, falls_s]) = (
-            self.drawn(0.03, 0.15),
-            [0; 2].map(|_| self.drawn(0.03, 0.3)),
-        );
+        let force_n = self.drawn(0.03, 0.15);
+        let [rises_s, falls_s] = [0; 2].map(|_| self.drawn(0.03, 0.3));
         let leans_mm = self.drawn(0.0, 0.6) * self.ratio * force_n / STIFFNESS;
-        self.until(rises_s, |part| {
-            (force_n * ramp(part), leans_mm * ramp(part))
-        });
-        self.until(0.3, |_| (force_n, leans_mm));
-        let left = |part| 1.0 - ramp(part);
-        self.until(falls_s, |part| {
-            (force_n * left(part), leans_mm * left(part))
-        });
+        let pressed = |part| (force_n * part, leans_mm * part);
+        self.until(rises_s, |part| pressed(ramp(part)));
+        self.until(0.3, |_| pressed(1.0));
+        self.until(falls_s, |part| pressed(1.0 - ramp(part)));
     }
 
     fn drag(&mut self) {
@@ -220,7 +198,10 @@ impl Run<'_> {
         };
         let weight_n = part * self.ratio * grip_n;
         let [lifts_s, reacts_s] = [self.drawn(0.15, 0.4), self.drawn(0.04, 0.08)];
-        let mut object = Moved::new(weight_n / GRAVITY);
+        let mut object = Moved {
+            mass_kg: weight_n / GRAVITY,
+            ..Moved::default()
+        };
         let (mut normal_n, mut slipped_since) = (grip_n, None);
         let grips_anew = self.random.random_bool(0.5);
         for step in 0..(1.0 * STEPS_HZ) as usize {
@@ -250,8 +231,11 @@ impl Run<'_> {
             true => self.drawn(20.0, 100.0),
             false => 0.0,
         };
-        let mut object = Moved::new(0.02);
-        object.speed = speed;
+        let mut object = Moved {
+            mass_kg: 0.02,
+            speed,
+            ..Moved::default()
+        };
         for step in 0..(0.7 * STEPS_HZ) as usize {
             let time_s = step as f64 / STEPS_HZ;
             let (sin, cos) = (std::f64::consts::TAU * frequency_hz * time_s).sin_cos();
@@ -266,6 +250,7 @@ impl Run<'_> {
 }
 
 /// An object that moves along the film.
+#[derive(Default)]
 struct Moved {
     mass_kg: f64,
     /// mm, and mm/s.
@@ -277,14 +262,6 @@ struct Moved {
 const DAMPING: f64 = 0.3;
 
 impl Moved {
-    fn new(mass_kg: f64) -> Self {
-        Self {
-            mass_kg,
-            at_mm: 0.0,
-            speed: 0.0,
-        }
-    }
-
     /// One step of the simulation under a force, N.
     fn step(&mut self, force_n: f64) {
         let step_s = 1.0 / STEPS_HZ;

@@ -12,20 +12,21 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
+use hivtac_twin::{Load, Options, Shutter};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::temporal::{Moment, Temporal};
 use hivtac_terms::status::Status;
-use hivtac_twin::{Load, Options, Shutter};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
 use crate::page;
 use crate::press::{Tared, TestedUnit, seeded};
-use crate::units::own_weights;
+use crate::units::Bench;
 use course::{Course, Kind};
-use score::{Frame, Row, Score};
+use score::{Frame, Score};
 
 /// Lines of an OV7725's frame, of which 240 are rows, and its frames a second.
 const LINES: u16 = 278;
@@ -57,23 +58,31 @@ pub struct Slip {
     json: bool,
 }
 
-/// Contacts and slips by how the unit was made ready and by what happened.
-type Scores = BTreeMap<(usize, Kind), [Score; 2]>;
+/// A row of the table: how the unit was made ready, and what happened.
+#[derive(Serialize)]
+struct Row {
+    unit: &'static str,
+    kind: &'static str,
+    #[serde(flatten)]
+    score: Score,
+}
+
+/// Contacts and slips by how the unit was made ready and by what happened, at last all of it.
+type Scores = [[[Score; 2]; Kind::ALL.len() + 1]; UNITS.len()];
 
 impl Slip {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When a file cannot be read or written, or no course can be shown.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let units = (0..self.units).into_par_iter();
         let scores = units.map(|number| self.test(&weights, &model, number));
-        let mut all = Scores::new();
+        let mut all = Scores::default();
         for scores in scores.collect::<Result<Vec<Scores>>>()? {
-            merge(&mut all, &scores);
+            let scores = scores.iter().flatten().flatten();
+            let sums = all.iter_mut().flatten().flatten();
+            sums.zip(scores).for_each(|(sum, score)| sum.merge(score));
         }
         let [contacts, slips] = [0, 1].map(|which| rows(&all, which));
         if self.json {
@@ -91,27 +100,27 @@ impl Slip {
         let conditions = &model.conditions;
         let nominal = TestedUnit::new(conditions, Options::default(), 0.5, number)?;
         let drawn = TestedUnit::drawn(conditions, number)?;
-        let own = own_weights(weights, &drawn, &mut drawn.tare(model)?, number)
+        let own = (Bench::Ten)
+            .calibrate(weights, &drawn, &mut drawn.tare(model)?, number)
             .and_then(|own| export(&own))
             .with_context(|| format!("unit {number}"))?;
         let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
         let ready = [(&nominal, model), (&drawn, model), (&drawn, &own)];
-        let mut scores = Scores::new();
+        let mut scores = Scores::default();
         for (nth, (unit, model)) in ready.into_iter().enumerate() {
             let mut tared = unit.tare(model)?;
-            tared.set_motion(Motion::rolling(LINES));
+            tared.sensor.set_motion(Motion::rolling(LINES));
             // The same courses before and after the loads.
             let mut random = seeded(80_000 + 2 * number + u64::from(nth > 0));
-            for kind in Kind::ALL
-                .into_iter()
-                .cycle()
-                .take(self.courses as usize * 5)
-            {
+            let kinds = Kind::ALL.into_iter().enumerate().cycle();
+            for (k, (kind, _)) in kinds.take(self.courses as usize * Kind::ALL.len()) {
                 let course = shown(unit, kind, &mut random)?;
                 let frames = follow(unit, &mut tared, &course)?;
-                let [contacts, slips] = scores.entry((nth, kind)).or_default();
-                contacts.merge(&Score::of_contacts(&frames));
-                slips.merge(&Score::of_slips(&frames));
+                for sum in [k, Kind::ALL.len()] {
+                    let [contacts, slips] = &mut scores[nth][sum];
+                    contacts.merge(&Score::of_contacts(&frames));
+                    slips.merge(&Score::of_slips(&frames));
+                }
             }
         }
         Ok(scores)
@@ -121,7 +130,7 @@ impl Slip {
 /// A course of a kind that the simulated film can hold and whose markers stay in the picture.
 fn shown(unit: &TestedUnit, kind: Kind, random: &mut ChaCha8Rng) -> Result<Course> {
     for _ in 0..DRAWS {
-        let course = Course::drawn(kind, unit.tip_radius_mm(), random);
+        let course = Course::drawn(kind, unit.tip_radius_mm, random);
         let steps = (course.duration_s() / LOOKED_AT_S) as u32;
         let is_shown = |step: u32| {
             let load = course.load(f64::from(step) * LOOKED_AT_S);
@@ -131,7 +140,7 @@ fn shown(unit: &TestedUnit, kind: Kind, random: &mut ChaCha8Rng) -> Result<Cours
             return Ok(course);
         }
     }
-    Err(anyhow!("no {} of {DRAWS} can be shown", kind.name()))
+    Err(anyhow!("no {kind:?} of {DRAWS} can be shown"))
 }
 
 /// What a sensor says of a course, frame by frame.
@@ -150,7 +159,7 @@ fn follow(unit: &TestedUnit, tared: &mut Tared<'_>, course: &Course) -> Result<V
         // Between the times that were looked at a load may be one that the film does not hold.
         let load = |after_s| course.load(time_s + after_s).unwrap_or(Load::REST);
         let noise = u64::from(number);
-        let picture = unit.scene().frame_under(&shutter, noise, load)?;
+        let picture = unit.scene.frame_under(&shutter, noise, load)?;
         let seen = tared.measure(&picture);
         let at = Moment {
             frame: number,
@@ -171,55 +180,43 @@ fn follow(unit: &TestedUnit, tared: &mut Tared<'_>, course: &Course) -> Result<V
     Ok(frames)
 }
 
-fn merge(all: &mut Scores, scores: &Scores) {
-    for (key, [contacts, slips]) in scores {
-        let [all_contacts, all_slips] = all.entry(*key).or_default();
-        all_contacts.merge(contacts);
-        all_slips.merge(slips);
-    }
-}
-
 /// The rows of contacts (0) or slips (1): each kind, and all together.
 fn rows(all: &Scores, which: usize) -> Vec<Row> {
-    let mut rows = Vec::new();
-    for (nth, unit) in UNITS.into_iter().enumerate() {
-        let mut together = Score::default();
-        for kind in Kind::ALL {
-            if let Some(scores) = all.get(&(nth, kind)) {
-                rows.push(scores[which].row(unit, Some(kind)));
-                together.merge(&scores[which]);
-            }
-        }
-        rows.push(together.row(unit, None));
-    }
-    rows
+    let kinds = || Kind::ALL.map(|(_, name)| name).into_iter().chain(["all"]);
+    let units = UNITS.into_iter().zip(all);
+    let rows = units.flat_map(|(unit, scores)| {
+        kinds().zip(scores).map(move |(kind, scores)| Row {
+            unit,
+            kind,
+            score: scores[which].clone(),
+        })
+    });
+    rows.collect()
 }
 
 fn table(name: &str, rows: &[Row]) -> Result<String> {
     let mut text = format!(
-        "\n## {name}\n\n| unit | what happens | true | told | precision | recall | missed, of them \
+        "\n{name}:\n\n| unit | what happens | true | reported | precision | recall | missed, of them \
          where frames had no force | delay: median, 95 % |\n|---|---|--:|--:|--:|--:|---|---|\n"
     );
-    let percent = |part: Option<f64>| match part {
-        Some(part) => format!("{:.0} %", 100.0 * part),
-        None => "–".to_owned(),
+    let percent = |part: u32, of: u32| match of {
+        0 => "–".to_owned(),
+        _ => format!("{:.0} %", 100.0 * f64::from(part) / f64::from(of)),
     };
-    for row in rows {
-        let delay = match (row.delay_ms, row.delay_95_ms) {
+    for Row { unit, kind, score } in rows {
+        let delay = match (score.delay_ms(50), score.delay_ms(95)) {
             (Some(median), Some(most)) => format!("{median:.0}, {most:.0} ms"),
             _ => "–".to_owned(),
         };
         writeln!(
             text,
-            "| {} | {} | {} | {} | {} | {} | {}, {} | {delay} |",
-            row.unit,
-            row.kind.map_or("all", Kind::name),
-            row.events,
-            row.told,
-            percent(row.precision),
-            percent(row.recall),
-            row.missed,
-            row.missed_without_force,
+            "| {unit} | {kind} | {} | {} | {} | {} | {}, {} | {delay} |",
+            score.true_events,
+            score.told,
+            percent(score.told - score.invented, score.told),
+            percent(score.found, score.true_events),
+            score.true_events - score.found,
+            score.missed_without_force,
         )?;
     }
     Ok(text)

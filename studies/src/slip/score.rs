@@ -4,8 +4,6 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use super::course::Kind;
-
 /// A contact or a slip goes on across gaps of at most so many frames.
 const GAP: usize = 2;
 /// What is told up to so long after an event belongs to it, s: the limits' time.
@@ -20,7 +18,6 @@ pub struct Frame {
     pub time_s: f64,
     /// True contact, and true slip.
     pub touches: bool,
-    /// See above.
     pub slips: bool,
     /// How far the contact has slipped, mm.
     pub slipped_mm: f64,
@@ -28,20 +25,17 @@ pub struct Frame {
     pub has_force: bool,
     /// Contact and slip as they were told.
     pub told_touch: bool,
-    /// See above.
     pub told_slip: bool,
 }
 
 /// Counts of events, and their delays.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct Score {
     /// True ones, and those of them that were told.
     pub true_events: u32,
-    /// See above.
     pub found: u32,
     /// Told ones, and those of them that are none.
     pub told: u32,
-    /// See above.
     pub invented: u32,
     /// Those that were not told, of which frames had no force.
     pub missed_without_force: u32,
@@ -120,48 +114,6 @@ impl Score {
         let last = sorted.len().checked_sub(1)?;
         Some(1e3 * sorted[(sorted.len() * percent / 100).min(last)])
     }
-
-    /// As it is printed.
-    pub fn row(&self, unit: &'static str, kind: Option<Kind>) -> Row {
-        let part = |of: u32, all: u32| (all > 0).then(|| f64::from(of) / f64::from(all));
-        Row {
-            unit,
-            kind,
-            events: self.true_events,
-            told: self.told,
-            precision: part(self.told - self.invented, self.told),
-            recall: part(self.found, self.true_events),
-            missed: self.true_events - self.found,
-            missed_without_force: self.missed_without_force,
-            delay_ms: self.delay_ms(50),
-            delay_95_ms: self.delay_ms(95),
-        }
-    }
-}
-
-/// A row of the table.
-#[derive(Debug, Serialize)]
-pub struct Row {
-    /// How the unit was made ready.
-    pub unit: &'static str,
-    /// What happened; all of it when none.
-    pub kind: Option<Kind>,
-    /// True events.
-    pub events: u32,
-    /// Told ones.
-    pub told: u32,
-    /// Part of the told ones that are true, and of the true ones that are told.
-    pub precision: Option<f64>,
-    /// See above.
-    pub recall: Option<f64>,
-    /// True ones that were not told, and those of them with frames without a force.
-    pub missed: u32,
-    /// See above.
-    pub missed_without_force: u32,
-    /// Median, and what 95 of 100 are within, ms.
-    pub delay_ms: Option<f64>,
-    /// See above.
-    pub delay_95_ms: Option<f64>,
 }
 
 /// Frames from the first to the last in which something is.
@@ -190,7 +142,7 @@ mod tests {
     use super::*;
 
     /// Frames of 10 ms: `t` is true, `x` told, `b` both, `n` true without a force.
-    fn frames(text: &str) -> Vec<Frame> {
+    fn score(text: &str) -> Score {
         let mut slipped_mm = 0.0;
         let frames = text.chars().enumerate().map(|(at, what)| {
             slipped_mm += if "tbn".contains(what) { 0.06 } else { 0.0 };
@@ -203,46 +155,34 @@ mod tests {
                 ..Frame::default()
             }
         });
-        frames.collect()
-    }
-
-    fn counts(text: &str) -> [u32; 5] {
-        let score = Score::of_slips(&frames(text));
-        [
-            score.true_events,
-            score.found,
-            score.told,
-            score.invented,
-            score.missed_without_force,
-        ]
+        Score::of_slips(&frames.collect::<Vec<_>>())
     }
 
     #[test]
     fn events_are_found_missed_and_invented() {
-        assert_eq!(counts("...tttbbb....."), [1, 1, 1, 0, 0]);
-        assert_eq!(counts("...tttttt....."), [1, 0, 0, 0, 0]);
-        assert_eq!(counts("...tttnnn....."), [1, 0, 0, 0, 1]);
-        assert_eq!(counts("......xx......"), [0, 0, 1, 1, 0]);
-        assert_eq!(
-            counts("...tttttt...xx"),
-            [1, 1, 1, 0, 0],
-            "late, and its own"
-        );
-        assert_eq!(counts("ttt........xxx"), [1, 0, 1, 1, 0], "too late");
-        assert_eq!(counts("..bb.bb...bb.."), [2, 2, 2, 0, 0], "a short gap");
-        assert_eq!(
-            counts("......b......."),
-            [0, 0, 1, 0, 0],
-            "too short to count"
-        );
-    }
-
-    #[test]
-    fn delays_are_counted_from_the_first_frame() {
-        let mut score = Score::of_slips(&frames("...tttbbb......"));
-        score.merge(&Score::of_slips(&frames("...bbbbb.......")));
-        assert!((score.delay_ms(95).unwrap() - 30.0).abs() < 1e-9);
-        assert_eq!(score.delay_ms(0), Some(0.0));
-        assert_eq!(Score::default().delay_ms(50), None);
+        for (text, expected) in [
+            ("...tttbbb.....", [1, 1, 1, 0, 0]),
+            ("...tttnnn.....", [1, 0, 0, 0, 1]),
+            ("......xx......", [0, 0, 1, 1, 0]),
+            // Late, and its own; too late; a short gap; too short to count.
+            ("...tttttt...xx", [1, 1, 1, 0, 0]),
+            ("ttt........xxx", [1, 0, 1, 1, 0]),
+            ("..bb.bb...bb..", [2, 2, 2, 0, 0]),
+            ("......b.......", [0, 0, 1, 0, 0]),
+        ] {
+            let score = score(text);
+            let found = [
+                score.true_events,
+                score.found,
+                score.told,
+                score.invented,
+                score.missed_without_force,
+            ];
+            assert_eq!(found, expected, "{text}");
+        }
+        let mut both = score("...tttbbb......");
+        both.merge(&score("...bbbbb......."));
+        assert!((both.delay_ms(95).unwrap() - 30.0).abs() < 1e-9);
+        assert_eq!(both.delay_ms(0), Some(0.0));
     }
 }

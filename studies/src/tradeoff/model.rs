@@ -4,24 +4,30 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
-use hivtac_calibration::data::conditions::Conditions;
-use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::evaluation::check::check;
 use hivtac_calibration::fit::fit;
-use hivtac_calibration::network::Meaning;
+use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
+use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::evaluation::check::check;
 use serde_json::json;
 
-use super::plan::{RENDERED, preset};
-use super::table::Configuration;
+use super::Configuration;
 
 /// Frames that the network is trained on, and frames that tell the markers' noise and their seed:
 /// as for the default model.
 const ROWS: usize = 80_000;
 const NOISE: (usize, u64) = (6_000, 5);
+/// Loads of the frames that are rendered, a little beyond those that are judged.
+const RENDERED: Range = Range {
+    force_n: 0.25,
+    alpha_deg: 10.0,
+    beta_deg: 10.0,
+    place_mm: 4.2,
+};
 /// Frames that are rendered for a model.
-pub const FRAMES: usize = ROWS + NOISE.0;
+pub(super) const FRAMES: usize = ROWS + NOISE.0;
 /// Frames to check on, and the seed of their loads and noise.
 const CHECKED: (usize, u64) = (4000, 1_000_001);
 
@@ -30,24 +36,28 @@ const CHECKED: (usize, u64) = (4000, 1_000_001);
 /// rendered frame.
 ///
 /// Gives what to do with them, in words.
-///
-/// # Errors
-/// When the frames cannot be rendered, training fails, or a file cannot be written.
-pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) -> Result<String> {
+pub(super) fn write(
+    picked: &Configuration,
+    folder: &Path,
+    progress: impl Fn() + Sync,
+) -> Result<String> {
     let recipe = Recipe {
-        preset: preset(picked.size),
-        width: picked.size[0],
-        height: picked.size[1],
-        centroid: picked.centroid,
+        width: picked.width,
+        height: picked.height,
+        centroid: picked.estimator(),
         loads: Loads::Random(ROWS),
         range: RENDERED,
         ..Recipe::default()
     };
     let dataset = generate(&recipe, &progress)?;
+    let widths = picked.network.split('-').map(str::parse);
     let options = Options {
         meaning: Meaning::ForceAndPlace,
-        hidden: picked.estimator.hidden.clone(),
-        arithmetic: picked.numbers.arithmetic().unwrap_or_default(),
+        hidden: widths.collect::<Result<_, _>>()?,
+        arithmetic: match picked.numbers.as_str() {
+            "int16" => Arithmetic::Int16,
+            _ => Arithmetic::Int8PerChannel,
+        },
         ..Options::default()
     };
     let mut weights = fit(&dataset, &options, |_| ())?.weights;
@@ -63,42 +73,24 @@ pub fn write(picked: &Configuration, folder: &Path, progress: impl Fn() + Sync) 
     let bytes = export(&weights)?;
     fs::create_dir_all(folder)?;
     let folder = folder.canonicalize()?;
-    let file = |name: &str| folder.join(name);
-    weights.save(&file("model.weights"))?;
-    let save = |name: &str, bytes: &[u8]| {
-        fs::write(file(name), bytes)
-            .with_context(|| format!("cannot write {}", file(name).display()))
-    };
-    save("model.hvtm", &bytes)?;
-    let settings = settings(&weights.conditions);
-    save(
-        "settings.json",
-        (serde_json::to_string_pretty(&settings)? + "\n").as_bytes(),
-    )?;
+    weights.save(&folder.join("model.weights"))?;
+    let settings = json!({ "conditions": weights.conditions, "commands": ["hivtac tare"] });
+    let settings = serde_json::to_string_pretty(&settings)? + "\n";
+    for (name, bytes) in [
+        ("model.hvtm", &bytes[..]),
+        ("settings.json", settings.as_bytes()),
+    ] {
+        let file = folder.join(name);
+        fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))?;
+    }
     let (samples, seed) = CHECKED;
     // The contact reading is `force`: no friction has a part in it.
     let report = check(&bytes, samples, seed, || ())?;
+    let folder = folder.display();
     Ok(format!(
-        "{report}\n\nwrote model.hvtm, model.weights and settings.json into {}\n\n{}",
-        folder.display(),
-        orders(&file("model.hvtm"))
-    ))
-}
-
-fn settings(conditions: &Conditions) -> serde_json::Value {
-    json!({
-        "conditions": conditions,
-        "commands": ["hivtac tare"],
-    })
-}
-
-/// What to type. The model file carries all settings of the sensing; the firmware takes them from
-/// it at the start.
-fn orders(model: &Path) -> String {
-    format!(
-        "flash it, from the root of the repository:\n\n  HIVTAC_MODEL={} \\\n    cargo run \
+        "{report}\n\nwrote model.hvtm, model.weights and settings.json into {folder}\n\nflash it, \
+         from the root of the repository:\n\n  HIVTAC_MODEL={folder}/model.hvtm \\\n    cargo run \
          --release -p hivtac-firmware --target thumbv7em-none-eabihf\n\nthen, while nothing \
-         touches the film:\n\n  hivtac tare",
-        model.display()
-    )
+         touches the film:\n\n  hivtac tare"
+    ))
 }

@@ -1,290 +1,163 @@
-//! The Pareto front, and which configuration is best under a user's limits.
+//! Which configuration is best under a user's limits.
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result};
+use clap::Args;
 
-use super::table::{Configuration, Reach};
+use super::Configuration;
 
 /// Errors count as equal within this part of themselves: training again changes them as much.
 const EQUAL: f64 = 0.05;
 
 /// A user's limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Args, Default)]
 pub struct Limits {
-    /// Longest time of a frame, µs at 480 MHz, modelled.
+    /// Pick the best that takes at most so many µs a frame, at 480 MHz, modelled.
+    #[arg(long)]
     pub budget_us: Option<f64>,
-    /// Least frames a second that the core can do, modelled.
+    /// Pick the best that the core can do at least so often a second, modelled.
+    #[arg(long)]
     pub min_rate: Option<f64>,
-    /// Largest mean direction error from 50 mN up, degrees, simulated: the upper end of its
-    /// interval.
+    /// Pick the fastest whose mean direction error from 50 mN up is at most this, simulated; the
+    /// upper end of its interval counts.
+    #[arg(long)]
     pub max_error_deg: Option<f64>,
 }
 
-/// The configurations within reach that no other within reach beats or equals in both time and
-/// direction error from 50 mN up, by time.
-pub fn front(configurations: &[Configuration], reach: Reach) -> Vec<&Configuration> {
-    let mut candidates: Vec<_> = configurations
-        .iter()
-        .filter(|c| c.reach() >= reach)
-        .filter_map(|c| Some((c.cost?.cycles, c.strong_direction_deg.value, c)))
-        .collect();
-    candidates.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let mut least = f64::INFINITY;
-    candidates.retain(|(_, error, _)| {
-        let better = *error < least;
-        least = least.min(*error);
-        better
-    });
-    candidates.into_iter().map(|(_, _, c)| c).collect()
-}
-
-/// The best configuration within the limits that the firmware does as it is.
+/// The best configuration within the limits.
 ///
 /// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
 /// error from 50 mN up, error of |F| and error of the place are within a twentieth of the least of
 /// each, and time within a twentieth of the fastest's, the one that refuses least.
-///
-/// # Errors
-/// When there is none; says what comes nearest.
-pub fn best<'c>(configurations: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
-    let reachable: Vec<&Configuration> = configurations
-        .iter()
-        .filter(|c| c.reach() == Reach::Firmware)
-        .collect();
-    let fitting: Vec<_> = reachable
-        .iter()
-        .copied()
-        .filter(|c| limits.hold(c))
-        .collect();
-    if fitting.is_empty() {
-        bail!(
-            "nothing that the firmware does is within these limits{}",
-            nearest(&reachable, limits)
-        );
-    }
-    let fastest = |among: &[&'c Configuration]| among.iter().copied().min_by_key(|c| cycles(c));
+pub(super) fn best<'c>(all: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
+    let fitting: Vec<_> = all.iter().filter(|c| limits.hold(c)).collect();
     let best = match limits.max_error_deg {
-        Some(_) => fastest(&fitting),
-        None => refuses_least(&as_fast(&as_accurate(&fitting))),
+        Some(_) => fitting.into_iter().min_by_key(|c| c.modelled_cycles),
+        None => {
+            let left = equals(&fitting, |c| c.strong_direction_deg);
+            let left = equals(&left, |c| c.force_rmse_mn);
+            let left = equals(&left, |c| c.place_rmse_um);
+            let left = equals(&left, |c| c.modelled_cycles as f64);
+            left.into_iter().min_by(|a, b| {
+                let by_cycles = a.modelled_cycles.cmp(&b.modelled_cycles);
+                (a.unexplained.total_cmp(&b.unexplained)).then(by_cycles)
+            })
+        }
     };
-    best.context("no configuration has a cost")
+    best.with_context(|| {
+        let nearest = nearest(all).unwrap_or_default();
+        format!("nothing that the firmware does is within these limits; {nearest}")
+    })
 }
 
-/// The most accurate and their equals.
-fn as_accurate<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
-    let equals = |among: &[&'c Configuration], of: fn(&Configuration) -> f64| {
-        let least = among.iter().map(|c| of(c)).fold(f64::INFINITY, f64::min);
-        let near = |c: &&&Configuration| of(c) <= least * (1.0 + EQUAL);
-        among.iter().filter(near).copied().collect::<Vec<_>>()
-    };
-    let by_direction = equals(fitting, |c| c.strong_direction_deg.value);
-    let by_force = equals(&by_direction, |c| c.force_rmse_mn.value);
-    equals(&by_force, |c| c.place_rmse_um.value)
+/// The one with the least of something, and its equals.
+fn equals<'c>(
+    among: &[&'c Configuration],
+    of: fn(&Configuration) -> f64,
+) -> Vec<&'c Configuration> {
+    let least = among.iter().map(|c| of(c)).fold(f64::INFINITY, f64::min);
+    let near = |c: &&&Configuration| of(c) <= least * (1.0 + EQUAL);
+    among.iter().filter(near).copied().collect()
 }
 
-/// The fastest and their equals.
-fn as_fast<'c>(fitting: &[&'c Configuration]) -> Vec<&'c Configuration> {
-    let least = fitting.iter().map(|c| cycles(c)).min().unwrap_or(i64::MAX);
-    let near = |c: &&&Configuration| cycles(c) as f64 <= least as f64 * (1.0 + EQUAL);
-    fitting.iter().filter(near).copied().collect()
-}
-
-/// The one that refuses the fewest frames; of several the fastest.
-fn refuses_least<'c>(fitting: &[&'c Configuration]) -> Option<&'c Configuration> {
-    let by_both = |a: &&&'c Configuration, b: &&&'c Configuration| {
-        (a.unexplained.total_cmp(&b.unexplained)).then(cycles(a).cmp(&cycles(b)))
-    };
-    fitting.iter().min_by(by_both).copied()
-}
-
-fn cycles(configuration: &Configuration) -> i64 {
-    configuration.cost.map_or(i64::MAX, |cost| cost.cycles)
-}
-
-fn nearest(reachable: &[&Configuration], limits: &Limits) -> String {
-    let fastest = reachable.iter().min_by_key(|c| cycles(c));
-    let accurate = reachable
-        .iter()
-        .min_by(|a, b| limit_error(a).total_cmp(&limit_error(b)));
-    let (Some(fastest), Some(accurate)) = (fastest, accurate) else {
-        return String::new();
-    };
-    let mut text = String::new();
-    if let (true, Some(cost)) = (
-        limits.budget_us.is_some() || limits.min_rate.is_some(),
-        fastest.cost,
-    ) {
-        text += &format!(
-            "; the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second)",
-            cost.microseconds(),
-            cost.rate()
-        );
-    }
-    if limits.max_error_deg.is_some() {
-        text += &format!(
-            "; the most accurate, {accurate}, is within {:.3}°",
-            limit_error(accurate)
-        );
-    }
-    text
-}
-
-/// The upper end of the direction error's interval.
-fn limit_error(configuration: &Configuration) -> f64 {
-    let error = configuration.strong_direction_deg;
-    error.value + error.half_width.unwrap_or(0.0)
+/// What comes nearest to limits of time, and to one of the error.
+fn nearest(all: &[Configuration]) -> Option<String> {
+    let fastest = all.iter().min_by_key(|c| c.modelled_cycles)?;
+    let by_error = |c: &&Configuration| (1e6 * c.limit_error_deg()) as u64;
+    let accurate = all.iter().min_by_key(by_error)?;
+    Some(format!(
+        "the fastest, {fastest}, takes {:.0} µs ({:.0} frames a second); the most accurate, \
+         {accurate}, is within {:.3}°",
+        fastest.microseconds(),
+        fastest.rate(),
+        accurate.limit_error_deg()
+    ))
 }
 
 impl Limits {
     /// Whether a configuration is within them.
-    pub fn hold(&self, configuration: &Configuration) -> bool {
-        let Some(cost) = configuration.cost else {
-            return false;
-        };
-        self.budget_us
-            .is_none_or(|most| cost.microseconds() <= most)
-            && self.min_rate.is_none_or(|least| cost.rate() >= least)
-            && self
-                .max_error_deg
-                .is_none_or(|most| limit_error(configuration) <= most)
+    fn hold(&self, c: &Configuration) -> bool {
+        self.budget_us.is_none_or(|most| c.microseconds() <= most)
+            && self.min_rate.is_none_or(|least| c.rate() >= least)
+            && (self.max_error_deg).is_none_or(|most| c.limit_error_deg() <= most)
     }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
-    use crate::tradeoff::costs::Cost;
-    use crate::tradeoff::plan::{Estimator, Numbers};
-    use crate::tradeoff::table::Mean;
-    use hivtac_terms::conditions::CentroidEstimator;
 
     /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
     /// (mN).
-    pub fn made(size: [u16; 2], cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
-        let mean = |value: f64| Mean {
-            value,
-            half_width: Some(0.1 * value),
-        };
+    fn made(cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         Configuration {
-            size,
-            centroid: CentroidEstimator::RednessWeighted,
-            estimator: Estimator::all()[0].clone(),
-            numbers: Numbers::Int16,
+            width: 320,
+            height: 240,
+            centroid: "weighted".to_owned(),
+            network: "16-16".to_owned(),
+            numbers: "int16".to_owned(),
             steps: 1,
-            looks: 2.0,
-            direction_deg: mean(3.0 * direction),
-            strong_direction_deg: mean(direction),
-            force_rmse_mn: mean(force),
-            place_rmse_um: mean(10.0),
+            direction_deg: 3.0 * direction,
+            strong_direction_deg: direction,
+            strong_direction_deg_95: Some(0.1 * direction),
+            force_rmse_mn: force,
+            place_rmse_um: 10.0,
             unexplained: 0.001,
-            worst: [10.0 * direction, 5.0 * force],
-            cost: Some(Cost {
-                instructions: 2 * cycles,
-                cycles,
-                latency_cycles: cycles / 5,
-                flash: 200_000,
-                ram: 300_000,
-            }),
+            modelled_cycles: cycles,
+            latency_microseconds: 10.0,
         }
     }
 
-    const QVGA: [u16; 2] = [320, 240];
-
-    /// By cycles: rough; good; as good; a little better; much better in |F|; then one without a
-    /// firmware, and one without a camera.
+    /// Rough; good; as good; a little better; much better in |F|.
     fn several() -> Vec<Configuration> {
         vec![
-            made(QVGA, 96_000, [0.5, 0.3]),
-            made(QVGA, 144_000, [0.20, 0.1]),
-            made(QVGA, 240_000, [0.20, 0.1]),
-            made(QVGA, 288_000, [0.195, 0.1]),
-            made(QVGA, 480_000, [0.198, 0.01]),
-            made([640, 480], 960_000, [0.1, 0.01]),
-            made([800, 600], 1_440_000, [0.05, 0.01]),
+            made(96_000, [0.5, 0.3]),
+            made(144_000, [0.20, 0.1]),
+            made(240_000, [0.20, 0.1]),
+            made(288_000, [0.195, 0.1]),
+            made(480_000, [0.198, 0.01]),
         ]
     }
 
-    fn picked(limits: Limits) -> i64 {
-        let all = several();
-        best(&all, &limits).unwrap().cost.unwrap().cycles
-    }
-
     #[test]
-    fn without_limits_the_most_accurate_that_the_firmware_does_is_best() {
-        assert_eq!(picked(Limits::default()), 480_000);
-    }
-
-    #[test]
-    fn among_equals_the_fastest_is_best() {
-        let budget = |us| Limits {
-            budget_us: Some(us),
-            ..Limits::default()
+    fn the_best_is_picked_under_each_limit() {
+        let picked = |budget_us, min_rate, max_error_deg| {
+            let limits = Limits {
+                budget_us,
+                min_rate,
+                max_error_deg,
+            };
+            best(&several(), &limits).unwrap().modelled_cycles
         };
-        assert_eq!(picked(budget(600.0)), 144_000);
-        assert_eq!(picked(budget(299.0)), 96_000);
-        assert_eq!(picked(budget(200.0)), 96_000);
-        let rate = Limits {
-            min_rate: Some(2000.0),
-            ..Limits::default()
-        };
-        assert_eq!(picked(rate), 144_000);
+        assert_eq!(picked(None, None, None), 480_000);
+        assert_eq!(picked(Some(600.0), None, None), 144_000);
+        assert_eq!(picked(Some(299.0), None, None), 96_000);
+        assert_eq!(picked(None, Some(2000.0), None), 144_000);
+        // The upper end of the interval counts: 0.22°.
+        assert_eq!(picked(None, None, Some(0.23)), 144_000);
+        assert_eq!(picked(None, None, Some(0.216)), 288_000);
     }
 
     #[test]
     fn among_equals_as_fast_the_one_that_refuses_least_is_best() {
         let mut all = several();
-        let mut other = made(QVGA, 500_000, [0.198, 0.01]);
-        other.unexplained = 0.0005;
-        all.push(other.clone());
-        assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, 0.0005);
-        all.pop();
-        other.cost = made(QVGA, 510_000, [0.198, 0.01]).cost;
-        all.push(other);
-        assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, 0.001);
-    }
-
-    #[test]
-    fn with_a_limit_on_the_error_the_fastest_is_best() {
-        // The upper end of the interval counts: 0.22°.
-        let error = |most| Limits {
-            max_error_deg: Some(most),
-            ..Limits::default()
-        };
-        assert_eq!(picked(error(0.23)), 144_000);
-        assert_eq!(picked(error(0.216)), 288_000);
-        assert_eq!(picked(error(1.0)), 96_000);
+        for (cycles, least) in [(510_000, 0.001), (500_000, 0.0005)] {
+            let mut other = made(cycles, [0.198, 0.01]);
+            other.unexplained = 0.0005;
+            all.push(other);
+            assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, least);
+        }
     }
 
     #[test]
     fn what_cannot_be_is_refused_with_what_comes_nearest() {
-        let all = several();
         let limits = Limits {
             budget_us: Some(100.0),
             max_error_deg: Some(0.1),
             ..Limits::default()
         };
-        let error = best(&all, &limits).unwrap_err().to_string();
+        let error = best(&several(), &limits).unwrap_err().to_string();
         for words in ["200 µs", "is within 0.21"] {
             assert!(error.contains(words), "no `{words}` in: {error}");
         }
-    }
-
-    #[test]
-    fn the_front_holds_what_nothing_beats() {
-        let all = several();
-        let cycles = |reach| -> Vec<i64> {
-            let front = front(&all, reach);
-            front.iter().map(|c| c.cost.unwrap().cycles).collect()
-        };
-        assert_eq!(cycles(Reach::Firmware), [96_000, 144_000, 288_000]);
-        assert_eq!(cycles(Reach::Camera), [96_000, 144_000, 288_000, 960_000]);
-    }
-
-    #[test]
-    fn floats_are_out_of_reach_and_other_frames_need_a_firmware() {
-        let mut float = made(QVGA, 1, [0.0; 2]);
-        float.cost = None;
-        assert_eq!(float.reach(), Reach::None);
-        let large = made([640, 480], 1, [0.0; 2]);
-        assert_eq!(large.reach(), Reach::Camera);
     }
 }

@@ -2,13 +2,13 @@
 //! them.
 
 use anyhow::{Context, Result};
-use hivtac_calibration::data::rest::Rest;
 use hivtac_calibration::forward::Known;
 use hivtac_calibration::loads::{Rough, SeenLoad};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::features::Features;
+use hivtac_calibration::data::rest::Rest;
 use hivtac_twin::Load;
+use hivtac_sensor::force::features::Features;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -64,9 +64,6 @@ impl Bench {
     ];
 
     /// The weights for a unit after these loads; the number draws gauge and stage.
-    ///
-    /// # Errors
-    /// When markers are not found, or no unit explains the loads.
     pub fn calibrate(
         self,
         weights: &Weights,
@@ -74,7 +71,7 @@ impl Bench {
         tared: &mut Tared<'_>,
         number: u64,
     ) -> Result<Weights> {
-        let rest = tared.rest().context("no rest position")?;
+        let rest = tared.sensor.tare().context("no rest position")?;
         let rest = Rest {
             features_q16: Features::to_array(&rest.features),
             areas_px: rest.areas,
@@ -107,8 +104,8 @@ impl Bench {
             for (number, (force_n, alpha, beta, place_mm)) in (0..).zip(TEN) {
                 let load = Load::from_angles(force_n, alpha, beta)?;
                 let load = load.with_offset_mm(there(place_mm))?;
-                let seen = Seen::of(unit, tared, load, 50_000 + 10 * number)?;
-                loads.push(seen.told(load.vector_n(), place_mm, random));
+                let seen = tared.seen_px(unit, load, FRAMES, 50_000 + 10 * number)?;
+                loads.push(told(seen, load.vector_n(), place_mm, random));
             }
             return Ok(loads);
         }
@@ -132,59 +129,46 @@ impl Bench {
             if !unit.shows_all(&load)? {
                 continue;
             }
-            let seen = Seen::of(unit, tared, load, number)?;
-            loads.push(match self {
-                Bench::ByHand => {
-                    let told = seen.told([0.0, 0.0, -force_n], [0.0; 2], random);
-                    let rough_mm = rough.place_mm(&told.observation(seen.areas));
-                    SeenLoad {
-                        direction_rad: HAND_DEG.to_radians(),
-                        each_place_mm: f64::INFINITY,
-                        place_mm: rough_mm,
-                        ..told
-                    }
-                }
-                _ => {
-                    let noted = place_mm.map(|part| part + PLACE_MM * normal(random));
-                    SeenLoad {
-                        each_place_mm: PLACE_MM,
-                        ..seen.told(load.vector_n(), noted, random)
-                    }
-                }
-            });
+            let seen = tared.seen_px(unit, load, FRAMES, number)?;
+            if self == Bench::ByHand {
+                let told = told(seen, [0.0, 0.0, -force_n], [0.0; 2], random);
+                loads.push(SeenLoad {
+                    direction_rad: HAND_DEG.to_radians(),
+                    each_place_mm: f64::INFINITY,
+                    // Areas at rest are good enough for a rough place.
+                    place_mm: rough.place_mm(&told.observation(rest.areas_px)),
+                    ..told
+                });
+            } else {
+                let noted = place_mm.map(|part| part + PLACE_MM * normal(random));
+                loads.push(SeenLoad {
+                    each_place_mm: PLACE_MM,
+                    ..told(seen, load.vector_n(), noted, random)
+                });
+            }
         }
         Ok(loads)
     }
 }
 
-/// Where markers are seen under a load, px.
-struct Seen {
-    px: [[f64; 2]; 4],
-    /// At rest, px: good enough for a rough place.
-    areas: [u32; 4],
-}
-
-impl Seen {
-    fn of(unit: &TestedUnit, tared: &mut Tared<'_>, load: Load, number: u64) -> Result<Self> {
-        Ok(Self {
-            px: tared.seen_px(unit, load, FRAMES, number)?,
-            areas: tared.rest().map_or([1; 4], |rest| rest.areas),
-        })
-    }
-
-    /// A load that is told to have this force, N, but for the gauge's error, and this place, mm.
-    fn told(&self, force_n: [f64; 3], place_mm: [f64; 2], random: &mut ChaCha8Rng) -> SeenLoad {
-        let size_n = force_n.iter().map(|part| part * part).sum::<f64>().sqrt();
-        let told = 1.0 + GAUGE_N * normal(random) / size_n;
-        SeenLoad {
-            force_n: force_n.map(|part| told * part),
-            size_n: GAUGE_N,
-            direction_rad: 0.0,
-            place_mm,
-            each_place_mm: 0.0,
-            seen_px: self.px,
-            noise_px: MEAN_PX,
-            frames: FRAMES as usize,
-        }
+/// A load that is told to have this force, N, but for the gauge's error, and this place, mm, and
+/// under which markers are seen there, px.
+fn told(
+    seen_px: [[f64; 2]; 4],
+    force_n: [f64; 3],
+    place_mm: [f64; 2],
+    random: &mut ChaCha8Rng,
+) -> SeenLoad {
+    let size_n = force_n.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let told = 1.0 + GAUGE_N * normal(random) / size_n;
+    SeenLoad {
+        force_n: force_n.map(|part| told * part),
+        size_n: GAUGE_N,
+        direction_rad: 0.0,
+        place_mm,
+        each_place_mm: 0.0,
+        seen_px,
+        noise_px: MEAN_PX,
+        frames: FRAMES as usize,
     }
 }

@@ -1,7 +1,6 @@
 //! Units as people build them: with a tare alone, and after they were calibrated.
 
 mod bench;
-mod real;
 #[cfg(test)]
 mod stretched;
 
@@ -17,17 +16,11 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
-use crate::calculix::Solver;
 use crate::page;
-use crate::press::{Errors, FORCES_MN, REACH_MM, Row, Tared, TestedUnit, press};
-use bench::Bench;
-use real::RealFilms;
+use crate::press::{Errors, REACH_MM, Tared, TestedUnit, press};
+pub use bench::Bench;
 
-/// What a calibrated unit shall be within: direction, degrees, |F|, mN, place, µm, root mean
-/// squares.
-const GOOD: [f64; 3] = [0.45, 1.0, 30.0];
-
-/// Draw units as people build them; measure them with a tare alone, and after ten loads.
+/// Draw units as people build them; measure them with a tare alone, and after they were calibrated.
 #[derive(Args)]
 pub struct Units {
     /// A weights file of a network that tells places, with its film.
@@ -36,14 +29,12 @@ pub struct Units {
     /// Units drawn.
     #[arg(long, default_value_t = 24)]
     units: u64,
-    /// Presses of each force on each of them.
+    /// Presses of each of the table's forces on each of them.
     #[arg(long, default_value_t = 100)]
     presses: u32,
     /// Whose films: of today's tables, or as people mount them.
     #[arg(long, value_enum, default_value_t = Films::Nominal)]
     films: Films,
-    #[command(flatten)]
-    calculix: Solver,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
@@ -51,174 +42,173 @@ pub struct Units {
 
 /// Whose films units have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Films {
+enum Films {
     /// The simulated film's tables, a little stiffer, thicker, held elsewhere.
     Nominal,
     /// Solved by finite elements: stretched, cut otherwise, of other rubber.
     Real,
-    /// The same, solved by CalculiX as solids; an hour for two.
-    Calculix,
 }
 
-/// One unit's errors at each force.
-type ByForce = [Errors; FORCES_MN.len()];
+impl Films {
+    /// Forces that are pressed, from and to, mN.
+    fn forces_mn(self) -> &'static [[u32; 2]] {
+        match self {
+            Films::Nominal => &[[50, 50], [100, 100], [200, 200]],
+            Films::Real => &[[50, 200]],
+        }
+    }
 
-/// A unit with a tare alone, and after ten loads; why it could not be calibrated otherwise.
-struct Tested {
-    tared: ByForce,
-    calibrated: Result<ByForce>,
+    /// How they are calibrated: films of finite elements in every way.
+    fn benches(self) -> &'static [(Bench, &'static str)] {
+        match self {
+            Films::Nominal => &Bench::ALL[..1],
+            Films::Real => &Bench::ALL,
+        }
+    }
 }
 
-/// What `--json` prints.
+/// A unit with a tare alone, and after each bench's loads: its errors at each force, or why it
+/// could not be calibrated.
+type Tested = Vec<Result<Vec<Errors>>>;
+
+/// What all units say after one kind of calibration.
 #[derive(Serialize)]
-struct Report {
-    /// With a tare alone.
-    tared: Vec<Row>,
-    /// After ten loads.
-    rows: Vec<Row>,
+struct Row {
+    calibration: &'static str,
+    force_mn: [u32; 2],
+    units: usize,
+    without_model: usize,
+    /// Root mean squares of all presses, and medians over units of their own: degrees, mN, µm.
+    rms: [f64; 3],
+    median: [f64; 3],
+    /// Per cent of frames.
+    with_force: f64,
+    /// Per cent of forces: beyond three stated standard uncertainties in any part, and within the
+    /// stated 95 % of direction, |F| and place.
+    beyond: f64,
+    within: [f64; 3],
 }
 
 impl Units {
     /// Runs it.
-    ///
-    /// # Errors
-    /// When a file cannot be read or written, or a unit cannot be pressed.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        let calculix = match self.films {
-            Films::Nominal => return self.of_todays_tables(&weights, &model),
-            Films::Real => None,
-            Films::Calculix => Some(&self.calculix),
-        };
-        let study = RealFilms {
-            weights: &weights,
-            model: &model,
-            calculix,
-            presses: self.presses,
-        };
-        study.run(self.units, self.json)
-    }
-
-    fn of_todays_tables(&self, weights: &Weights, model: &Model<'_>) -> Result<()> {
-        let units = (0..self.units).into_par_iter();
-        let tested = units.map(|number| self.test(weights, model, number));
+        let tested = (0..self.units).into_par_iter().map(|number| {
+            let tested = self.test(&weights, &model, number);
+            tested.with_context(|| format!("unit {number}"))
+        });
         let tested: Vec<Tested> = tested.collect::<Result<_>>()?;
-        let calibrated: Vec<ByForce> = tested
-            .iter()
-            .filter_map(|unit| unit.calibrated.as_ref().ok().copied())
-            .collect();
-        let tared: Vec<ByForce> = tested.iter().map(|unit| unit.tared).collect();
-        if self.json {
-            let rows = |units: &[ByForce]| {
-                let forces = FORCES_MN.into_iter().enumerate();
-                forces
-                    .map(|(k, force_mn)| all(units, k).row(force_mn))
-                    .collect()
-            };
-            let report = Report {
-                tared: rows(&tared),
-                rows: rows(&calibrated),
-            };
-            println!("{}", serde_json::to_string(&report)?);
-            return Ok(());
+        let names = ["tare alone"].into_iter();
+        let names = names.chain(self.films.benches().iter().map(|(_, name)| *name));
+        let mut rows = Vec::new();
+        for (nth, name) in names.enumerate() {
+            for (k, force_mn) in self.films.forces_mn().iter().enumerate() {
+                rows.push(row((name, *force_mn), &tested, |unit| {
+                    Some(&unit[nth].as_ref().ok()?[k])
+                }));
+            }
         }
-        let mut text = table("a tare alone", &tared)?;
-        text += &table("ten loads", &calibrated)?;
-        for unit in &tested {
-            if let Err(error) = &unit.calibrated {
-                writeln!(text, "\nNot calibrated: {error:#}.")?;
+        if self.json {
+            return page::print_rows(&rows);
+        }
+        let mut text = table(&rows)?;
+        for (number, unit) in tested.iter().enumerate() {
+            for error in unit.iter().filter_map(|errors| errors.as_ref().err()) {
+                writeln!(text, "\nUnit {number} has no model: {error:#}.")?;
             }
         }
         print!("{text}");
-        page::write("units.md", include_str!("units.md"), &text)
+        match self.films {
+            Films::Nominal => page::write("units.md", include_str!("units.md"), &text),
+            Films::Real => page::write("real-films.md", include_str!("real.md"), &text),
+        }
     }
 
     fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Tested> {
-        let unit = TestedUnit::drawn(&model.conditions, number)?;
+        let unit = match self.films {
+            Films::Nominal => TestedUnit::drawn(&model.conditions, number)?,
+            Films::Real => TestedUnit::with_real_film(&model.conditions, number)?,
+        };
         let mut tared = unit.tare(model)?;
-        let of_tare = self.answers(&mut tared, &unit, number)?;
-        let calibrated = self.calibrated(weights, &unit, &mut tared, number);
-        Ok(Tested {
-            tared: of_tare,
-            calibrated: calibrated.with_context(|| format!("unit {number}")),
-        })
+        let mut tested = vec![Ok(self.answers(&mut tared, &unit, number)?)];
+        tested.extend(self.films.benches().iter().map(|(bench, name)| {
+            let own = bench.calibrate(weights, &unit, &mut tared, number);
+            let own = export(&own.with_context(|| format!("after {name}"))?)?;
+            let own = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
+            self.answers(&mut unit.tare(&own)?, &unit, number)
+        }));
+        Ok(tested)
     }
 
-    fn calibrated(
+    fn answers(
         &self,
-        weights: &Weights,
-        unit: &TestedUnit,
         tared: &mut Tared<'_>,
+        unit: &TestedUnit,
         number: u64,
-    ) -> Result<ByForce> {
-        let own = export(&own_weights(weights, unit, tared, number)?)?;
-        let model = Model::parse(&own).map_err(|error| anyhow!("{error}"))?;
-        self.answers(&mut unit.tare(&model)?, unit, number)
-    }
-
-    fn answers(&self, tared: &mut Tared<'_>, unit: &TestedUnit, number: u64) -> Result<ByForce> {
-        let mut all = ByForce::default();
-        for (errors, force_mn) in all.iter_mut().zip(FORCES_MN) {
+    ) -> Result<Vec<Errors>> {
+        let forces = self.films.forces_mn().iter();
+        let all = forces.map(|force_mn| {
+            let mut errors = Errors::default();
             for k in 0..self.presses {
-                let load = press(
-                    k + 1000 * number as u32,
-                    f64::from(force_mn) * 1e-3,
-                    REACH_MM,
-                )?;
+                let force_n = force_mn.map(|force| f64::from(force) * 1e-3);
+                let load = press(k + 1000 * number as u32, force_n, REACH_MM)?;
                 if unit.shows_all(&load)? {
                     let answer = tared.answer(unit, load, k.into())?;
                     errors.add(answer.force.as_ref(), &load)?;
                 }
             }
-        }
-        Ok(all)
+            Ok(errors)
+        });
+        all.collect()
     }
 }
 
-/// The weights for a unit after its ten loads; the number draws its gauge and its stage.
-///
-/// # Errors
-/// When its markers are not found, or no unit explains its loads.
-pub fn own_weights(
-    weights: &Weights,
-    unit: &TestedUnit,
-    tared: &mut Tared<'_>,
-    number: u64,
-) -> Result<Weights> {
-    Bench::Ten.calibrate(weights, unit, tared, number)
+fn row<'a>(
+    (calibration, force_mn): (&'static str, [u32; 2]),
+    units: &'a [Tested],
+    of: impl Fn(&'a Tested) -> Option<&'a Errors>,
+) -> Row {
+    let each: Vec<&Errors> = units.iter().filter_map(of).collect();
+    let median = |k: usize| {
+        let mut values: Vec<f64> = each.iter().map(|errors| errors.rms()[k]).collect();
+        values.sort_by(f64::total_cmp);
+        values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
+    };
+    let mut all = Errors::default();
+    each.iter().for_each(|errors| all.merge(errors));
+    let forces = f64::from(all.count);
+    Row {
+        calibration,
+        force_mn,
+        units: units.len(),
+        without_model: units.len() - each.len(),
+        rms: all.rms(),
+        median: [0, 1, 2].map(median),
+        with_force: 100.0 * forces / (forces + f64::from(all.refused)),
+        beyond: 100.0 * f64::from(all.beyond) / forces,
+        within: all.covered(),
+    }
 }
 
-/// All units together at the force with this index.
-fn all(units: &[ByForce], force: usize) -> Errors {
-    let mut sum = Errors::default();
-    units.iter().for_each(|unit| sum.merge(&unit[force]));
-    sum
-}
-
-fn table(name: &str, units: &[ByForce]) -> Result<String> {
-    let mut text = format!(
-        "\n{} units with {name}:\n\n| force | direction, rms | \\|F\\|, rms | place, rms | within \
-         the stated 95 %: direction, \\|F\\|, place | frames with a force | units within 0.45°, 1 \
-         mN and 30 µm |\n|--:|--:|--:|--:|---|--:|--:|\n",
-        units.len()
+fn table(rows: &[Row]) -> Result<String> {
+    let mut text = String::from(
+        "| calibration | force | direction, rms: all, median of units | \\|F\\| | place | frames \
+         with a force | beyond 3 stated σ | within the stated 95 %: direction, \\|F\\|, place | \
+         units without a model |\n|---|--:|--:|--:|--:|--:|--:|---|--:|\n",
     );
-    for (k, force_mn) in FORCES_MN.into_iter().enumerate() {
-        let errors = all(units, k);
-        let [direction, force, place] = errors.rms();
-        let [by_direction, by_force, by_place] = errors.covered();
-        let good = |unit: &&ByForce| {
-            let rms = unit[k].rms();
-            rms.iter().zip(GOOD).all(|(rms, good)| *rms <= good)
+    for row in rows {
+        let force = match row.force_mn {
+            [least, most] if least < most => format!("{least} to {most} mN"),
+            [force, _] => format!("{force} mN"),
         };
+        let ([a, b, c], [d, e, f], [x, y, z]) = (row.rms, row.median, row.within);
         writeln!(
             text,
-            "| {force_mn} mN | {direction:.2}° | {force:.2} mN | {place:.0} µm | \
-             {by_direction:.1}, {by_force:.1}, {by_place:.1} % | {} of {} | {} |",
-            errors.count,
-            errors.count + errors.refused,
-            units.iter().filter(good).count(),
+            "| {} | {force} | {a:.2}°, {d:.2}° | {b:.2}, {e:.2} mN | {c:.0}, {f:.0} µm | {:.1} % | \
+             {:.1} % | {x:.1}, {y:.1}, {z:.1} % | {} of {} |",
+            row.calibration, row.with_force, row.beyond, row.without_model, row.units,
         )?;
     }
     Ok(text)

@@ -5,12 +5,12 @@ use std::path::Path;
 
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::model::Model;
-use hivtac_twin::Load;
 use hivtac_twin::film::DiscMotion;
+use hivtac_twin::Load;
+use hivtac_sensor::force::model::Model;
 use serde_json::{Value, json};
 
-use super::own_weights;
+use super::Bench;
 use crate::anywhere::WEIGHTS;
 use crate::press::TestedUnit;
 
@@ -29,19 +29,21 @@ fn a_stretched_unit_is_written() {
     let weights = Weights::load(&root.join(WEIGHTS)).unwrap();
     let file = export(&weights).unwrap();
     let model = Model::parse(&file).unwrap();
-    let unit = TestedUnit::with_real_film(&model.conditions, NUMBER, None).unwrap();
+    let unit = TestedUnit::with_real_film(&model.conditions, NUMBER).unwrap();
     let mut tared = unit.tare(&model).unwrap();
-    let own = export(&own_weights(&weights, &unit, &mut tared, NUMBER).unwrap()).unwrap();
+    let own = export(
+        &Bench::Ten
+            .calibrate(&weights, &unit, &mut tared, NUMBER)
+            .unwrap(),
+    )
+    .unwrap();
     let loads = FORCES_N.map(|force_n| {
         let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
         load.with_offset_mm(PLACE_MM).unwrap()
     });
-    let states: Vec<Value> = [Load::REST]
-        .iter()
-        .chain(&loads)
-        .map(|load| state(&unit, load))
-        .collect();
-    let options = unit.scene().options();
+    let states = [Load::REST].iter().chain(&loads);
+    let states: Vec<Value> = states.map(|load| state(&unit, load)).collect();
+    let options = unit.scene.options();
     let told = json!({
         "shift_px": options.mounting.shift_px,
         "roll_deg": options.mounting.roll_deg,
@@ -57,10 +59,9 @@ fn a_stretched_unit_is_written() {
 
 /// How the film is under a load.
 fn state(unit: &TestedUnit, load: &Load) -> Value {
-    let pressed = unit
-        .pressed(load)
-        .expect("a film that is not the scene's")
-        .unwrap();
+    let load = unit.with_tip(*load).unwrap();
+    let pressed = unit.pressed(&load).unwrap();
+    let pressed = pressed.expect("a film that is not the scene's");
     let motion = |disc: DiscMotion| [disc.moved_mm, disc.along_x, disc.along_y];
     json!({
         "force_n": pressed.force_n,

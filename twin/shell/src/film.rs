@@ -38,17 +38,6 @@ pub enum Contact {
     },
 }
 
-/// One tip among several that press at once.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
-    /// Its force on the film, N; a press has F_z < 0.
-    pub force_n: [f64; 3],
-    /// Where it meets the film at rest, mm from the middle.
-    pub at_mm: [f64; 2],
-    /// Radius of the disc over which it spreads its force, mm.
-    pub radius_mm: f64,
-}
-
 /// Where a tip is and how large.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tip {
@@ -249,31 +238,6 @@ impl Film {
         };
         let solution = problem.solve(&self.solver, &start.unknowns)?;
         Ok(self.equilibrium(solution, force, &guided, tip))
-    }
-
-    /// The film under several tips at once, each with a force of its own, found from rest. What the
-    /// state calls its tip is where the design has it.
-    ///
-    /// # Errors
-    /// When a touch cannot be, or no equilibrium is found.
-    pub fn press_all(&self, touches: &[Touch]) -> Result<Equilibrium, ShellError> {
-        let (mut load, mut sum_n) = (vec![0.0; self.unknowns()], [0.0; 3]);
-        for touch in touches {
-            let force_n = finite("force", touch.force_n)?;
-            self.check_tip(touch.at_mm, touch.radius_mm)?;
-            let shares = tip_shares(self.shell.grid(), touch.at_mm, touch.radius_mm);
-            for (sum, part) in load.iter_mut().zip(weighted(&shares, &force_n)) {
-                *sum += part;
-            }
-            sum_n = [0, 1, 2].map(|i| sum_n[i] + force_n[i]);
-        }
-        let problem = Problem {
-            shell: &self.shell,
-            load,
-            guides: Vec::new(),
-        };
-        let solution = problem.solve(&self.solver, &self.rest.unknowns)?;
-        Ok(self.equilibrium(solution, sum_n, &[], self.own_tip()))
     }
 
     /// How the camera-side surface point of the mounted film at (x, y) mm is displaced from where
@@ -579,53 +543,6 @@ mod tests {
             let state = pressed(&film, Contact::Force(force));
             assert_eq!(state.force_n, force);
             close(state.reaction_n, force.map(|part| -part), 1e-9);
-        }
-    }
-
-    #[test]
-    fn tips_at_once_are_one_where_they_touch_the_same() {
-        let film = film(0.5);
-        let touch = |force_n, x: f64| Touch {
-            force_n,
-            at_mm: [x, 0.0],
-            radius_mm: 0.5,
-        };
-        let (part, whole) = ([0.01, 0.0, -0.04], [0.03, 0.0, -0.12]);
-        let rest = part.map(|component| 2.0 * component);
-        let once = pressed(&film, Contact::Force(whole));
-        let both = film
-            .press_all(&[touch(part, 0.0), touch(rest, 0.0)])
-            .unwrap();
-        close(both.force_n, whole, 1e-15);
-        close(both.tip_mm, once.tip_mm, 1e-8);
-        let apart = film
-            .press_all(&[touch(part, -2.0), touch(rest, 2.0)])
-            .unwrap();
-        close(apart.reaction_n, whole.map(|component| -component), 1e-9);
-        assert!(
-            apart.tip_mm[2] > once.tip_mm[2],
-            "spread, a load goes less deep"
-        );
-        assert!(film.press_all(&[touch(part, 13.0)]).is_err());
-    }
-
-    /// So weak that the film answers in proportion: each touch then adds what it does alone, at its
-    /// own place.
-    #[test]
-    fn faint_touches_add_up() {
-        let film = film(0.5);
-        let touches = [(-2.0, 1.0, 0.3), (3.0, -0.5, 0.8)].map(|(x, y, radius_mm)| Touch {
-            force_n: [2e-6 * x, 1e-6, -1e-5],
-            at_mm: [x, y],
-            radius_mm,
-        });
-        let both = film.press_all(&touches).unwrap();
-        let alone = touches.map(|touch| film.press_all(&[touch]).unwrap());
-        for place in [[-2.0, 1.0], [3.0, -0.5], [3.717, 3.717], [0.0, -6.0]] {
-            let [a, b] = [0, 1].map(|k| film.displacement(&alone[k], place));
-            let sum = [0, 1, 2].map(|i| a[i] + b[i]);
-            assert!(a[2] < 0.0 && b[2] < 0.0, "both press: {a:?} {b:?}");
-            close(film.displacement(&both, place), sum, 1e-3 * -sum[2]);
         }
     }
 

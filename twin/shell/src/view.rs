@@ -35,15 +35,10 @@ pub fn paper_camera() -> Result<Camera, ShellError> {
 
 /// The four markers of a film in a state.
 pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4] {
-    markers_on(|rest| film.displacement(state, rest), camera)
-}
-
-/// The four markers of a film whose camera side moves so: from a place at rest to its displacement,
-/// mm.
-pub fn markers_on(moved: impl Fn([f64; 2]) -> [f64; 3], camera: &Camera) -> [Marker; 4] {
+    let moved = |rest| film.displacement(state, rest);
     MARKERS.map(|disc| Marker {
-        moved_mm: disc_motion(&moved, &disc).moved_mm,
-        seen_px: disc.centroid_px(&moved, camera),
+        moved_mm: disc_motion(moved, &disc).moved_mm,
+        seen_px: disc.centroid_px(moved, camera),
     })
 }
 
@@ -57,23 +52,13 @@ pub fn pressed(
     state: &Equilibrium,
     discs: impl Iterator<Item = Disc>,
 ) -> Result<Pressed, ShellError> {
-    pressed_on(|point| film.displacement(state, point), discs)
-}
-
-/// The same of a film whose camera side moves so: from a place to its displacement, mm.
-///
-/// # Errors
-/// As [`pressed`].
-pub fn pressed_on(
-    moved: impl Fn([f64; 2]) -> [f64; 3],
-    discs: impl Iterator<Item = Disc>,
-) -> Result<Pressed, ShellError> {
+    let moved = |point| film.displacement(state, point);
     let camera = paper_camera()?;
     let mut pressed = Pressed::default();
     let places = pressed.centres_mm.iter_mut().zip(&mut pressed.discs);
     for ((centre_mm, motion), disc) in places.zip(discs) {
         *centre_mm = disc.centre_mm;
-        *motion = seen_motion(&moved, &disc, &camera);
+        *motion = seen_motion(moved, &disc, &camera);
     }
     Ok(pressed)
 }

@@ -19,20 +19,6 @@ pub struct Case {
     pub size: [u64; 2],
     /// Pixel format of that frame: `rgb565`, `yuv422` or `mono`.
     pub format: String,
-    /// What it is of the trade between speed and accuracy, if it belongs there.
-    #[serde(default)]
-    pub part: Option<Part>,
-}
-
-/// A part of the trade between speed and accuracy, or some of them together.
-#[derive(Clone, Debug, Deserialize)]
-pub struct Part {
-    /// How markers' positions are taken; nothing without a frame.
-    pub centroid: Option<String>,
-    /// The model's name.
-    pub model: String,
-    /// Size of its file.
-    pub bytes: u64,
 }
 
 /// What a case runs.
@@ -87,14 +73,6 @@ pub fn write(folder: &Path) -> Result<Vec<Case>> {
 pub fn write_frames(folder: &Path, times_us: &[u64]) -> Result<Vec<Case>> {
     let times: Vec<String> = times_us.iter().map(u64::to_string).collect();
     describe(folder, &times)
-}
-
-/// Writes what the trade between speed and accuracy is made of.
-///
-/// # Errors
-/// When they cannot be made.
-pub fn write_trade(folder: &Path) -> Result<Vec<Case>> {
-    describe(folder, &["tradeoff".to_owned()])
 }
 
 fn describe(folder: &Path, which: &[String]) -> Result<Vec<Case>> {

@@ -61,8 +61,6 @@ pub struct Measured {
     pub stages: BTreeMap<&'static str, Cost>,
     /// What happens once the last band of rows is there.
     pub last_band: Cost,
-    /// Whether the model is run then, and not before.
-    pub answers_last: bool,
     /// The loops of the network that multiply.
     pub inner_loop: Cost,
     /// How often a predictor that always guesses a block's usual successor is wrong.
@@ -139,7 +137,6 @@ impl Bench {
             inner_loop: self.inner_loop(&case, &record, &cycles)?,
             case,
             stages: parts,
-            answers_last: last_band.contains_key("network"),
             last_band: last_band.into_values().sum(),
             mispredictions: record.unusual_exits(),
             loads: Loads::of(&record),

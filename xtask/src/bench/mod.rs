@@ -17,7 +17,6 @@ mod peers;
 mod record;
 mod stages;
 mod tables;
-mod trade;
 
 use anyhow::Result;
 use clap::Args;
@@ -45,10 +44,6 @@ pub struct Bench {
     /// Draw the paper's Figure 14 and Table 1 with this sensor's rows, into docs.
     #[arg(long, conflicts_with_all = ["json", "write_baseline", "write_docs", "peers"])]
     paper: bool,
-    /// Count what the configurations of `hivtac-studies tradeoff` cost, into
-    /// studies/tradeoff/costs.json. With `--write-docs` docs/tradeoff.md follows.
-    #[arg(long, conflicts_with_all = ["json", "write_baseline", "peers", "paper"])]
-    tradeoff: bool,
     /// Measure on an STM32H743 that is attached by a debug probe instead.
     #[arg(long, conflicts_with_all = ["json", "write_baseline", "write_docs", "peers"])]
     board: bool,
@@ -75,15 +70,6 @@ impl Bench {
         }
         let folder = workspace::work_folder("bench")?;
         let mut bench = prepare(toolchain)?;
-        if self.tradeoff {
-            let measured = bench.measure_all(cases::write_trade(&folder)?)?;
-            trade::write(toolchain, &measured)?;
-            return if self.write_docs {
-                trade::write_documents()
-            } else {
-                Ok(())
-            };
-        }
         let measured = bench.measure_all(cases::write(&folder)?)?;
         let items = items::of(&measured);
         if self.paper {

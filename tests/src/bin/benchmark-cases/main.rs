@@ -3,11 +3,8 @@
 //! `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
 //! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
 //! board can hold of them it writes as `board.rs`, too, for `tests/board`.
-//! `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is
-//! made of (`trade`), and each line says the `"part"`, too. With times it writes the frames of the
-//! demo's scene at these times instead, for the figure over time.
-
-mod trade;
+//! With times it writes the frames of the demo's scene at these times instead, for the figure over
+//! time.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -47,10 +44,7 @@ fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
-    let folder = folder.context("usage: benchmark-cases FOLDER [tradeoff | MICROSECONDS …]")?;
-    if env::args().nth(2).as_deref() == Some("tradeoff") {
-        return trade::write_cases(&folder);
-    }
+    let folder = folder.context("usage: benchmark-cases FOLDER [MICROSECONDS …]")?;
     let times: Vec<u64> = env::args()
         .skip(2)
         .map(|word| word.parse().with_context(|| format!("the time `{word}`")))
