@@ -1,4 +1,4 @@
-//! The cameras of the presets, and where a point in space is seen.
+//! The simulated cameras of the presets: they give the place in the picture of a point in space.
 
 use hivtac_terms::geometry::Preset;
 
@@ -12,11 +12,12 @@ pub const FILM_DISTANCE_MM: f64 = 10.0;
 const PAPER_VIEW_DEG: f64 = 150.0;
 /// Width of the OV7725's picture: 640 pixels of 6 µm, in mm.
 const OV7725_WIDTH_MM: f64 = 3.84;
-/// Focal length of the lens on an MT9V034, mm: the markers stay within the rows that it reads out.
+/// Focal length of the lens on an MT9V034, mm. It keeps the markers within the rows that the chip
+/// reads out.
 const MT9V034_FOCAL_LENGTH_MM: f64 = 1.2;
-/// Its pixels of 6 µm, binned 2 × 2, mm.
+/// Pitch of the MT9V034's pixels, mm: 6 µm, binned 2 × 2.
 const MT9V034_PITCH_MM: f64 = 0.012;
-/// Its whole array of binned pixels: columns and rows.
+/// Columns and rows of the MT9V034's whole array of binned pixels.
 const MT9V034_ARRAY: [u32; 2] = [376, 240];
 
 /// The simulated camera of a preset.
@@ -24,10 +25,10 @@ pub trait PresetCamera {
     /// Columns and rows of its usual frame.
     fn usual_size(self) -> [u32; 2];
 
-    /// How it codes pixels by default.
+    /// The default pixel format.
     fn usual_format(self) -> Format;
 
-    /// What its markers are by default: black where it sees no colours.
+    /// The default markers: black if the camera sees no colours, otherwise red.
     fn usual_markers(self) -> Paint;
 
     /// Focal length of its lens, mm.
@@ -64,7 +65,7 @@ impl PresetCamera for Preset {
     }
 }
 
-/// Whether frames of a preset may have this size.
+/// Whether the preset's camera can give frames of this size.
 fn has_size(preset: Preset, width: u32, height: u32) -> bool {
     match preset {
         Preset::Paper | Preset::Ov7725 => {
@@ -88,11 +89,11 @@ fn pitch_mm(preset: Preset, width: u32, height: u32) -> f64 {
     }
 }
 
-/// Lens and picture: where a point in space is seen.
+/// A lens and a picture: together they give the place in the picture of a point in space.
 ///
-/// Usually an equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z), ρ the
-/// distance from the optical axis and Z the *axial* distance from the pinhole. The paper's eq. 15
-/// means this Z; its eq. 23 puts the slant distance √(ρ² + Z²) in its place, which is not a ray's
+/// By default an equidistant fisheye, r = f·θ (the paper's eq. 14), with θ = arctan(ρ / Z). ρ is
+/// the distance from the optical axis, Z the *axial* distance from the pinhole. The paper's eq. 15
+/// means this Z. Its eq. 23 uses the slant distance √(ρ² + Z²) instead, which does not give a ray's
 /// angle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
@@ -102,18 +103,18 @@ pub struct Camera {
     /// Focal length in pixels.
     focal_px: f64,
     projection: Projection,
-    /// Where the axis meets the picture, px.
+    /// The point where the optical axis meets the picture, px.
     axis_px: [f64; 2],
     /// Sine and cosine of the roll about the optical axis.
     roll: (f64, f64),
 }
 
 impl Camera {
-    /// The camera of a preset at a frame size: 4:3, 160×120 to 800×600; of `mt9v034` an even number
-    /// of columns and rows, 80×80 to 376×240.
+    /// Returns the camera of a preset at a frame size. Sizes are 4:3, 160×120 to 800×600. For
+    /// `mt9v034` they are an even number of columns and rows, 80×80 to 376×240.
     ///
     /// # Errors
-    /// When the size is another.
+    /// If the preset has no frames of this size.
     pub fn new(preset: Preset, width: u32, height: u32) -> Result<Camera, SceneError> {
         if !has_size(preset, width, height) {
             return Err(SceneError::Size {
@@ -133,7 +134,7 @@ impl Camera {
         })
     }
 
-    /// The same camera with another lens, mounted a little off.
+    /// Returns the same camera with this lens and this mounting.
     pub(crate) fn fitted(mut self, lens: &Lens, mounting: &Mounting) -> Camera {
         let preset_mm = pitch_mm(self.preset, self.width, self.height);
         let pitch_mm = lens.pitch_um.map_or(preset_mm, |um| um / 1000.0);
@@ -165,8 +166,8 @@ impl Camera {
         self.focal_px
     }
 
-    /// Where the point (x, y, z) mm of the film frame is seen, px. z > −10 mm: in front of the
-    /// pinhole.
+    /// Returns the place in the picture, px, of the point (x, y, z) mm of the film frame. z must be
+    /// > −10 mm: in front of the pinhole.
     pub fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let rho = (x * x + y * y).sqrt();
         if rho == 0.0 {
@@ -185,7 +186,7 @@ impl Camera {
         ]
     }
 
-    /// The angle from the optical axis at which a pixel looks, radians.
+    /// Returns the angle between the optical axis and a pixel's line of sight, radians.
     pub(crate) fn view_angle(&self, [x, y]: [f64; 2]) -> f64 {
         let (dx, dy) = (x - self.axis_px[0], y - self.axis_px[1]);
         let part = (dx * dx + dy * dy).sqrt() / self.focal_px;
@@ -196,12 +197,12 @@ impl Camera {
     }
 }
 
-/// Degrees to radians.
+/// Converts degrees to radians.
 pub(crate) fn radians(degrees: f64) -> f64 {
     degrees * (std::f64::consts::PI / 180.0)
 }
 
-/// The middle of `count` pixels whose first has its centre at 0.
+/// Returns the middle of `count` pixels; the centre of the first is at 0.
 pub(crate) fn centre(count: u32) -> f64 {
     (f64::from(count) - 1.0) / 2.0
 }
@@ -239,7 +240,7 @@ mod tests {
     #[test]
     fn projection_is_equidistant_with_the_axial_distance() {
         let camera = camera(Preset::Ov7725, 320);
-        // 10 mm aside at 10 mm axial distance is 45° off the axis.
+        // 10 mm from the axis at 10 mm axial distance is 45° off the axis.
         let [x, y] = camera.project([10.0, 0.0, 0.0]);
         assert!((x - 159.5 - 175.0 * radians(45.0)).abs() < 1e-9);
         assert!((y - 119.5).abs() < 1e-9);

@@ -1,4 +1,4 @@
-//! How much of each pixel a disc's image covers: exactly, then blurred by the lens.
+//! The part of each pixel that a disc's image covers: computed exactly, then blurred by the lens.
 
 use crate::disc::Outline;
 use crate::exposure::Image;
@@ -9,18 +9,19 @@ use crate::exposure::Image;
 /// row; summed along the row, the edges of a closed polygon leave exactly the covered area. A pixel
 /// (x, y) is the unit square around its centre (x, y).
 pub(crate) struct Coverage {
-    /// Column and row of the grid's first pixel; may lie outside the frame.
+    /// Column and row of the grid's first pixel. It may lie outside the frame.
     left: i64,
     top: i64,
     columns: usize,
-    /// Row by row.
+    /// The covered parts, row by row.
     parts: Vec<f64>,
 }
 
 impl Coverage {
-    /// The coverage by an image, as far as a frame of this size can see it.
+    /// Returns the coverage by an image, limited to what a frame of this size can see.
     pub(crate) fn of(image: &Image, width: u32, height: u32) -> Coverage {
-        // Room for what is blurred into the frame, and never a larger grid than it takes.
+        // The margin holds what is blurred into the frame; the grid is never larger than it needs
+        // to be.
         let margin = 4.0 * image.blur_px + 2.0;
         let fits = |outline: &Outline| {
             let (low, high) = outline.bounds();
@@ -37,9 +38,9 @@ impl Coverage {
         Coverage::mean(&clipped, image.blur_px)
     }
 
-    /// The mean coverage by polygons of finite corners, clockwise on the screen: one, or several
-    /// during an exposure. Blurred by a Gaussian of standard deviation `blur_px` ≥ 0 along x and
-    /// along y.
+    /// Returns the mean coverage by polygons with finite corners, clockwise on the screen. There is
+    /// one polygon, or several during an exposure. The result is blurred by a Gaussian of standard
+    /// deviation `blur_px` ≥ 0 along x and y.
     fn mean(outlines: &[Outline], blur_px: f64) -> Coverage {
         let margin = (3.0 * blur_px).ceil() as i64;
         let mut grid = Coverage::around(outlines, margin);
@@ -60,8 +61,8 @@ impl Coverage {
         grid
     }
 
-    /// An empty grid that holds the polygons and a margin, with one spare column that takes what
-    /// the last edges leave over.
+    /// Returns an empty grid that holds the polygons and a margin. One spare column takes what the
+    /// last edges carry to their right.
     fn around(outlines: &[Outline], margin: i64) -> Coverage {
         let start = ([0.0; 2], [0.0; 2]);
         let outlines = outlines
@@ -85,8 +86,8 @@ impl Coverage {
         }
     }
 
-    /// Convolves the grid with a bell along its rows, then along its columns. Outside the grid
-    /// nothing is covered.
+    /// Convolves the grid with a bell along its rows, then along its columns. Everything outside
+    /// the grid counts as uncovered.
     fn blur(&mut self, bell: &[f64]) {
         let columns = self.columns;
         let rows = self.parts.len() / columns;
@@ -109,8 +110,8 @@ impl Coverage {
         if y0 == y1 {
             return;
         }
-        // Edges downwards lie on the right of a clockwise polygon: what is on their right is
-        // outside.
+        // Edges that go down lie on the right of a clockwise polygon: the area on their right is
+        // outside it.
         let (sign, [xa, ya], [xb, yb]) = match y0 < y1 {
             true => (-weight, [x0, y0], [x1, y1]),
             false => (weight, [x1, y1], [x0, y0]),
@@ -124,7 +125,7 @@ impl Coverage {
         }
     }
 
-    /// Splits a piece within one row, spanning a signed height, at the borders between columns.
+    /// Splits a piece within one row, which spans a signed height, at the borders between columns.
     fn add_in_row(&mut self, row: usize, ends: [f64; 2], height: f64) {
         let (xa, xb) = (ends[0].min(ends[1]), ends[0].max(ends[1]));
         let cells = &mut self.parts[row * self.columns..][..self.columns];
@@ -141,20 +142,21 @@ impl Coverage {
             } else {
                 1.0
             };
-            // What lies right of the piece within this pixel, and what is left over for all pixels
-            // after it.
+            // The area on the right of the piece within this pixel, and the rest that goes to all
+            // pixels after it.
             let to_its_left = (left + right) / 2.0 - column as f64;
             cells[column] += height * part * (1.0 - to_its_left);
             cells[column + 1] += height * part * to_its_left;
         }
     }
 
-    /// A point of the picture in the grid's own coordinates, whose pixels begin at whole numbers.
+    /// Converts a point of the picture to the grid's coordinates, in which pixels begin at whole
+    /// numbers.
     fn in_grid(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [x + 0.5 - self.left as f64, y + 0.5 - self.top as f64]
     }
 
-    /// The covered pixels inside a frame: (index into the frame, covered part > 0).
+    /// Iterates over the covered pixels inside a frame: (index into the frame, covered part > 0).
     pub(crate) fn pixels(&self, width: u32, height: u32) -> impl Iterator<Item = (usize, f64)> {
         let (width, height) = (i64::from(width), i64::from(height));
         let rows = self.parts.chunks_exact(self.columns).zip(self.top..);
@@ -171,7 +173,7 @@ impl Coverage {
 /// Lowest and highest x and y.
 type Bounds = ([f64; 2], [f64; 2]);
 
-/// Weights of a Gaussian at whole pixels from −margin to margin; they add up to one.
+/// Returns the weights of a Gaussian at whole pixels from −margin to margin. They add up to one.
 fn bell(deviation: f64, margin: i64) -> Vec<f64> {
     let weight = |i: i64| {
         let z = i as f64 / deviation;
@@ -182,7 +184,8 @@ fn bell(deviation: f64, margin: i64) -> Vec<f64> {
     weights.into_iter().map(|weight| weight / sum).collect()
 }
 
-/// A line of parts convolved with a bell of odd length, nothing beyond its ends.
+/// Convolves a line of parts with a bell of odd length; beyond the ends of the line all parts are
+/// 0.
 fn convolved(line: &[f64], bell: &[f64]) -> Vec<f64> {
     let margin = bell.len() / 2;
     let mut blurred = vec![0.0; line.len() + 2 * margin];
@@ -237,7 +240,7 @@ mod tests {
         assert_eq!(parts, [(23, 0.5), (24, 0.5), (25, 0.5)]);
     }
 
-    /// Area, centroid and variance about it along x and along y.
+    /// Returns the area, the centroid, and the variances about it along x and along y.
     fn moments(image: &Outline, blur_px: f64) -> [f64; 5] {
         let grid = Coverage::mean(std::slice::from_ref(image), blur_px);
         let parts = || {
@@ -263,14 +266,14 @@ mod tests {
             }
             for (a, b) in sharp[3..].iter().zip(&soft[3..]) {
                 let added = (b - a) / (blur_px * blur_px);
-                // The bell ends at three deviations, and a narrow one falls between pixels.
+                // The bell is cut off at three deviations, and a narrow one falls between pixels.
                 let least = if blur_px < 1.0 { 0.85 } else { 0.95 };
                 assert!((least..1.01).contains(&added), "{blur_px}: {added}");
             }
         }
     }
 
-    /// The covered part of a pixel by brute force.
+    /// Returns the covered part of a pixel by brute force.
     fn sampled(inside: impl Fn(f64, f64) -> bool, x: i64, y: i64) -> f64 {
         const N: u32 = 64;
         let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(N) - 0.5;

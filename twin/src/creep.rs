@@ -1,41 +1,42 @@
-//! Creep and hysteresis: what the film remembers of its loads.
+//! Creep and hysteresis: the film remembers earlier loads, and its shape depends on them.
 //!
-//! A linear viscoelastic solid with a Prony series of two terms, in Fung's quasi-linear form (*Bio-
-//! mechanics: Mechanical Properties of Living Tissues*, 2nd ed., 1993, section 7.6; for the series
-//! Park and Schapery, *Int. J. Solids Struct.* 36, 1999): the film answers at each moment as the
-//! elastic film does to an effective load,
+//! The model is a linear viscoelastic solid with a Prony series of two terms, in Fung's
+//! quasi-linear form. See *Biomechanics: Mechanical Properties of Living Tissues*, 2nd ed., 1993,
+//! section 7.6, and for the series Park and Schapery, *Int. J. Solids Struct.* 36, 1999. At each
+//! moment the film takes the shape that an elastic film takes under an effective load:
 //!
 //! ```text
 //! F_eff = F + Σ part · q,    time · dq/dt = F − q,
 //! ```
 //!
-//! so that a load that is put on is first answered elastically and, held, goes on as if it grew by
-//! the sum of the parts. What remains of it when it is taken off dies away with the two times. Fung
-//! has it of stress at each point of a material; of a film that is shaped by its loads it is an
-//! approximation, that all of it lags alike.
+//! A load that is put on first gets the elastic answer. While it is held, the film moves on as if
+//! the load grew by the sum of the parts. After the load is taken off, the rest of it dies away
+//! with the two times. Fung's form is about the stress at each point of a material. For a film,
+//! whose shape depends on its loads, it is an approximation: all of the film lags alike.
 //!
-//! The load's moment lags as its components do, so that what remains acts where the loads were.
+//! The load's moment lags as its components do. The rest of a load therefore acts where the load
+//! was.
 
 use crate::options::all_within;
 use crate::{Load, SceneError};
 
-/// The largest part.
+/// The largest value of a part.
 const MOST: f64 = 0.15;
-/// Times, s.
+/// Shortest and longest time, s.
 const TIMES_S: [f64; 2] = [0.01, 1000.0];
-/// For so long at most a load of a motion is taken as changing steadily, s.
+/// The longest step, s, within which the load of a motion is taken as changing at a constant rate.
 const STEP_S: f64 = 0.005;
-/// What is longer ago than so many of the longer time is forgotten: e⁻²⁰.
+/// Loads older than this many times the longer time are forgotten: e⁻²⁰ of them is left.
 const TIMES_REMEMBERED: f64 = 20.0;
 
-/// How much of its loads a film remembers, and for how long. The default is an elastic film.
+/// The share of its loads that a film remembers, and for how long. The default is an elastic film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Creep {
-    /// By which parts of itself a held load grows, 0 to 0.15 each.
+    /// The parts of itself by which a held load grows, 0 to 0.15 each.
     pub parts: [f64; 2],
-    /// Within which times, s, 0.01 to 1000.
+    /// The times in which it grows by them, s, 0.01 to 1000.
     pub times_s: [f64; 2],
 }
 
@@ -48,7 +49,7 @@ impl Default for Creep {
     }
 }
 
-/// F_x, F_y, F_z, N, and F_z·x, F_z·y, N·mm: what lags.
+/// The quantities that lag: F_x, F_y, F_z, N, and F_z·x, F_z·y, N·mm.
 type Resultant = [f64; 5];
 
 /// A film's memory at one moment.
@@ -59,7 +60,8 @@ pub struct Memory {
 }
 
 impl Creep {
-    /// Half of a part within half a second, half of it within twenty seconds.
+    /// Splits `part` in two halves: one comes within half a second, the other within twenty
+    /// seconds.
     pub fn of(part: f64) -> Creep {
         Creep {
             parts: [part / 2.0; 2],
@@ -67,7 +69,7 @@ impl Creep {
         }
     }
 
-    /// The memory of a film that nothing ever pressed.
+    /// Returns the memory of a film that was never pressed.
     pub fn unpressed(self) -> Memory {
         Memory {
             creep: self,
@@ -76,7 +78,7 @@ impl Creep {
     }
 
     /// # Errors
-    /// When parts or times are outside their ranges.
+    /// If parts or times are outside their ranges.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         all_within("parts", self.parts, [0.0, MOST])?;
         all_within("times_s", self.times_s, TIMES_S)
@@ -86,14 +88,15 @@ impl Creep {
         self.parts == [0.0; 2]
     }
 
-    /// How many times a load has grown that was put on at once and is held for so long, s.
+    /// Returns the factor by which a load has grown that was put on at once and held for `held_s`
+    /// seconds.
     pub fn grown(&self, held_s: f64) -> f64 {
         let terms = self.parts.iter().zip(self.times_s);
         let grown = terms.map(|(part, time_s)| part * (1.0 - libm::exp(-held_s / time_s)));
         1.0 + grown.sum::<f64>()
     }
 
-    /// What a held load grows to.
+    /// Returns the load to which a held load grows in the end.
     pub(crate) fn at_last(&self, load: &Load) -> Load {
         if self.is_elastic() {
             return *load;
@@ -105,7 +108,7 @@ impl Creep {
         })
     }
 
-    /// The memory at a time, s, of loads from time 0 on.
+    /// Returns the memory at a time, s, of loads from time 0 on.
     pub(crate) fn memory(self, time_s: f64, load: impl Fn(f64) -> Load) -> Memory {
         let [one, other] = self.times_s;
         let forgotten_s = time_s - TIMES_REMEMBERED * one.max(other);
@@ -114,7 +117,7 @@ impl Creep {
 }
 
 impl Memory {
-    /// Lets a time pass, s, > 0, in which the load changes steadily from one to another.
+    /// Lets a time > 0, s, pass, in which the load changes at a constant rate from one to another.
     pub fn pass(&mut self, from: &Load, to: &Load, after_s: f64) {
         if after_s <= 0.0 {
             return;
@@ -123,14 +126,15 @@ impl Memory {
         for (lagging, time_s) in self.lagging.iter_mut().zip(self.creep.times_s) {
             let left = libm::exp(-after_s / time_s);
             for (part, (from, to)) in lagging.iter_mut().zip(from.iter().zip(to)) {
-                // Of a load that changes steadily it comes to be this far behind.
+                // For a load that changes at a constant rate, the lag approaches this value.
                 let behind = (to - from) * time_s / after_s;
                 *part = to - behind + (*part - from + behind) * left;
             }
         }
     }
 
-    /// The memory at a later time, s, of loads in time. Before time 0 nothing presses.
+    /// Returns the memory at a later time, s, of loads as a function of time. Before time 0 there
+    /// is no load.
     pub(crate) fn after(mut self, from_s: f64, to_s: f64, load: impl Fn(f64) -> Load) -> Memory {
         let from_s = from_s.max(0.0);
         if self.creep.is_elastic() || !to_s.is_finite() || to_s <= from_s {
@@ -147,7 +151,8 @@ impl Memory {
         self
     }
 
-    /// The load to which the elastic film answers as this one does to a load.
+    /// Returns the effective load: under it an elastic film has the shape that this film has under
+    /// `load`.
     pub fn effective(&self, load: &Load) -> Load {
         if self.creep.is_elastic() {
             return *load;
@@ -159,7 +164,7 @@ impl Memory {
             }
         }
         let [x, y, z, right, down] = sum;
-        // All loads press, and so does what is left of them.
+        // All loads press, and what is left of them presses as well.
         let force = Load::from_vector([x, y, z]).unwrap_or(Load::REST);
         let placed = force.with_offset_mm([right / z, down / z]);
         let placed = placed.unwrap_or(force);
@@ -213,14 +218,14 @@ mod tests {
             let [short, long] = [0.5f64, 20.0]
                 .map(|time_s| libm::exp(-after_s / time_s) - libm::exp(-(10.0 + after_s) / time_s));
             let expected = 0.1 * (0.04 * short + 0.1 * long);
-            // Where the load is taken off, it falls within a step.
+            // The load is taken off within one step, and falls in it.
             assert!((left.magnitude_n() / expected - 1.0).abs() < 0.01);
             near(left.offset_mm()[1], -1.0);
         }
         near(creep.at_last(&press(0.1)).magnitude_n(), 0.114);
     }
 
-    /// The loss factor of the series at a frequency.
+    /// Returns the loss factor of the series at a frequency.
     #[test]
     fn a_sine_lags_as_a_standard_solid_does() {
         let creep = Creep::of(0.1);

@@ -1,4 +1,4 @@
-//! Discs on the film and their images.
+//! Discs on the film, such as the markers, and their images.
 
 use std::f64::consts::PI;
 
@@ -14,14 +14,14 @@ pub const MARKERS: [Disc; 4] = [
     Disc::marker(MARKER_CENTRES_MM[3]),
 ];
 
-/// Corners of the polygon that stands for a disc's image. Its centroid is then off by less than
-/// 1e-4 px.
+/// Number of corners of the polygon that stands for a disc's image. The error of its centroid is
+/// less than 1e-4 px.
 const CORNERS: u32 = 48;
-/// Discs of a smaller radius, mm, make do with fewer corners: they are specks of a few pixels.
+/// Discs with a smaller radius, mm, have fewer corners: they are specks of a few pixels.
 const SPECK_RADIUS_MM: f64 = 0.15;
 const SPECK_CORNERS: u32 = 12;
 
-/// A disc drawn on the film at rest; it follows the film.
+/// A disc drawn on the film. It moves with the film; its fields hold for the film at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// Centre at rest, mm.
@@ -31,7 +31,7 @@ pub struct Disc {
 }
 
 impl Disc {
-    /// A marker with its centre there, mm.
+    /// Returns a marker with its centre at a place, mm.
     pub const fn marker(centre_mm: [f64; 2]) -> Disc {
         Disc {
             centre_mm,
@@ -39,7 +39,7 @@ impl Disc {
         }
     }
 
-    /// The same disc farther along x and y, mm.
+    /// Returns the same disc, shifted along x and y, mm.
     pub(crate) fn moved(&self, [x, y]: [f64; 2]) -> Disc {
         Disc {
             centre_mm: [self.centre_mm[0] + x, self.centre_mm[1] + y],
@@ -47,7 +47,7 @@ impl Disc {
         }
     }
 
-    /// The centroid of the disc's image, px, on a film that moves its points (mm) by
+    /// Returns the centroid of the disc's image, px, on a film whose points (mm) move by
     /// `displacement`.
     pub fn centroid_px(
         &self,
@@ -57,8 +57,8 @@ impl Disc {
         self.image(displacement, camera).area_and_centroid().1
     }
 
-    /// The disc's image on a film that moves its points (mm) by `displacement`: the image of its
-    /// rim, not of its centre.
+    /// Returns the disc's image on a film whose points (mm) move by `displacement`. It is the image
+    /// of the disc's rim, not of its centre.
     pub(crate) fn image(
         &self,
         displacement: impl Fn([f64; 2]) -> [f64; 3],
@@ -75,7 +75,7 @@ impl Disc {
     }
 }
 
-/// Corners of a regular polygon of the circle's area.
+/// Returns the corners of a regular polygon with the circle's area.
 fn rim([x, y]: [f64; 2], radius: f64) -> impl Iterator<Item = [f64; 2]> {
     let corners = if radius < SPECK_RADIUS_MM {
         SPECK_CORNERS
@@ -97,13 +97,13 @@ pub(crate) struct Outline {
 }
 
 impl Outline {
-    /// Its edges, each from a corner to the next, closed.
+    /// Iterates over the edges of the closed polygon, each from a corner to the next.
     pub(crate) fn edges(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> {
         let next = self.corners.iter().cycle().skip(1);
         self.corners.iter().copied().zip(next.copied())
     }
 
-    /// Smallest and largest x and y.
+    /// Returns the smallest and the largest x and y.
     pub(crate) fn bounds(&self) -> ([f64; 2], [f64; 2]) {
         let start = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         self.corners.iter().fold(start, |(low, high), corner| {
@@ -114,7 +114,7 @@ impl Outline {
         })
     }
 
-    /// Area in px²; 0 without corners.
+    /// Returns the area in px²; 0 without corners.
     pub(crate) fn area(&self) -> f64 {
         if self.corners.is_empty() {
             return 0.0;
@@ -122,8 +122,8 @@ impl Outline {
         self.area_and_centroid().0
     }
 
-    /// Area in px² and its centroid in px. There must be corners; without an area the centroid is
-    /// no number.
+    /// Returns the area in px² and the centroid in px. There must be corners; with an area of 0 the
+    /// centroid is NaN.
     pub(crate) fn area_and_centroid(&self) -> (f64, [f64; 2]) {
         // Moments about a corner, so that no digits are lost far from the origin.
         let [ox, oy] = self.corners[0];
@@ -139,8 +139,8 @@ impl Outline {
         (twice_area / 2.0, centroid)
     }
 
-    /// The part of it inside a frame with a margin around it, px; without corners where there is
-    /// none.
+    /// Returns the part of the outline inside a frame with a margin around it, px. The result has
+    /// no corners if no part is inside.
     pub(crate) fn clipped(&self, width: u32, height: u32, margin: f64) -> Outline {
         let before = 0.5 + margin;
         let right = f64::from(width) - 0.5 + margin;
@@ -151,7 +151,7 @@ impl Outline {
             .clip_half(|[_, y]| bottom - y)
     }
 
-    /// Moved as a whole, px.
+    /// Returns the outline shifted as a whole, px.
     pub(crate) fn moved(mut self, [dx, dy]: [f64; 2]) -> Outline {
         for corner in &mut self.corners {
             *corner = [corner[0] + dx, corner[1] + dy];
@@ -159,7 +159,8 @@ impl Outline {
         self
     }
 
-    /// The part where `inside` (a signed distance) is not negative (Sutherland and Hodgman).
+    /// Returns the part where `inside` (a signed distance) is not negative (Sutherland and
+    /// Hodgman).
     fn clip_half(&self, inside: impl Fn([f64; 2]) -> f64) -> Outline {
         let mut corners = Vec::with_capacity(self.corners.len() + 1);
         for (a, b) in self.edges() {
@@ -207,9 +208,9 @@ mod tests {
         assert!(outside.corners.is_empty());
     }
 
-    /// Centroid of a resting disc's image on the diagonal, mm from the axis, by a sum over the
-    /// disc: every part of the film counts by the area of its image, r·r′/ρ with r = f·arctan(ρ /
-    /// D).
+    /// Returns the distance from the axis, mm, of the centroid of a resting disc's image on the
+    /// diagonal. It is a sum over the disc: each part of the film counts by the area of its image,
+    /// r·r′/ρ with r = f·arctan(ρ / D).
     fn centroid_radius_mm(centre_mm: f64, radius_mm: f64) -> f64 {
         const N: i32 = 400;
         let at = |i: i32| (f64::from(i) + 0.5) / f64::from(N) * radius_mm;

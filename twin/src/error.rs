@@ -1,4 +1,4 @@
-//! What can be wrong with a scene.
+//! The errors of a scene.
 
 use std::fmt;
 
@@ -6,26 +6,26 @@ use crate::film::FilmError;
 
 use crate::{Motion, Preset, PresetCamera};
 
-/// A scene, size, load or option that cannot be simulated. The message says what, where and what is
-/// possible.
+/// An error of a scene, size, load or option that cannot be simulated. The message names the item,
+/// the cause and the possible values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SceneError {
-    /// No scene of this name.
+    /// There is no scene with this name.
     UnknownScene(String),
-    /// No pixel format of this name.
+    /// There is no pixel format with this name.
     UnknownFormat(String),
     /// A frame size that the simulated camera does not have.
     Size {
-        /// Whose camera.
+        /// The preset of the camera.
         preset: Preset,
-        /// Columns asked for.
+        /// Columns that the caller asked for.
         width: u32,
-        /// Rows asked for.
+        /// Rows that the caller asked for.
         height: u32,
     },
-    /// A load or a film that cannot be.
+    /// A load or a film that is impossible.
     Film(FilmError),
-    /// A scene file that is not one: the line, the key and what is possible.
+    /// An invalid scene file: the message has the line, the key and the possible values.
     #[cfg(feature = "file")]
     File(String),
     /// A key of a scene file whose value does not fit the others.
@@ -33,7 +33,7 @@ pub enum SceneError {
     Key {
         /// The key.
         key: &'static str,
-        /// Why not.
+        /// The reason.
         why: String,
     },
     /// An option outside its range.
@@ -42,7 +42,7 @@ pub enum SceneError {
         name: &'static str,
         /// The value given.
         value: f64,
-        /// The smallest and the largest value that is possible.
+        /// The smallest and the largest possible value.
         range: [f64; 2],
     },
 }

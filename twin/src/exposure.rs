@@ -1,5 +1,4 @@
-//! The images that discs leave in one frame: where they are while their rows are exposed, and how
-//! sharp.
+//! The images of discs in one frame: their places while their rows are exposed, and their blur.
 
 use crate::camera::centre;
 use crate::disc::Outline;
@@ -7,14 +6,14 @@ use crate::film::{Film, Pressed};
 use crate::lens::Discs;
 use crate::{Camera, Disc, FILM_DISTANCE_MM, Lens, Load, MarkerTruth, Mechanics, Shutter};
 
-/// Everything that decides where discs are seen.
+/// All that decides the places of discs in a picture.
 pub(crate) struct Exposure<'a, L: Fn(f64) -> Load> {
     pub(crate) film: &'a Film,
     pub(crate) mechanics: &'a Mechanics,
     pub(crate) camera: &'a Camera,
     pub(crate) lens: &'a Lens,
     pub(crate) shutter: &'a Shutter,
-    /// The load at a time in seconds from the frame's.
+    /// The load at a time in seconds, relative to the frame's time.
     pub(crate) load: L,
     /// The film at the frame's time.
     pub(crate) now: Pressed,
@@ -23,14 +22,14 @@ pub(crate) struct Exposure<'a, L: Fn(f64) -> Load> {
 /// The image of one disc.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Image {
-    /// Its outlines during the exposure, at least one.
+    /// The disc's outlines during the exposure, at least one.
     pub(crate) outlines: Vec<Outline>,
-    /// Standard deviation of its blur.
+    /// Standard deviation of the blur.
     pub(crate) blur_px: f64,
 }
 
 impl<L: Fn(f64) -> Load> Exposure<'_, L> {
-    /// The image of a disc.
+    /// Returns the image of a disc.
     pub(crate) fn image(&self, disc: &Disc) -> Image {
         let now = self.outline(disc, &self.now);
         let still = *self.shutter == Shutter::default();
@@ -44,7 +43,8 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
         }
     }
 
-    /// The outlines while the row is exposed in which the disc is seen at the frame's time.
+    /// Returns the outlines during the exposure of the row in which the disc appears at the frame's
+    /// time.
     fn smeared(&self, disc: &Disc, now: &Outline) -> Vec<Outline> {
         let (_, [_, row]) = now.area_and_centroid();
         let height = f64::from(self.camera.height());
@@ -77,7 +77,7 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
     }
 }
 
-/// Where a disc's centre is on a pressed film, mm.
+/// Returns the position of a disc's centre on a pressed film, mm.
 fn centre_mm(disc: &Disc, film: &Pressed) -> [f64; 3] {
     let [x, y] = disc.centre_mm;
     let [dx, dy, dz] = film.displacement([x, y]);
@@ -85,7 +85,7 @@ fn centre_mm(disc: &Disc, film: &Pressed) -> [f64; 3] {
 }
 
 impl Image {
-    /// Its mean area and centroid; `None` where no part of it is in the frame.
+    /// Returns the image's mean area and centroid. Returns `None` if no part of it is in the frame.
     pub(crate) fn truth(&self, camera: &Camera) -> Option<MarkerTruth> {
         let (mut area, mut inside, mut moment) = (0.0, 0.0, [0.0; 2]);
         for outline in &self.outlines {

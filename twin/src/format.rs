@@ -1,7 +1,7 @@
-//! Pixel formats: how the camera codes what it sees.
+//! Pixel formats: how the camera codes a picture.
 //!
-//! Colours of YUV422 and JPEG follow BT.601 in full range, 0 to 255 in all three numbers, as JFIF
-//! has it and as OmniVision's sensors send when their output range is set to 00–FF:
+//! Colours of YUV422 and JPEG follow BT.601 in full range, 0 to 255 in all three numbers. JFIF does
+//! it in this way, and so do OmniVision's sensors with their output range set to 00–FF:
 //!
 //! ```text
 //! Y  = 0.299 R + 0.587 G + 0.114 B
@@ -23,27 +23,27 @@ pub enum Format {
     #[default]
     Rgb565,
     /// YUYV, one `u16` per pixel as two bytes of the bus lie in little-endian memory: luma in the
-    /// low byte, chroma in the high byte, Cb in even columns and Cr in odd ones; both are the mean
-    /// of the pair. Read as a little-endian `u32`, a pair has its Cr in the top byte. A marker's Cr
-    /// is 191, the film's 132.
+    /// low byte, chroma in the high byte. Cb is in even columns and Cr in odd ones; both are the
+    /// mean of the pair. Read as a little-endian `u32`, a pair has its Cr in the top byte. A
+    /// marker's Cr is 191, the film's 132.
     Yuv422,
-    /// One byte per pixel: a monochrome sensor, to which [`Options::mono`](crate::Options::mono)
-    /// says how red, green and blue count. Behind a green filter, or in green light, red markers
+    /// One byte per pixel, from a monochrome sensor. [`Options::mono`](crate::Options::mono) has
+    /// its weights of red, green and blue. Behind a green filter, or in green light, red markers
     /// are *dark*: 36 against the film's 141. (Without the filter red tape has half of the film's
     /// luma, behind a red one all of it.)
     Mono,
-    /// The picture compressed and decompressed again, then coded as [`Format::Rgb565`]: what a
-    /// computer works on that has a JPEG camera, as the paper's was. Chroma has half the resolution
-    /// each way.
+    /// The picture compressed and decompressed again, then coded as [`Format::Rgb565`]. A computer
+    /// with a JPEG camera, as the paper's, works on such pictures. Chroma has half the resolution
+    /// in each direction.
     #[cfg(feature = "jpeg")]
     Jpeg {
-        /// 1 to 100, as the Independent JPEG Group counts; cameras use 70 to 95.
+        /// Quality 1 to 100, on the scale of the Independent JPEG Group; cameras use 70 to 95.
         quality: u8,
     },
 }
 
 impl Format {
-    /// Its name in files and on the command line: `rgb565`, `yuv422`, `mono` or `jpeg`.
+    /// Returns the name in files and on the command line: `rgb565`, `yuv422`, `mono` or `jpeg`.
     pub fn name(self) -> &'static str {
         match self {
             Format::Rgb565 => "rgb565",
@@ -54,7 +54,7 @@ impl Format {
         }
     }
 
-    /// Codes a picture of a width, row by row, its channels not yet clipped.
+    /// Codes a picture of a width, row by row. Its channels are not yet clipped.
     #[cfg_attr(not(feature = "jpeg"), expect(unused_variables))]
     pub(crate) fn code(self, width: u32, picture: impl Iterator<Item = [Channel; 3]>) -> Raster {
         let clipped = |channel: Channel| channel.clamp(Channel::default(), WHITE);
@@ -73,7 +73,7 @@ impl Format {
     }
 }
 
-/// The quality of `jpeg` when none is given.
+/// The default quality of `jpeg`.
 #[cfg(feature = "jpeg")]
 pub const JPEG_QUALITY: u8 = 85;
 
@@ -100,17 +100,17 @@ impl FromStr for Format {
     }
 }
 
-/// The nearest 8-bit level.
+/// Returns the nearest 8-bit level.
 fn level(channel: Channel) -> u8 {
     channel.rounded() as u8
 }
 
-/// A channel of a whole level.
+/// Returns the channel of a whole level.
 fn of_level(level: u8) -> Channel {
     Q::from_bits(i32::from(level) << 6)
 }
 
-/// RGB565 from channels, 0 to white, rounded to the nearest code.
+/// Returns RGB565 from channels, 0 to white, rounded to the nearest code.
 fn rgb565([red, green, blue]: [Channel; 3]) -> u16 {
     let white = WHITE.bits() as u32;
     let code =
@@ -118,19 +118,19 @@ fn rgb565([red, green, blue]: [Channel; 3]) -> u16 {
     (code(red, 31) << 11 | code(green, 63) << 5 | code(blue, 31)) as u16
 }
 
-/// RGB565 from 8-bit levels, rounded to the nearest code.
+/// Returns RGB565 from 8-bit levels, rounded to the nearest code.
 pub(crate) fn rgb565_of_levels(levels: [u8; 3]) -> u16 {
     rgb565(levels.map(of_level))
 }
 
-/// RGB565 to 8-bit levels, its upper bits repeated below.
+/// Returns the 8-bit levels of an RGB565 code; the upper bits are repeated in the low ones.
 pub(crate) fn levels_of_rgb565(pixel: u16) -> [u8; 3] {
     let five = |v: u16| ((v << 3) | (v >> 2)) as u8;
     let six = |v: u16| ((v << 2) | (v >> 4)) as u8;
     [five(pixel >> 11), six((pixel >> 5) & 63), five(pixel & 31)]
 }
 
-/// Pairs of pixels as Y₀ Cb, Y₁ Cr. Rows have an even number of pixels.
+/// Codes pairs of pixels as Y₀ Cb, Y₁ Cr. Rows have an even number of pixels.
 fn yuyv(picture: impl Iterator<Item = [Channel; 3]>) -> Vec<u16> {
     let pixels: Vec<_> = picture.collect();
     let (pairs, _) = pixels.as_chunks::<2>();
@@ -146,7 +146,7 @@ fn word(low: u8, high: u8) -> u16 {
     u16::from_le_bytes([low, high])
 }
 
-/// Weights of the channels; they add up to one.
+/// Weights of the channels in the luma. They add up to one.
 const LUMA: [Q<16>; 3] = [
     Q::from_bits(19_595),
     Q::from_bits(38_470),
@@ -166,7 +166,7 @@ fn luma(pixel: [Channel; 3]) -> u8 {
     level(luma_channel(pixel))
 }
 
-/// Cb and Cr.
+/// Returns Cb and Cr.
 fn chroma(pixel: [Channel; 3]) -> [u8; 2] {
     let luma = luma_channel(pixel);
     let scaled = |channel: Channel, scale: Q<16>| {
@@ -176,11 +176,11 @@ fn chroma(pixel: [Channel; 3]) -> [u8; 2] {
     [scaled(pixel[2], CB_SCALE), scaled(pixel[0], CR_SCALE)]
 }
 
-/// Two words of YUYV to 8-bit red, green and blue of their two pixels.
+/// Returns the 8-bit red, green and blue of the two pixels in two words of YUYV.
 pub(crate) fn levels_of_yuyv(pair: [u16; 2]) -> [[u8; 3]; 2] {
     let [[y0, cb], [y1, cr]] = pair.map(|word| word.to_le_bytes().map(i32::from));
     let (cb, cr) = (cb - 128, cr - 128);
-    // 1.402, 0.344, 0.714 and 1.772 in 1/65,536.
+    // The factors 1.402, 0.344, 0.714 and 1.772 in 1/65,536.
     let red = (91_881 * cr) >> 16;
     let green = -((22_554 * cb + 46_802 * cr) >> 16);
     let blue = (116_130 * cb) >> 16;
@@ -250,7 +250,7 @@ mod tests {
         fn yuyv_of_a_pair_of_one_colour_gives_it_back(levels: [u8; 3]) {
             for pixel in levels_of_yuyv(pair(levels)) {
                 for c in 0..3 {
-                    // Three numbers rounded, each times at most 1.772.
+                    // The error of three rounded numbers, each times at most 1.772.
                     prop_assert!(pixel[c].abs_diff(levels[c]) <= 2, "{pixel:?} for {levels:?}");
                 }
             }

@@ -1,25 +1,25 @@
-//! A rendered frame and the truth behind it.
+//! A rendered frame and its ground truth.
 
 use std::borrow::Cow;
 
 use crate::format::{levels_of_rgb565, levels_of_yuyv, rgb565_of_levels};
 use crate::{Format, Load};
 
-/// One exposure with what is true of it.
+/// One exposure with its ground truth.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// Columns.
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// How its pixels are coded.
+    /// The code of its pixels.
     pub format: Format,
-    /// Row by row, `width · height` of them, coded as [`Format`] says, in native order; none in
-    /// [`Format::Mono`].
+    /// Pixels row by row, `width · height` of them, coded as [`Format`] defines, in native order.
+    /// Empty in [`Format::Mono`].
     pub pixels: Vec<u16>,
-    /// Row by row, `width · height` of them, in [`Format::Mono`]; otherwise none.
+    /// Pixels row by row, `width · height` of them, in [`Format::Mono`]; empty in other formats.
     pub mono: Vec<u8>,
-    /// What is true of it.
+    /// The ground truth.
     pub truth: Truth,
 }
 
@@ -46,48 +46,48 @@ impl Raster {
     }
 }
 
-/// What is true of a scene at one moment.
+/// The ground truth of a scene at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Truth {
-    /// The load as it is labelled: what a stage and its gauge say.
+    /// The load as it is labelled, by a stage and its gauge.
     pub force: Load,
-    /// The tip's force on the film, N: the label's in the contact reading `force`, another one
-    /// otherwise.
+    /// The tip's force on the film, N. It equals the label's force in the contact reading `force`,
+    /// and differs otherwise.
     pub on_film_n: [f64; 3],
-    /// Where the tip went, mm, film frame.
+    /// The tip's displacement, mm, film frame.
     pub tip_mm: [f64; 3],
-    /// Which point of the film the tip is on, by where that rests, mm from the middle; `None`
-    /// without a force.
+    /// The point of the film that the tip touches, given by its place at rest, mm from the middle.
+    /// `None` without a force.
     pub touches_mm: Option<[f64; 2]>,
-    /// The markers by identity; `None` where a marker is missing or no part of it is in the frame.
+    /// The markers by identity; `None` if a marker is missing or no part of it is in the frame.
     pub markers: [Option<MarkerTruth>; 4],
 }
 
-/// What is true of one marker's image. Patches over it are not taken off.
+/// The ground truth of one marker's image. Patches over it are not subtracted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkerTruth {
-    /// Centroid of the disc's whole image in this frame, as its shutter exposes it, px; the centre
+    /// Centroid of the disc's whole image in this frame, as its shutter exposes it, px. The centre
     /// of pixel (0, 0) is the origin.
     pub centroid_px: [f64; 2],
     /// Area of the disc's whole image, px².
     pub area_px2: f64,
-    /// The part of that area inside the frame: 1 where the border does not cut it, > 0.
+    /// The part of that area inside the frame, > 0; 1 if the border does not cut it.
     pub visible: f64,
 }
 
 impl Frame {
-    /// The rows of [`Self::pixels`] from top to bottom; none in [`Format::Mono`].
+    /// Iterates over the rows of [`Self::pixels`] from top to bottom; no rows in [`Format::Mono`].
     pub fn rows(&self) -> impl Iterator<Item = &[u16]> {
         self.pixels.chunks_exact(self.width as usize)
     }
 
-    /// The rows of [`Self::mono`] from top to bottom; none in the other formats.
+    /// Iterates over the rows of [`Self::mono`] from top to bottom; no rows in the other formats.
     pub fn mono_rows(&self) -> impl Iterator<Item = &[u8]> {
         self.mono.chunks_exact(self.width as usize)
     }
 
-    /// The frame as 16-bit words: [`Self::pixels`], or two pixels of [`Self::mono`] in each, the
-    /// left one below.
+    /// Returns the frame as 16-bit words: [`Self::pixels`], or two pixels of [`Self::mono`] in each
+    /// word, the left one in the low byte.
     pub fn words(&self) -> Cow<'_, [u16]> {
         if self.format == Format::Mono {
             let (pairs, _) = self.mono.as_chunks();
@@ -96,8 +96,8 @@ impl Frame {
         Cow::Borrowed(&self.pixels)
     }
 
-    /// The picture in 8-bit red, green and blue, three bytes per pixel, row by row, whatever its
-    /// format. RGB565 is widened by repeating the upper bits of a channel.
+    /// Returns the picture in 8-bit red, green and blue, three bytes per pixel, row by row, for
+    /// every format. RGB565 is widened by repeating the upper bits of a channel.
     pub fn to_rgb888(&self) -> Vec<u8> {
         match self.format {
             Format::Mono => self.mono.iter().flat_map(|&grey| [grey; 3]).collect(),
@@ -113,8 +113,8 @@ impl Frame {
         }
     }
 
-    /// The picture in RGB565, whatever its format: [`Self::pixels`] where they are that, otherwise
-    /// the nearest codes.
+    /// Returns the picture in RGB565 for every format: [`Self::pixels`] if they are RGB565,
+    /// otherwise the nearest codes.
     pub fn to_rgb565(&self) -> Cow<'_, [u16]> {
         if matches!(self.format, Format::Yuv422 | Format::Mono) {
             let levels = self.to_rgb888();
@@ -126,7 +126,7 @@ impl Frame {
         Cow::Borrowed(&self.pixels)
     }
 
-    /// The frame as a binary PPM picture.
+    /// Returns the frame as a binary PPM picture.
     pub fn to_ppm(&self) -> Vec<u8> {
         let mut ppm = format!("P6\n{} {}\n255\n", self.width, self.height).into_bytes();
         ppm.extend(self.to_rgb888());

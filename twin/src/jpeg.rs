@@ -1,5 +1,6 @@
-//! A picture through JPEG and back, the same bytes on every machine: both crates transform in
-//! integers, the encoder without its `simd`, the decoder told not to use any.
+//! Passes a picture through JPEG and back, with the same bytes on every machine. Both crates
+//! transform in integers: the encoder is built without its `simd`, and the decoder has it switched
+//! off.
 
 use jpeg_encoder::{ChromaSubsamplingMethod, ColorType, Encoder, SamplingFactor};
 use zune_jpeg::JpegDecoder;
@@ -24,13 +25,13 @@ pub(crate) fn there_and_back(
 }
 
 fn compress(width: u32, quality: u8, levels: &[u8]) -> Vec<u8> {
-    // A camera's pictures are at most 800 wide.
+    // A camera's pictures are at most 800 pixels wide.
     let columns = width as u16;
     let rows = (levels.len() / 3 / usize::from(columns)) as u16;
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, quality);
     encoder.set_sampling_factor(SamplingFactor::F_2_2);
-    // Otherwise chroma is that of every fourth pixel, and colours move by half a pixel.
+    // The default takes chroma from every fourth pixel, which shifts colours by half a pixel.
     encoder.set_chroma_subsampling_method(ChromaSubsamplingMethod::Average);
     encoder
         .encode(levels, columns, rows, ColorType::Rgb)
@@ -52,7 +53,7 @@ mod tests {
     use super::*;
     use crate::format::levels_of_rgb565;
 
-    /// Red on grey stays where it is: its weight's column is that of the square.
+    /// Red on grey stays in place: the column of its weight is that of the square.
     #[test]
     fn colours_do_not_move() {
         let inside = |i: u32| (60..75).contains(&(i % 160)) && (41..52).contains(&(i / 160));
@@ -78,7 +79,7 @@ mod tests {
         assert!(x.abs() < 0.2 && y.abs() < 0.2, "{x} {y}");
     }
 
-    /// A plain picture keeps its colour, but for rounding.
+    /// A plain picture keeps its colour, up to rounding.
     #[test]
     fn a_plain_picture_stays() {
         let colour = [160, 36, 40];

@@ -1,35 +1,35 @@
-//! What the lens does, how the camera sits and when it exposes.
+//! The lens, the camera's mounting and the shutter.
 
 use crate::SceneError;
 use crate::options::{all_within, within};
 
-/// What the lens does with a point of the film.
+/// How the lens images a point of the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Lens {
-    /// How an angle becomes a place in the picture.
+    /// How an angle becomes a distance in the picture.
     pub projection: Projection,
-    /// What the image of a disc is.
+    /// How a disc is imaged.
     pub discs: Discs,
-    /// Pixel pitch at this frame size, 1 to 50 µm; `None` is the preset's.
+    /// Pixel pitch at this frame size, 1 to 50 µm; `None` means the preset's.
     pub pitch_um: Option<f64>,
-    /// Standard deviation of the blur that every point has, 0 to 20 px: the lens's faults and a
+    /// Standard deviation of the blur of every point, 0 to 20 px, from the lens's faults and a
     /// wrong focus.
     pub blur_px: f64,
-    /// Diameter of the entrance pupil, 0 to 2.1 mm: 2.1 mm divided by the F-number. It blurs what
-    /// is nearer or farther than [`Self::focus_mm`]; 0 blurs nothing.
+    /// Diameter of the entrance pupil, 0 to 2.1 mm: 2.1 mm divided by the F-number. It blurs points
+    /// nearer or farther than [`Self::focus_mm`]; 0 blurs none.
     pub aperture_mm: f64,
-    /// The distance from the pinhole along the axis that is in focus, 1 to 1000 mm.
+    /// The distance in focus, from the pinhole along the axis, 1 to 1000 mm.
     pub focus_mm: f64,
 }
 
-/// How the angle θ off the axis becomes the distance r from the axis in the picture.
+/// The relation between the angle θ off the axis and the distance r from the axis in the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(rename_all = "lowercase"))]
 pub enum Projection {
-    /// r = f·θ: the fisheye that the sensor has.
+    /// r = f·θ: the sensor's fisheye.
     #[default]
     Equidistant,
     /// r = f·tan θ: a lens without distortion.
@@ -37,7 +37,7 @@ pub enum Projection {
 }
 
 impl Projection {
-    /// Its name in files: `equidistant` or `pinhole`.
+    /// Returns the name in files: `equidistant` or `pinhole`.
     pub fn name(self) -> &'static str {
         match self {
             Projection::Equidistant => "equidistant",
@@ -46,7 +46,7 @@ impl Projection {
     }
 }
 
-/// What the image of a disc is.
+/// How a disc is imaged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(rename_all = "kebab-case"))]
@@ -54,42 +54,43 @@ pub enum Discs {
     /// The image of all its points.
     #[default]
     Whole,
-    /// The same shape, but with its centroid at the image of the disc's centre: what a calculation
-    /// with points sees.
+    /// The same shape, but with its centroid at the image of the disc's centre, as in a calculation
+    /// with points.
     ByCentre,
 }
 
-/// How far the camera sits from its nominal place.
+/// The shift and roll of the camera from its nominal place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Mounting {
     /// Shift of the whole picture (the optical centre), px, within ±200.
     pub shift_px: [f64; 2],
-    /// Rotation of the picture about the optical axis, degrees, within ±45; positive turns x
+    /// Rotation of the picture about the optical axis, degrees, within ±45. Positive turns x
     /// towards y.
     pub roll_deg: f64,
 }
 
-/// When which row is exposed. Brightness is [`crate::Options::gain`]'s alone: cameras make up for
-/// the time.
+/// When each row is exposed. [`crate::Options::gain`] alone sets the brightness: cameras compensate
+/// for the exposure time.
 ///
-/// A frame's time is the middle of the exposure of its middle row. Each disc is imaged at the time
-/// of the row in which it is seen, all of it at once: a marker is 13 to 32 rows high, and what
-/// moves it by a pixel within a few rows' time would tear the film.
+/// A frame's time is the middle of the exposure of its middle row. Each whole disc is imaged at the
+/// time of the row in which it appears. A marker is 13 to 32 rows high; a motion by a pixel within
+/// a few rows' time would tear the film.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Shutter {
-    /// How long each row is exposed, 0 to 1 s: what moves meanwhile is smeared.
+    /// Exposure time of each row, 0 to 1 s. Motion during it is smeared.
     pub exposure_s: f64,
-    /// How much later a row below the last one would be exposed than the first, 0 to 0.1 s; 0 is a
-    /// global shutter. The OV7725 rolls: 5.5 ms for its 240 rows at 156 frames per second.
+    /// Time from the exposure of the first row to that of a row just below the last, 0 to 0.1 s; 0
+    /// is a global shutter. The OV7725 has a rolling shutter: 5.5 ms for its 240 rows at 156 frames
+    /// per second.
     pub readout_s: f64,
 }
 
 impl Default for Lens {
-    /// The presets' fisheye, sharp at every distance.
+    /// Returns the presets' fisheye, sharp at every distance.
     fn default() -> Lens {
         Lens {
             projection: Projection::Equidistant,
@@ -112,12 +113,12 @@ impl Lens {
         within("focus_mm", self.focus_mm, [1.0, 1000.0])
     }
 
-    /// Standard deviation of the blur of a point at an axial distance in mm, by a lens of a focal
-    /// length in px.
+    /// Returns the standard deviation, px, of the blur of a point at an axial distance in mm, for a
+    /// focal length in px. At most 20 px.
     ///
     /// Through a pupil of diameter A, a point at distance Z is a disc of angular diameter A·|1/Z −
-    /// 1/Z₀| when Z₀ is in focus; along each direction a uniform disc has a quarter of its diameter
-    /// for standard deviation. At most 20 px.
+    /// 1/Z₀| if Z₀ is in focus. Along each direction the standard deviation of a uniform disc is a
+    /// quarter of its diameter.
     pub(crate) fn blur_px_at(&self, distance_mm: f64, focal_px: f64) -> f64 {
         let vergence = (1.0 / distance_mm.max(0.1) - 1.0 / self.focus_mm).abs();
         let defocus_px = focal_px * self.aperture_mm * vergence / 4.0;
@@ -134,7 +135,7 @@ impl Mounting {
     }
 }
 
-/// Images of a disc during one exposure, when there is motion to smear.
+/// Number of images of a disc during one exposure, if there is an exposure time.
 const INSTANTS: u32 = 5;
 
 impl Shutter {
@@ -143,8 +144,8 @@ impl Shutter {
         within("readout_s", self.readout_s, [0.0, 0.1])
     }
 
-    /// The moments of the exposure of a row, s from the frame's time; `below` is its distance from
-    /// the middle row as a part of the frame's height.
+    /// Iterates over the moments of the exposure of a row, s from the frame's time. `below` is the
+    /// row's distance below the middle row as a part of the frame's height.
     pub(crate) fn instants(&self, below: f64) -> impl Iterator<Item = f64> {
         let count = if self.exposure_s > 0.0 { INSTANTS } else { 1 };
         let (middle_s, exposure_s) = (below * self.readout_s, self.exposure_s);

@@ -1,5 +1,4 @@
-//! The simulated HiVTac sensor: what presses the film, how the film gives, what the camera sees of
-//! it.
+//! The simulated HiVTac sensor: the loads, the film's answer to them, and the camera's frames.
 //!
 //! ```text
 //! load → film → marker discs in space → fisheye
@@ -7,9 +6,9 @@
 //! ```
 //!
 //! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure
-//! functions of scene, seed, frame number and load, and the same bytes on every machine:
-//! transcendental functions come from `libm` only, nothing is fused, and the noise generator is the
-//! crate's own.
+//! functions of scene, seed, frame number and load, with the same bytes on every machine:
+//! transcendental functions come from `libm` only, no operations are fused, and the noise generator
+//! is the crate's own.
 //!
 //! ```
 //! use hivtac_twin::{Preset, Scene};

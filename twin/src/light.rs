@@ -1,16 +1,16 @@
-//! Colours and the light they are seen in.
+//! Colours, and the light on the film.
 //!
-//! Channels are proportional to the light (no gamma), so that a pixel half covered is half way
-//! between two colours. The film is taken to fill the picture.
+//! Channels are proportional to the light (no gamma), so that a half-covered pixel is half-way
+//! between two colours. The film fills the picture.
 
 use crate::camera::centre;
 use crate::camera::radians;
 use crate::{Camera, Options, Paint, noise};
 use hivtac_terms::fixed::Q;
 
-/// A channel, in 8-bit levels, until it becomes one of a pixel.
+/// A channel in 8-bit levels, before it is rounded to a pixel's code.
 pub(crate) type Channel<T = i32> = Q<6, T>;
-/// Steps of one level.
+/// Number of steps per level.
 pub(crate) const STEPS: f64 = 64.0;
 /// The brightest channel.
 pub(crate) const WHITE: Channel = Q::from_bits(255 << 6);
@@ -22,16 +22,16 @@ const FILM_COLOUR: [f64; 3] = [150.0, 141.0, 128.0];
 const RED_COLOUR: [f64; 3] = [160.0, 36.0, 40.0];
 /// A lamp's reflection: white even in dim light.
 const GLARE_COLOUR: [f64; 3] = [2000.0; 3];
-/// Matte black paint: it reflects some 7 % where the film reflects or lets through some 40 %.
+/// Matte black paint: it reflects about 7 %; the film reflects or lets through about 40 %.
 const BLACK_COLOUR: [f64; 3] = [25.0, 24.0, 22.0];
 /// Blue tape: hue 105, as bright in blue as the red tape is in red.
 const BLUE_COLOUR: [f64; 3] = [30.0, 75.0, 120.0];
-/// The angle that [`Options::falloff`] is given for, degrees.
+/// The angle to which [`Options::falloff`] refers, degrees.
 const FALLOFF_ANGLE_DEG: f64 = 75.0;
 
 impl Paint {
-    /// Its level to a camera of [`Format::Mono`](crate::Format::Mono) with these weights, in the
-    /// nominal light.
+    /// Returns its level in a camera of [`Format::Mono`](crate::Format::Mono) with these weights,
+    /// in the nominal light.
     pub fn level(self, mono: [f64; 3]) -> f64 {
         let colour = self.colour();
         mono.iter().zip(colour).map(|(w, c)| w * c).sum()
@@ -48,12 +48,12 @@ impl Paint {
     }
 }
 
-/// The light on each pixel and the bare film in it.
+/// The light on each pixel, and the picture of the bare film in it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Light {
     /// Brightness per pixel, row by row; 1 is nominal.
     brightness: Vec<f64>,
-    /// What is added to red, green and blue before their gain, in levels.
+    /// The levels added to red, green and blue before their gain.
     haze: f64,
     /// Gain of red, green and blue.
     balance: [f64; 3],
@@ -78,12 +78,12 @@ impl Light {
         light
     }
 
-    /// The film without markers.
+    /// Returns the picture of the film without markers.
     pub(crate) fn bare_film(&self) -> Vec<[Channel<i16>; 3]> {
         self.film.clone()
     }
 
-    /// What a pixel becomes when `paint` covers a part (0 to 1) of it.
+    /// Returns the colour of a pixel of which `paint` covers a part (0 to 1).
     pub(crate) fn painted(
         &self,
         pixel: usize,
@@ -98,8 +98,8 @@ impl Light {
         })
     }
 
-    /// A paint in the light of a brightness, in steps, at most white: a camera clips what is too
-    /// bright.
+    /// Returns a paint's colour in light of a brightness, in steps, at most white: a camera clips
+    /// brighter values.
     fn seen(&self, paint: Paint, brightness: f64) -> [f64; 3] {
         let colour = paint.colour();
         std::array::from_fn(|c| {
@@ -108,14 +108,14 @@ impl Light {
         })
     }
 
-    /// A paint in the light of the picture's middle.
+    /// Returns a paint's colour in the light of the picture's middle.
     pub(crate) fn in_the_middle(&self, paint: Paint) -> [Channel; 3] {
         let middle = self.brightness[self.brightness.len() / 2];
         self.seen(paint, middle).map(|steps| channel(steps).into())
     }
 }
 
-/// The paint at a pixel of a checkerboard; without squares it is the film everywhere.
+/// Returns the paint at a pixel of a checkerboard; without squares it is the film everywhere.
 fn board(square_px: u32, x: usize, y: usize) -> Paint {
     let square = square_px as usize;
     match square > 0 && (x / square + y / square) % 2 == 1 {
@@ -137,8 +137,8 @@ fn brightness(camera: &Camera, options: &Options, seed: u64) -> Vec<f64> {
         .collect()
 }
 
-/// Light at a pixel: gain, gradient across the picture, falloff with the square of the angle off
-/// the axis.
+/// Returns the brightness at a pixel, from gain, gradient across the picture, and falloff with the
+/// square of the angle off the axis.
 fn brightness_at(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
     let across = |v: f64, count: u32| (v - centre(count)) / centre(count);
     let slope = options.gradient[0] * across(x, camera.width())
@@ -148,7 +148,7 @@ fn brightness_at(camera: &Camera, options: &Options, [x, y]: [f64; 2]) -> f64 {
     options.gain * (1.0 + slope).max(0.0) * falloff.max(0.0)
 }
 
-/// The nearest to so many steps.
+/// Returns the channel nearest to a number of steps.
 fn channel(steps: f64) -> Channel<i16> {
     Q::from_bits(steps.round() as i16)
 }

@@ -1,55 +1,56 @@
-//! The film as it is, or simplified: to see what each part of its answer is worth.
+//! The film's answer to a load, complete or simplified: it shows what each part is worth.
 
 use crate::film::DiscMotion;
 use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
 use crate::film::{Film, FilmError, Pressed};
 use crate::{Contact, Creep, Load, SceneError};
 
-/// What the scene takes of the film's answer to a load.
+/// The parts of the film's answer to a load that a scene uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Mechanics {
-    /// Which of the film's surfaces carries the markers.
+    /// The film's surface that carries the markers.
     pub surface: crate::Surface,
-    /// How far it gives for how much force.
+    /// The relation of the film's depth to the force.
     pub stiffness: Stiffness,
-    /// Whether a tilted force moves it sideways; without, |F| presses straight, whatever its
+    /// Whether a tilted force moves the film sideways. If false, |F| presses straight for every
     /// direction.
     pub lateral: bool,
-    /// Where gravity pulls on it, a unit vector in the film's frame; `None`: it weighs nothing.
+    /// Direction of gravity, a unit vector in the film's frame; `None` means that the film weighs
+    /// nothing.
     pub down: Option<[f64; 3]>,
-    /// How it differs from the nominal film.
+    /// Its differences from the nominal film.
     pub unit: Unit,
-    /// What the labels of loads mean that do not say so themselves.
+    /// The meaning of labels, for loads that leave it open.
     pub contact: Contact,
-    /// Where the tip of loads first touches that do not say so themselves, mm from the middle,
-    /// within ±5 (±0.25 where it sticks or slides).
+    /// The place where the tip first touches, for loads that leave it open: mm from the middle,
+    /// within ±5 (±0.25 if it sticks or slides).
     pub offset_mm: [f64; 2],
-    /// Radius of the disc over which the tip of loads spreads their force that do not say so
-    /// themselves, mm, 0.25 to 2.
+    /// Radius of the disc over which the tip spreads its force, for loads that leave it open, mm,
+    /// 0.25 to 2.
     pub tip_radius_mm: f64,
-    /// What it remembers of a scene's motion.
+    /// What the film remembers of a scene's motion.
     pub creep: Creep,
 }
 
-/// How far the film gives for how much force.
+/// The relation of the film's depth to the force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(rename_all = "lowercase"))]
 pub enum Stiffness {
-    /// As its finite elements say: soft at first, five times stiffer at 0.2 N.
+    /// As its finite elements give it: soft at first, five times stiffer at 0.2 N.
     #[default]
     Computed,
-    /// In proportion, and as computed at 0.2 N; no further beyond.
+    /// Depth in proportion to force, as computed at 0.2 N; constant beyond that.
     Linear,
 }
 
-/// Where a linear film agrees with the computed one, N.
+/// The force at which a linear film agrees with the computed one, N.
 const LINEAR_UP_TO_N: f64 = 0.2;
 
 impl Default for Mechanics {
-    /// All of it.
+    /// The complete answer.
     fn default() -> Mechanics {
         Mechanics {
             surface: crate::Surface::CameraSide,
@@ -66,10 +67,11 @@ impl Default for Mechanics {
 }
 
 impl Mechanics {
-    /// The film that it asks for, with markers so far beside their places, by identity, mm.
+    /// Returns the film for these settings, with each marker shifted by `markers_mm` from its
+    /// place, by identity, mm.
     ///
     /// # Errors
-    /// When a film differs too much from the nominal one, or a contact cannot be.
+    /// If a film differs too much from the nominal one, or a contact is impossible.
     pub(crate) fn film(&self, markers_mm: [[f64; 2]; 4]) -> Result<Film, SceneError> {
         if self.down.is_some() && self.stiffness == Stiffness::Linear {
             let why = "a linear film weighs nothing: leave down out, or use computed".to_owned();
@@ -84,22 +86,22 @@ impl Mechanics {
         Ok(film)
     }
 
-    /// Whether a film can take a load, held for ever.
+    /// Checks that a film can take a load, held for ever.
     ///
     /// # Errors
-    /// When the load is outside what the film's tables hold for.
+    /// If the load is outside what the film's tables hold for.
     pub(crate) fn check(&self, film: &Film, load: &Load) -> Result<(), SceneError> {
         let load = self.completed(load);
         film.check(&load)?;
         Ok(film.check(&self.creep.at_last(&load))?)
     }
 
-    /// A load with what it leaves open.
+    /// Returns a load with the values that it leaves open.
     pub(crate) fn completed(&self, load: &Load) -> Load {
         load.or(self.contact, self.offset_mm, self.tip_radius_mm)
     }
 
-    /// The film under a load that it accepts.
+    /// Returns the film under a load that it accepts.
     pub(crate) fn press(&self, film: &Film, load: &Load) -> Pressed {
         let load = &self.completed(load);
         match self.stiffness {
@@ -112,12 +114,13 @@ impl Mechanics {
         }
     }
 
-    /// The motion of what carries the markers under a load that the film accepts.
+    /// Returns the motion of the surface that carries the markers, under a load that the film
+    /// accepts.
     pub(crate) fn seen(&self, film: &Film, load: &Load) -> Pressed {
         self.surface.of(self.press(film, load))
     }
 
-    /// A load of another size, straight when its direction does not matter.
+    /// Returns a load of another size, straight if `lateral` is false.
     fn taken(&self, load: &Load, magnitude_n: f64) -> Load {
         if self.lateral && magnitude_n == load.magnitude_n() {
             return *load;
@@ -126,7 +129,7 @@ impl Mechanics {
             true => (load.alpha_deg(), load.beta_deg()),
             false => (0.0, 0.0),
         };
-        // The angles of a load, and a size, make a load.
+        // A load's angles together with a size are always a valid load.
         let other = Load::from_angles(magnitude_n, alpha, beta).unwrap_or(*load);
         other.or(load.contact(), load.offset_mm(), load.tip_radius_mm())
     }

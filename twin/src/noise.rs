@@ -1,9 +1,9 @@
 //! Sensor noise, the same on every machine.
 //!
 //! Counter-based: the noise of a pixel depends on seed, frame number and pixel index alone. A
-//! 64-bit hash (SplitMix64's output function over a Weyl sequence) gives 12 bits per channel, and
-//! each picks a quantile of the normal distribution from a table: |z| ≤ 3.7, standard deviation
-//! within 0.1 % of the one asked for.
+//! 64-bit hash (SplitMix64's output function over a Weyl sequence) gives 12 bits per channel. Each
+//! channel's bits select a quantile of the normal distribution from a table: |z| ≤ 3.7, standard
+//! deviation within 0.1 % of the requested one.
 
 use std::sync::LazyLock;
 
@@ -14,11 +14,11 @@ const QUANTILES: usize = 4096;
 /// SplitMix64's increment, the odd number nearest to 2⁶⁴ / golden ratio.
 const WEYL: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// How many values the number beside a pixel's noise has.
+/// Number of values of the extra number that comes with a pixel's noise.
 pub(crate) const LOTS: u32 = 1 << 28;
 
-/// The middle quantiles of as many equal parts of the standard normal distribution; made once, as
-/// that takes a while.
+/// The middle quantiles of [`QUANTILES`] equal parts of the standard normal distribution. Computed
+/// once, because that takes a while.
 static UNIT: LazyLock<Vec<f64>> = LazyLock::new(|| {
     let middle = |i: usize| (i as f64 + 0.5) / QUANTILES as f64;
     (0..QUANTILES).map(|i| normal_quantile(middle(i))).collect()
@@ -32,7 +32,7 @@ pub(crate) struct Noise {
 }
 
 impl Noise {
-    /// Noise of a standard deviation in steps, at most 4096.
+    /// Returns noise of a standard deviation in steps, at most 4096.
     pub(crate) fn new(deviation: f64, seed: u64) -> Noise {
         let scaled = |quantile: &f64| Channel::from_bits((deviation * quantile).round() as i16);
         Noise {
@@ -41,8 +41,8 @@ impl Noise {
         }
     }
 
-    /// The noise of one frame, pixel by pixel: three channels each, and a number below [`LOTS`]
-    /// that is independent of them.
+    /// Iterates over the noise of one frame, pixel by pixel: three channels each, and a number
+    /// below [`LOTS`] that is independent of them.
     pub(crate) fn of_frame(&self, number: u64) -> impl Iterator<Item = ([Channel; 3], u32)> {
         let mut state = mix(mix(self.seed).wrapping_add(number.wrapping_mul(WEYL)));
         let table: &[Channel<i16>; QUANTILES] =
@@ -57,7 +57,8 @@ impl Noise {
     }
 }
 
-/// What never changes: pixel by pixel, a number of the standard normal distribution.
+/// Iterates over a pattern that is the same in all frames: a number of the standard normal
+/// distribution per pixel.
 pub(crate) fn pattern(seed: u64) -> impl Iterator<Item = f64> {
     let mut state = mix(seed ^ 0x7465_7874_7572_6500);
     std::iter::repeat_with(move || {
@@ -66,7 +67,7 @@ pub(crate) fn pattern(seed: u64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// Numbers from 0 to below 1, one after the other.
+/// Iterates over numbers ≥ 0 and < 1.
 pub(crate) fn uniform(seed: u64) -> impl Iterator<Item = f64> {
     let mut state = mix(seed ^ 0x7370_6563_6b73_0000);
     std::iter::repeat_with(move || {
@@ -75,14 +76,14 @@ pub(crate) fn uniform(seed: u64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// A well-mixed 64-bit hash (SplitMix64, variant 13 of Stafford's mixers).
+/// Returns a well-mixed 64-bit hash (SplitMix64, variant 13 of Stafford's mixers).
 pub(crate) fn mix(value: u64) -> u64 {
     let value = (value ^ (value >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let value = (value ^ (value >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     value ^ (value >> 31)
 }
 
-/// The standard normal quantile of p, 0 < p < 1, by bisection of the distribution function.
+/// Returns the standard normal quantile of p, 0 < p < 1, by bisection of the distribution function.
 fn normal_quantile(p: f64) -> f64 {
     let below = |z: f64| 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2);
     let (mut low, mut high) = (-8.0, 8.0);
@@ -110,7 +111,7 @@ mod tests {
         frame.map(|(pixel, _)| pixel.map(steps)).collect()
     }
 
-    /// Mean of the product of two series of deviation 160, as a correlation.
+    /// Returns the mean product of two series of deviation 160, as a correlation.
     fn correlation(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
         let sum: f64 = a.zip(b).map(|(a, b)| a * b).sum();
         sum / PIXELS as f64 / (160.0 * 160.0)

@@ -1,4 +1,4 @@
-//! What makes a frame harder or easier than the default.
+//! The options of a scene, which make a frame harder or easier than the default.
 
 use crate::{Format, Lens, Mechanics, Mounting, Patch, Preset, PresetCamera, SceneError, Shutter};
 use crate::{Paint, Specks};
@@ -9,13 +9,13 @@ pub struct Options {
     /// How the camera codes its pixels.
     pub format: Format,
     /// Brightness of the whole picture, 0 to 4; 1 is nominal. At about 0.3 the default threshold
-    /// starts to eat the markers.
+    /// starts to cut parts off the markers.
     pub gain: f64,
     /// Change of brightness from the picture's middle to its right and lower edge, −1 to 1 each:
     /// (0.6, 0) is 160 % at the right edge and 40 % at the left.
     pub gradient: [f64; 2],
-    /// The part of the light that is lost 75° off the optical axis, 0 to 1; it grows with the
-    /// square of the angle. A usual lens loses 0.3, which no centroid shows.
+    /// The part of the light that is lost 75° off the optical axis, 0 to 1. It grows with the
+    /// square of the angle. A usual lens loses 0.3, which has no effect on a centroid.
     pub falloff: f64,
     /// Veiling light on the whole picture, 0 to 255 levels at a gain of 1: stray light that washes
     /// out colours.
@@ -28,31 +28,31 @@ pub struct Options {
     pub texture: f64,
     /// Standard deviation of the noise of each channel, 0 to 64 of 255 levels.
     pub noise: f64,
-    /// Pixels that show a colour of their own, in each frame others.
+    /// Pixels that show a colour of their own; different ones in each frame.
     pub salt: Salt,
-    /// What is taken of the film's answer.
+    /// The parts of the film's answer that are used.
     pub film: Mechanics,
-    /// What a camera of [`Format::Mono`] makes of red, green and blue: the weight of each, 0 to 1.
-    /// (0, 1, 0) is green light or a green filter.
+    /// Weights, 0 to 1, of red, green and blue in a camera of [`Format::Mono`]. (0, 1, 0) is green
+    /// light or a green filter.
     pub mono: [f64; 3],
-    /// What the markers are painted with.
+    /// The paint of the markers.
     pub markers: Paint,
-    /// Which markers (by identity) have come off.
+    /// Markers (by identity) that came off.
     pub missing: [bool; 4],
-    /// How far from its place each marker (by identity) is glued, mm along x and y, −1 to 1 each.
+    /// Each marker's shift from its place (by identity), mm along x and y, −1 to 1 each.
     pub glued_mm: [[f64; 2]; 4],
     /// Round patches on the film, painted over the markers in this order.
     pub patches: Vec<Patch>,
     /// Red specks all over the film, under the markers.
     pub specks: Specks,
     /// Side of the squares of a checkerboard of film and markers' red in the whole picture, 0 to
-    /// 400 px; 0 is none.
+    /// 400 px; 0 means no checkerboard.
     pub checkerboard_px: u32,
-    /// What the lens does with a point.
+    /// How the lens images a point.
     pub lens: Lens,
-    /// How the camera sits.
+    /// Shift and roll of the camera.
     pub mounting: Mounting,
-    /// When which row is exposed.
+    /// When each row is exposed.
     pub shutter: Shutter,
 }
 
@@ -96,7 +96,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The nominal sensor of a preset.
+    /// Returns the options of the nominal sensor of a preset.
     pub fn of(preset: Preset) -> Options {
         Options {
             format: preset.usual_format(),
@@ -106,7 +106,7 @@ impl Options {
     }
 
     /// # Errors
-    /// When a value is outside its range or not a number.
+    /// If a value is outside its range or not a number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
         #[cfg(feature = "jpeg")]
         if let Format::Jpeg { quality } = self.format {
@@ -164,7 +164,7 @@ mod tests {
         assert_eq!(Options::default().check(), Ok(()));
     }
 
-    /// What is said of the default with one thing changed.
+    /// Returns the error message for the default with one change.
     fn said_of(change: impl Fn(&mut Options)) -> String {
         let mut options = Options::default();
         change(&mut options);

@@ -1,4 +1,4 @@
-//! What lies on the film besides its markers.
+//! Things on the film other than its markers: patches and specks.
 
 use crate::options::{all_within, within};
 use crate::{Disc, HALF_SIDE_MM, SceneError, noise};
@@ -8,7 +8,7 @@ use crate::{Disc, HALF_SIDE_MM, SceneError, noise};
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(deny_unknown_fields))]
 pub struct Patch {
-    /// Where its centre rests on the film, mm, within ±14.
+    /// Place of its centre on the film at rest, mm, within ±14.
     pub centre_mm: [f64; 2],
     /// Radius, 0.01 to 10 mm; a marker has 0.5 mm.
     pub radius_mm: f64,
@@ -21,9 +21,9 @@ pub struct Patch {
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(rename_all = "lowercase"))]
 pub enum Paint {
-    /// The markers' red: a distracting thing, or a bridge that merges two markers.
+    /// The markers' red: a distraction, or a bridge that merges two markers.
     Red,
-    /// The film's own colour: cuts what lies beneath.
+    /// The film's own colour: it cuts what lies beneath.
     Film,
     /// The reflection of a lamp: white, and as bright as the camera can show.
     Glare,
@@ -43,7 +43,7 @@ impl Paint {
         Paint::Blue,
     ];
 
-    /// Its name in files: `red`, `film`, `glare`, `black` or `blue`.
+    /// Returns the name in files: `red`, `film`, `glare`, `black` or `blue`.
     pub fn name(self) -> &'static str {
         match self {
             Paint::Red => "red",
@@ -55,17 +55,17 @@ impl Paint {
     }
 }
 
-/// Red specks all over the film, at places that the scene's seed decides; they move with the film.
+/// Red specks all over the film; they move with it. The scene's seed decides their places.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Specks {
-    /// How many, 0 to 100,000.
+    /// Their number, 0 to 100,000.
     pub count: u32,
     /// Radius of each, 0.01 to 1 mm; a pixel of QVGA sees about 0.06 mm.
     pub radius_mm: f64,
 }
 
 impl Default for Specks {
-    /// None. If there were some, they would have 0.05 mm.
+    /// No specks; their radius would be 0.05 mm.
     fn default() -> Specks {
         Specks {
             count: 0,
@@ -94,7 +94,7 @@ impl Specks {
         within("speck_radius_mm", self.radius_mm, [0.01, 1.0])
     }
 
-    /// Where they are.
+    /// Returns the specks as discs.
     pub(crate) fn discs(&self, seed: u64) -> Vec<Disc> {
         let mut place = noise::uniform(seed).map(|part| HALF_SIDE_MM * (2.0 * part - 1.0));
         let mut next = || place.next().unwrap_or_default();

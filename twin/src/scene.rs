@@ -1,4 +1,4 @@
-//! The scene: what presses the sensor, and the frames its camera takes of it.
+//! The scene: the load on the sensor, and the camera's frames of it.
 
 use crate::coverage::Coverage;
 use crate::exposure::{Exposure, Image};
@@ -12,8 +12,7 @@ use crate::{
     Shutter, Truth,
 };
 
-/// A simulated sensor and what presses it. Frames depend on nothing but the scene and the
-/// arguments.
+/// A simulated sensor and its load. Frames depend only on the scene and the arguments.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     film: Film,
@@ -27,21 +26,21 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// A scene by name, with the preset's options, at a frame size that the preset has
+    /// Returns a scene by name, with the preset's options, at a frame size that the preset has
     /// ([`Camera::new`]). The seed decides the noise, and where `demo` starts.
     ///
-    /// - `rest`: nothing presses.
+    /// - `rest`: no load.
     /// - `static`: 0.1 N at α = 4°, β = −3°.
-    /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F|
-    ///   0.02–0.2 N, |α| ≤ 8°, |β| ≤ 6°.
+    /// - `demo`: a tenth of a second of rest, then a tip whose force wanders smoothly, |F| 0.02–0.2
+    ///   N, |α| ≤ 8°, |β| ≤ 6°.
     /// - `sweep`: |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then at α = ±8°, then
     ///   at β = ±6°.
-    /// - `press`, `drag`, `grasp`, `catch`, `vibration`: after a tenth of a second of rest, what
-    ///   [`Press`](crate::Press), [`Drag`](crate::Drag), [`Grasp`](crate::Grasp),
-    ///   [`Catch`](crate::Catch) and [`Vibration`](crate::Vibration) are by default.
+    /// - `press`, `drag`, `grasp`, `catch`, `vibration`: a tenth of a second of rest, then the
+    ///   defaults of [`Press`](crate::Press), [`Drag`](crate::Drag), [`Grasp`](crate::Grasp),
+    ///   [`Catch`](crate::Catch) and [`Vibration`](crate::Vibration).
     ///
     /// # Errors
-    /// When there is no scene of that name or the size is another.
+    /// If no scene has that name, or the preset has no frames of that size.
     pub fn preset(
         name: &str,
         preset: Preset,
@@ -63,18 +62,18 @@ impl Scene {
         })
     }
 
-    /// The same scene under one constant load.
+    /// Returns the same scene under one constant load.
     ///
     /// # Errors
-    /// When the film cannot take the load.
+    /// If the film cannot take the load.
     pub fn with_load(self, load: Load) -> Result<Scene, SceneError> {
         self.with_motion(Motion::Static(load))
     }
 
-    /// The same scene with something else that presses.
+    /// Returns the same scene with another motion.
     ///
     /// # Errors
-    /// When a parameter is outside its range, or the film cannot take a load within the motion's
+    /// If a parameter is outside its range, or the film cannot take a load within the motion's
     /// first ten seconds.
     pub fn with_motion(mut self, motion: Motion) -> Result<Scene, SceneError> {
         self.try_motion(&motion)?;
@@ -82,10 +81,11 @@ impl Scene {
         Ok(self)
     }
 
-    /// The same scene under other conditions.
+    /// Returns the same scene under other conditions.
     ///
     /// # Errors
-    /// When an option is outside its range, or the film that it asks for cannot take what presses.
+    /// If an option is outside its range, or the film that the options describe cannot take the
+    /// motion.
     pub fn with_options(mut self, options: Options) -> Result<Scene, SceneError> {
         options.check()?;
         self.film = options.film.film(options.glued_mm)?;
@@ -105,27 +105,27 @@ impl Scene {
         motion.check(|load| self.options.film.check(&self.film, load))
     }
 
-    /// The camera.
+    /// Returns the camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
 
-    /// What presses.
+    /// Returns the load as a function of time.
     pub fn motion(&self) -> &Motion {
         &self.motion
     }
 
-    /// The conditions.
+    /// Returns the conditions.
     pub fn options(&self) -> &Options {
         &self.options
     }
 
-    /// The frame taken at a time in seconds; its number selects its noise.
+    /// Returns the frame taken at a time in seconds. Its number selects its noise.
     pub fn frame(&self, number: u64, time_s: f64) -> Frame {
         self.frame_by(&self.options.shutter, number, time_s)
     }
 
-    /// The same by a camera with another shutter, whose times are in their ranges.
+    /// As [`Self::frame`], by a camera with another shutter, whose times are in their ranges.
     pub fn frame_by(&self, shutter: &Shutter, number: u64, time_s: f64) -> Frame {
         let force = self.motion.load(time_s);
         self.expose(
@@ -135,12 +135,12 @@ impl Scene {
         )
     }
 
-    /// The load that the elastic film answers to as this one does to the motion, so many seconds
-    /// after a time, while a shutter is open.
+    /// Returns the effective load, by seconds from a time, while a shutter is open: under it an
+    /// elastic film has the shape that this film has under the motion.
     fn course(&self, shutter: &Shutter, time_s: f64) -> impl Fn(f64) -> Load {
         let mechanics = &self.options.film;
         let load = move |time_s| mechanics.completed(&self.motion.load(time_s));
-        // The first row is exposed so much earlier than the middle one.
+        // The first row is exposed this much earlier than the middle one.
         let begin_s = time_s - shutter.exposure_s - shutter.readout_s;
         let memory = mechanics.creep.memory(begin_s, load);
         move |after_s| {
@@ -149,12 +149,12 @@ impl Scene {
         }
     }
 
-    /// What is true at a time in seconds, without rendering.
+    /// Returns the ground truth at a time in seconds, without rendering.
     pub fn truth(&self, time_s: f64) -> Truth {
         self.truth_by(&self.options.shutter, time_s)
     }
 
-    /// The same of a camera with another shutter, whose times are in their ranges.
+    /// As [`Self::truth`], for a camera with another shutter, whose times are in their ranges.
     pub fn truth_by(&self, shutter: &Shutter, time_s: f64) -> Truth {
         let exposure = self.exposure(shutter, self.course(shutter, time_s));
         self.truth_of(
@@ -164,28 +164,30 @@ impl Scene {
         )
     }
 
-    /// What is true under any constant load, whatever the scene's motion, without rendering.
+    /// Returns the ground truth under a constant load instead of the scene's motion, without
+    /// rendering.
     ///
     /// # Errors
-    /// When the film cannot take the load.
+    /// If the film cannot take the load.
     pub fn truth_under(&self, load: &Load) -> Result<Truth, SceneError> {
         self.options.film.check(&self.film, load)?;
         let exposure = self.exposure(&self.options.shutter, |_| *load);
         Ok(self.truth_of(&exposure, load, &self.marker_images(&exposure)))
     }
 
-    /// A frame under any constant load, whatever the scene's motion; the number selects its noise.
+    /// Returns a frame under a constant load instead of the scene's motion. The number selects its
+    /// noise.
     ///
     /// # Errors
-    /// When the film cannot take the load.
+    /// If the film cannot take the load.
     pub fn render_load(&self, load: &Load, number: u64) -> Result<Frame, SceneError> {
         self.options.film.check(&self.film, load)?;
         let exposure = self.exposure(&self.options.shutter, |_| *load);
         Ok(self.expose(&exposure, load, number))
     }
 
-    /// A frame of a film that somebody else pressed, such as finite elements; the number selects
-    /// its noise, and the load is what the frame's truth says. The film's markers are those of this
+    /// Returns a frame of a film whose state comes from elsewhere, such as finite elements. The
+    /// number selects its noise; the frame's truth has `load`. The film's markers are those of this
     /// scene.
     pub fn render_pressed(&self, pressed: Pressed, load: &Load, number: u64) -> Frame {
         let shutter = Shutter::default();
@@ -196,7 +198,7 @@ impl Scene {
         self.expose(&exposure, load, number)
     }
 
-    /// What is true of such a film, without rendering.
+    /// Returns the ground truth of such a film, without rendering.
     pub fn truth_of_pressed(&self, pressed: Pressed, load: &Load) -> Truth {
         let shutter = Shutter::default();
         let exposure = Exposure {
@@ -206,12 +208,12 @@ impl Scene {
         self.truth_of(&exposure, load, &self.marker_images(&exposure))
     }
 
-    /// The frame of a camera with a shutter under a load in time that is no [`Motion`]: what
-    /// presses so many seconds after the middle of the exposure. The number selects its noise.
+    /// Returns the frame of a camera with a shutter under loads in time that are not a [`Motion`].
+    /// `load` takes the seconds from the middle of the exposure. The number selects the noise.
     ///
     /// # Errors
-    /// When the film cannot take the load in that middle. Loads around it are those of the film's
-    /// limits.
+    /// If the film cannot take the load at that middle. Loads before and after it are clamped to
+    /// the film's limits.
     pub fn frame_under(
         &self,
         shutter: &Shutter,
@@ -258,7 +260,7 @@ impl Scene {
         }
     }
 
-    /// The images of the markers that have not come off.
+    /// Returns the images of the markers that have not come off.
     fn marker_images<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>) -> [Option<Image>; 4] {
         std::array::from_fn(|id| {
             let there = !self.options.missing[id];
@@ -266,7 +268,7 @@ impl Scene {
         })
     }
 
-    /// Film, specks, markers and patches in their light, before any noise.
+    /// Returns the picture of film, specks, markers and patches in their light, without noise.
     fn picture<L: Fn(f64) -> Load>(
         &self,
         exposure: &Exposure<'_, L>,
@@ -308,7 +310,8 @@ impl Scene {
         self.options.format.code(self.camera.width(), noisy)
     }
 
-    /// Red, green and blue as the camera tells them apart: one that sees no colours not at all.
+    /// Returns red, green and blue as the camera sees them. A camera without colours gives all
+    /// three the same value.
     fn as_seen(&self, colour: [Channel; 3]) -> [Channel; 3] {
         if self.options.format != Format::Mono {
             return colour;
@@ -326,7 +329,7 @@ impl Scene {
         let Mechanics { creep, .. } = self.options.film;
         let force = self.options.film.completed(force);
         let presses = force.magnitude_n() > 0.0;
-        // Force and place are the tip's, whatever else the film remembers.
+        // Force and place are the tip's, independent of what the film remembers.
         let touched = match creep.is_elastic() {
             true => exposure.now,
             false => self.options.film.press(&self.film, &force),

@@ -1,9 +1,10 @@
-//! Which surface of the film carries the markers.
+//! The surface of the film that carries the markers.
 
 use crate::film::DiscMotion;
 use crate::film::Pressed;
 
-/// A surface of the film. Where the film tilts, one is aside of the other.
+/// A surface of the film. Where the film tilts, the two surfaces are shifted sideways from each
+/// other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(rename_all = "kebab-case"))]
@@ -11,7 +12,7 @@ pub enum Surface {
     /// The one that the camera sees.
     #[default]
     CameraSide,
-    /// The middle one, which a film without thickness has alone.
+    /// The middle one: the only surface of a film without thickness.
     Middle,
 }
 
@@ -19,7 +20,7 @@ pub enum Surface {
 const HALF_THICKNESS_MM: f64 = 0.25;
 
 impl Surface {
-    /// The motion of this surface, from that of the camera's side.
+    /// Returns the motion of this surface, from that of the camera's side.
     pub(crate) fn of(self, pressed: Pressed) -> Pressed {
         match self {
             Surface::CameraSide => pressed,
@@ -31,7 +32,8 @@ impl Surface {
     }
 }
 
-/// The middle surface above a marker: half the thickness along the normal from the camera's side.
+/// Returns the middle surface's motion above a marker: half the thickness along the normal from the
+/// camera's side.
 fn middle(disc: DiscMotion) -> DiscMotion {
     let (x, y) = (disc.along_x[2], disc.along_y[2]);
     let length = (1.0 + x * x + y * y).sqrt();
@@ -58,8 +60,8 @@ mod tests {
             [b[0] - a[0], b[1] - a[1], b[2] - a[2]]
         };
         assert_eq!(apart(0.0), [0.0; 3], "nothing tilts at rest");
-        // Marker 1, right and above: the film rises outwards there, so that its normal leans to the
-        // middle.
+        // Marker 1 is on the right and at the top. The film rises outwards there, and its normal
+        // leans towards the middle.
         let [x, y, z] = apart(0.2);
         assert!(x < -0.05 && y > 0.05, "{x} {y}");
         let length = (x * x + y * y + (z + 0.25) * (z + 0.25)).sqrt();

@@ -1,4 +1,4 @@
-//! Scenes from TOML files (`docs/scene-file.md`).
+//! Reads scenes from TOML files (`docs/scene-file.md`).
 
 mod sections;
 
@@ -8,12 +8,12 @@ use self::sections::SceneFile;
 use crate::{Scene, SceneError};
 
 impl Scene {
-    /// The scene that a TOML text describes, as `docs/scene-file.md` says. What it leaves out is as
-    /// in the default.
+    /// Returns the scene that a TOML text describes, as `docs/scene-file.md` defines it. Keys that
+    /// the text omits have their defaults.
     ///
     /// # Errors
-    /// [`SceneError::File`], with the line, when the text is no TOML, has a key that there is not,
-    /// or a value that cannot be.
+    /// [`SceneError::File`], with the line, if the text is not TOML, has an unknown key, or has an
+    /// impossible value.
     pub fn from_toml(text: &str) -> Result<Scene, SceneError> {
         let file: SceneFile =
             toml::from_str(text).map_err(|error| SceneError::File(error.to_string()))?;
@@ -22,7 +22,7 @@ impl Scene {
     }
 }
 
-/// An error with the line that it speaks of, where that can be told.
+/// Formats an error, with the line of its cause if that can be found.
 fn located(text: &str, error: &SceneError) -> String {
     let place = match error {
         SceneError::Option { name, value, .. } => find(text, name, Some(*value)),
@@ -37,15 +37,15 @@ fn located(text: &str, error: &SceneError) -> String {
     }
 }
 
-/// Where a key is.
+/// The place of a key in a file.
 struct Place {
-    /// Its name with those of its tables before it.
+    /// The key's name, preceded by the names of its tables.
     path: String,
     /// Counted from 1.
     line: usize,
 }
 
-/// The first key of a name, and when a value is given, of one in whose text it is.
+/// Returns the first key with a name. If a value is given, the key's text must contain that value.
 fn find(text: &str, name: &str, value: Option<f64>) -> Option<Place> {
     let table = DeTable::parse(text).ok()?;
     let mut found = Vec::new();
@@ -60,7 +60,7 @@ fn find(text: &str, name: &str, value: Option<f64>) -> Option<Place> {
 
 type Span = std::ops::Range<usize>;
 
-/// All keys of a name in a table and the tables in it: path, and where key and value are written.
+/// Collects all keys with a name in a table and its inner tables: path, and spans of key and value.
 fn collect(table: &DeTable<'_>, path: &str, name: &str, found: &mut Vec<(String, Span, Span)>) {
     for (key, value) in table {
         let path = match path {
@@ -83,7 +83,7 @@ fn collect(table: &DeTable<'_>, path: &str, name: &str, found: &mut Vec<(String,
     }
 }
 
-/// The numbers in a value as it is written.
+/// Iterates over the numbers in the text of a value.
 fn numbers(written: &str) -> impl Iterator<Item = f64> {
     let parts = written.split(|c: char| "[], \t\r\n".contains(c));
     parts.filter_map(|part| part.replace('_', "").parse().ok())

@@ -35,7 +35,7 @@ struct CameraSection {
     jpeg_quality: Option<u8>,
 }
 
-/// A preset by its name.
+/// Reads a preset by its name.
 fn preset<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Preset, D::Error> {
     const NAMES: &[&str] = &{
         let [first, second, third] = Preset::ALL;
@@ -171,7 +171,7 @@ impl SceneFile {
 }
 
 impl CameraSection {
-    /// Columns and rows.
+    /// Returns columns and rows.
     fn size(&self) -> [u32; 2] {
         let [width, height] = self.preset.usual_size();
         [self.width.unwrap_or(width), self.height.unwrap_or(height)]
@@ -226,7 +226,7 @@ impl LoadSection {
         })
     }
 
-    /// A table of another motion than the chosen one would do nothing, silently.
+    /// Rejects a table of a motion that was not chosen: it would have no effect, silently.
     fn check_tables(&self) -> Result<(), SceneError> {
         let tables = [
             ("static", MotionName::Static, self.constant.is_some()),

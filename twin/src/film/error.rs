@@ -1,14 +1,15 @@
-//! What can be wrong with a load or a film.
+//! The errors of a load or a film.
 
 use std::fmt;
 
-/// A load or a film that the tables do not hold. The message says what, where and what is possible.
+/// A load or a film outside what the tables hold for. The message names the item, the cause and the
+/// possible values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FilmError {
-    /// A load that is no number, pulls, or presses the film further than it can go; a film that is
-    /// too unlike the nominal one.
+    /// A load that is not a number, pulls, or presses the film further than it can go; or a film
+    /// that differs too much from the nominal one.
     Load(String),
-    /// Bytes do not hold a film's tables.
+    /// The bytes are not the tables of a film.
     Tables(String),
 }
 

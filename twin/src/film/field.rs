@@ -1,14 +1,15 @@
-//! The film between tip, markers and posts, roughly.
+//! The approximate motion of the film between tip, markers and posts.
 //!
-//! It follows the tip by a share that depends on the place from it only, and what that leaves at
-//! the markers is spread around them. Close to a marker it moves as the marker does.
+//! The film follows the tip by a share that depends only on the place relative to the tip. The
+//! difference that remains at the markers is spread around them. Close to a marker the film moves
+//! as the marker does.
 
 use crate::film::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed};
 
-/// Within this distance of a marker's centre the film moves as the marker does, mm: its rim as a
-/// polygon is inside.
+/// Within this distance of a marker's centre, mm, the film moves as the marker does. The marker's
+/// rim, drawn as a polygon, is inside.
 const OWN_MM: f64 = 1.05 * MARKER_RADIUS_MM;
-/// Beyond this one, as tip and markers together say, mm.
+/// Beyond this distance, mm, the motion is the one of tip and markers together.
 const OTHERS_MM: f64 = 2.0;
 
 pub fn displacement(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
@@ -38,7 +39,7 @@ fn nearest([x, y]: [f64; 2]) -> usize {
 }
 
 fn rough(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
-    // Nothing is known of the film beyond its posts.
+    // The motion beyond the posts is unknown.
     let place = rest_mm.map(|part| part.clamp(-HALF_SIDE_MM, HALF_SIDE_MM));
     let (of_tip, of_markers) = (share(from_tip(pressed, place)), spread(pressed, place));
     let at_markers = pressed
@@ -53,7 +54,8 @@ fn rough(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
     std::array::from_fn(component)
 }
 
-/// A place as it is from the tip, the film's border being where it is from the middle.
+/// Maps a place to coordinates relative to the tip, in which the film's border is as far away as it
+/// is from the middle.
 fn from_tip(pressed: &Pressed, place: [f64; 2]) -> [f64; 2] {
     std::array::from_fn(|c| {
         let tip = pressed.touches_mm[c];
@@ -63,14 +65,14 @@ fn from_tip(pressed: &Pressed, place: [f64; 2]) -> [f64; 2] {
     })
 }
 
-/// How far the film goes at a place where its markers go so far, roughly.
+/// Estimates the depth at a place from the depth at the markers.
 pub fn from_markers(at_markers: f64, place: [f64; 2]) -> f64 {
     at_markers * share(place) / share([MARKER_REST_MM; 2])
 }
 
-/// The part of the tip's depth that a place takes under a straight press, from the full solution at
-/// 0.02 and 0.25 N (within 0.03): 1 at the tip, 0.70 and 0.67 at the markers, 0.36 and 0.39 in the
-/// middle of an edge, 0 at the posts.
+/// The part of the tip's depth that a place has under a straight press, from the full solution at
+/// 0.02 and 0.25 N (within 0.03). It is 1 at the tip, 0.70 and 0.67 at the markers, 0.36 and 0.39
+/// in the middle of an edge, 0 at the posts.
 fn share(place: [f64; 2]) -> f64 {
     let [a, b] = place.map(|part| part / HALF_SIDE_MM);
     let (r, corner) = (length([a, b]), a * a * b * b);
@@ -78,11 +80,11 @@ fn share(place: [f64; 2]) -> f64 {
     (along - 0.883 * corner + 0.3006 * corner * r * r).max(0.0)
 }
 
-/// Each marker's part: all of it at the marker itself, nothing at the others, at the tip and at the
-/// film's border.
+/// The part of each marker at a place: 1 at the marker itself, 0 at the others, at the tip and at
+/// the film's border.
 fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
     let near = |from: [f64; 2]| length([place[0] - from[0], place[1] - from[1]]);
-    // From the markers outward it falls to nothing at the border.
+    // From the markers outwards the part falls to 0 at the border.
     let border = place.map(|part| {
         let [own, marker] =
             [part, MARKER_REST_MM].map(|part| 1.0 - (part / HALF_SIDE_MM) * (part / HALF_SIDE_MM));
@@ -90,7 +92,7 @@ fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
     });
     let weigh = |k: usize| {
         let centre = pressed.centres_mm[k];
-        // The tip under a marker leaves it nothing but its own.
+        // With the tip under a marker, only the marker's own area is left to it.
         let apart = |from: [f64; 2]| length([centre[0] - from[0], centre[1] - from[1]]);
         let clear =
             smooth((near(pressed.touches_mm) / apart(pressed.touches_mm).max(0.1)).min(1.0));
@@ -104,7 +106,7 @@ fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
     std::array::from_fn(|k| weigh(k) * border[0] * border[1])
 }
 
-/// From 0 to 1 with level ends.
+/// A smooth step from 0 to 1 with slope 0 at both ends.
 fn smooth(part: f64) -> f64 {
     part * part * (3.0 - 2.0 * part)
 }

@@ -1,47 +1,46 @@
-//! The force that a label of the paper's stage means: the tip moves the label's way, the film
-//! sticks to it or it slides over the film, and a gauge reads the force along the way.
+//! The force that a label of the paper's stage means. The tip moves in the label's direction, the
+//! film sticks to it or the tip slides, and a gauge reads the force along the direction.
 
 use crate::film::reduced::{LARGEST_TILT, Pose};
 
-/// The film as a tip on a stage feels it.
+/// The film's answer to a tip on a stage.
 pub trait Felt {
-    /// Where the tip goes under a load, mm.
+    /// Returns the tip's displacement under a load, mm.
     fn tip_mm(&self, pose: &Pose) -> [f64; 3];
-    /// A force's size, by how far the film gives.
+    /// Returns the size, as in [`Pose`], of a force in N on this film.
     fn size_of(&self, force_n: f64) -> f64;
 }
 
-/// What a stage does.
+/// The motion and the gauge reading of a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stage {
-    /// The way of the tip along x and y for one along −z.
+    /// The tip's travel along x and y per travel along −z.
     pub tangents: [f64; 2],
-    /// The force along that way, N, > 0.
+    /// The force along that direction, N, > 0.
     pub force_n: f64,
     /// Where the tip first touches the film, mm.
     pub offset_mm: [f64; 2],
-    /// The largest tangential force in parts of the normal one, up to 0.8: beyond it the tip
-    /// slides.
+    /// The largest ratio of tangential to normal force, up to 0.8. Beyond it the tip slides.
     pub friction: f64,
 }
 
 /// The tip of a stage at rest on the film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// The load on the film, with the place that the tip is on now.
+    /// The load on the film; its place is the tip's present one.
     pub pose: Pose,
     /// |F|, N.
     pub magnitude_n: f64,
 }
 
-/// Newton's steps at most, and by what unknowns are differentiated.
+/// The largest number of Newton's steps, and the step by which unknowns are differentiated.
 const MOST_STEPS: usize = 40;
 const STEP: f64 = 1e-3;
-/// What the tip may be off its way, in parts of its depth.
+/// The tip's largest allowed distance from its path, in parts of its depth.
 const TOLERANCE: f64 = 1e-6;
 
 impl Stage {
-    /// The load under which the tip is on its way.
+    /// Returns the load under which the tip is on its path.
     pub fn reach(&self, film: &impl Felt) -> Reached {
         let steepest = libm::atan(self.friction).min(LARGEST_TILT);
         let held = solve([0.0; 2], |tilt| self.off_its_way(film, tilt, [0.0; 2]));
@@ -50,8 +49,8 @@ impl Stage {
         if steep <= steepest {
             return self.reached(film, tilt, [0.0; 2]);
         }
-        // It slides along the tangential force: unknown are that direction and how far, in parts of
-        // the depth.
+        // The tip slides along the tangential force. The unknowns are the direction of the slide
+        // and its length in parts of the depth.
         let [x, y] = self.tangents;
         let along = |turn: f64| {
             let (sin, cos) = libm::sincos(turn);
@@ -70,7 +69,7 @@ impl Stage {
         self.reached(film, tilt, part)
     }
 
-    /// The load of a tilt, with the tip slid so far, in parts of its depth.
+    /// Returns the load with this tilt; the tip has slid by `slid`, in parts of its depth.
     fn reached(&self, film: &impl Felt, tilt: [f64; 2], slid: [f64; 2]) -> Reached {
         let mut pose = Pose {
             size: 0.0,
@@ -91,7 +90,7 @@ impl Stage {
         Reached { pose, magnitude_n }
     }
 
-    /// How far the tip is off its way, in parts of its depth.
+    /// Returns the tip's distance from its path, in parts of its depth.
     fn off_its_way(&self, film: &impl Felt, tilt: [f64; 2], slid: [f64; 2]) -> [f64; 2] {
         let Reached { pose, .. } = self.reached(film, tilt, slid);
         let [x, y, z] = film.tip_mm(&pose);
@@ -100,7 +99,7 @@ impl Stage {
     }
 }
 
-/// Newton's method for two unknowns; none where it finds no root.
+/// Newton's method for two unknowns. Returns `None` if it finds no root.
 fn solve(start: [f64; 2], off: impl Fn([f64; 2]) -> [f64; 2]) -> Option<[f64; 2]> {
     let mut at = start;
     for _ in 0..MOST_STEPS {
@@ -135,7 +134,7 @@ fn solve(start: [f64; 2], off: impl Fn([f64; 2]) -> [f64; 2]) -> Option<[f64; 2]
 mod tests {
     use super::*;
 
-    /// A spring, softer sideways by four.
+    /// A film of springs, four times softer sideways.
     struct Springs;
 
     impl Felt for Springs {
@@ -175,7 +174,7 @@ mod tests {
         let reached = stage.reach(&Springs);
         let [x, y, z] = reached.pose.force_n();
         assert!((x / -z - 0.5).abs() < 1e-9 && y.abs() < 1e-9);
-        // The stage went 0.2 of the depth; the film gave 0.125 of it.
+        // The stage moved by 0.2 of the depth, and the film gave way by 0.125 of it.
         let slid = reached.pose.place_mm[0] - 0.1;
         assert!((slid - 0.075 * 40.0 * -z).abs() < 1e-5, "{slid}");
     }

@@ -8,23 +8,24 @@ use crate::film::FilmError;
 use crate::film::MAX_RATIO;
 use crate::film::reduced::NOMINAL_RADIUS_MM;
 
-/// What the label (α, β, |F|) of a load says of the tip. It decides how well anything can be
-/// measured: at 0.2 N a degree moves the markers by 0.2 px (`Force`) or 1.8 px (`Stick`) at
-/// 800×600.
+/// How the label (α, β, |F|) of a load relates to the tip. It decides how well anything can be
+/// measured: at 0.2 N and 800×600, a degree moves the markers by 0.2 px (`Force`) or 1.8 px
+/// (`Stick`).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(try_from = "String"))]
 pub enum Contact {
-    /// The force on the film has that direction and size; the tip goes where the film lets it.
+    /// The label is the direction and size of the force on the film. The tip goes where the film
+    /// lets it.
     #[default]
     Force,
-    /// The tip moves in that direction and the film sticks to it, up to a friction ratio of 0.8;
-    /// |F| is the force along it, as a gauge on the paper's stage reads it. The force on the film
-    /// is tilted more than the travel.
+    /// The tip moves in the label's direction and the film sticks to it, up to a friction ratio of
+    /// 0.8. |F| is the force along that direction, as a gauge on the paper's stage reads it. The
+    /// force on the film is tilted more than the travel.
     Stick,
     /// As `Stick`, until the sideways force is μ times the normal one (in the film's frame). Then
-    /// the tip slides over the film the way it is moved, and the sideways force stays μ times the
-    /// normal one.
+    /// the tip slides over the film in its direction of travel, and the sideways force stays at μ
+    /// times the normal one.
     Slip {
         /// The friction ratio, 0.05 to 0.8.
         mu: f64,
@@ -34,7 +35,7 @@ pub enum Contact {
 impl FromStr for Contact {
     type Err = FilmError;
 
-    /// `force`, `stick` or `slip:0.6`, the friction ratio.
+    /// Reads `force`, `stick` or, with the friction ratio, `slip:0.6`.
     fn from_str(text: &str) -> Result<Contact, FilmError> {
         let contact = match (text, text.strip_prefix("slip:")) {
             ("force", _) => Some(Contact::Force),
@@ -71,7 +72,7 @@ impl fmt::Display for Contact {
 
 impl Contact {
     /// # Errors
-    /// When the friction ratio is outside its range.
+    /// If the friction ratio is outside its range.
     fn check(self) -> Result<(), FilmError> {
         match self {
             Contact::Slip { mu } if !(0.05..=MAX_RATIO).contains(&mu) => {
@@ -84,12 +85,12 @@ impl Contact {
     }
 }
 
-/// What presses on the film: a labelled force in newtons, what its label means and where it acts.
+/// A load on the film: a labelled force in newtons, the meaning of its label, and its place.
 ///
-/// Film frame, right-handed: x right and y down in the image, z away from the camera, so that a
-/// press has F_z < 0. F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's (the
-/// paper's goniometer, Section 6). Whether the film can take it is the film's to say
-/// ([`crate::film::Film::check`]), and what force then really acts on it ([`crate::film::Pressed::force_n`]).
+/// Film frame, right-handed: x right and y down in the image, z away from the camera. A press has
+/// F_z < 0. F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's (the paper's
+/// goniometer, Section 6). [`crate::film::Film::check`] decides whether the film can take the load.
+/// [`crate::film::Pressed::force_n`] is the force that then acts on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     vector_n: [f64; 3],
@@ -102,7 +103,7 @@ pub struct Load {
 }
 
 impl Load {
-    /// No force. A force without size has no direction: α and β are 0.
+    /// No force. A force of size 0 has no direction: α and β are 0.
     pub const REST: Load = Load {
         vector_n: [0.0; 3],
         magnitude_n: 0.0,
@@ -113,10 +114,10 @@ impl Load {
         tip_radius_mm: NOMINAL_RADIUS_MM,
     };
 
-    /// A force by size (N, ≥ 0) and direction (degrees, between −90 and 90).
+    /// Returns a force of a size (N, ≥ 0) and a direction (degrees, between −90 and 90).
     ///
     /// # Errors
-    /// When a number is not finite, `magnitude_n` is negative or an angle is not between −90° and
+    /// If a number is not finite, `magnitude_n` is negative or an angle is not between −90° and
     /// 90°.
     pub fn from_angles(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Result<Load, FilmError> {
         check_magnitude(magnitude_n)?;
@@ -137,10 +138,10 @@ impl Load {
         })
     }
 
-    /// A force by its vector (N) in the film frame, F_z < 0 (or no force at all).
+    /// Returns a force from its vector (N) in the film frame, with F_z < 0, or the zero vector.
     ///
     /// # Errors
-    /// When a component is not finite, or the force does not press (F_z ≥ 0).
+    /// If a component is not finite, or the force does not press (F_z ≥ 0).
     pub fn from_vector(vector_n: [f64; 3]) -> Result<Load, FilmError> {
         let [x, y, z] = vector_n;
         let magnitude_n = (x * x + y * y + z * z).sqrt();
@@ -162,19 +163,19 @@ impl Load {
         })
     }
 
-    /// The same label with another meaning.
+    /// Returns the same label with another meaning.
     ///
     /// # Errors
-    /// When the friction ratio is outside its range.
+    /// If the friction ratio is outside its range.
     pub fn with_contact(self, contact: Contact) -> Result<Load, FilmError> {
         contact.check()?;
         Ok(Load { contact, ..self })
     }
 
-    /// The same load where the tip first touches the film (x, y) mm from the middle.
+    /// Returns the same load; its tip first touches the film (x, y) mm from the middle.
     ///
     /// # Errors
-    /// When a number is not finite.
+    /// If a number is not finite.
     pub fn with_offset_mm(self, offset_mm: [f64; 2]) -> Result<Load, FilmError> {
         if !offset_mm.iter().all(|part| part.is_finite()) {
             return Err(FilmError::Load(format!(
@@ -184,10 +185,10 @@ impl Load {
         Ok(Load { offset_mm, ..self })
     }
 
-    /// The same load by a tip that spreads it over a disc of this radius, mm.
+    /// Returns the same load by a tip that spreads it over a disc of this radius, mm.
     ///
     /// # Errors
-    /// When it is not finite.
+    /// If the radius is not finite.
     pub fn with_tip_radius_mm(self, tip_radius_mm: f64) -> Result<Load, FilmError> {
         if !tip_radius_mm.is_finite() {
             return Err(FilmError::Load(format!(
@@ -200,8 +201,8 @@ impl Load {
         })
     }
 
-    /// The same load with what it leaves open, which is what every load begins with; both must be
-    /// possible.
+    /// Returns the load with these values in place of those that it leaves open. A new load leaves
+    /// them all open. The values must be possible.
     pub fn or(self, contact: Contact, offset_mm: [f64; 2], tip_radius_mm: f64) -> Load {
         let plain = self.contact == Contact::Force;
         let central = self.offset_mm == [0.0; 2];
@@ -218,38 +219,38 @@ impl Load {
         }
     }
 
-    /// What the label means.
+    /// Returns the meaning of the label.
     pub fn contact(&self) -> Contact {
         self.contact
     }
 
-    /// Where the tip first touches the film, mm from the middle along x and y.
+    /// Returns the place where the tip first touches the film, mm from the middle along x and y.
     pub fn offset_mm(&self) -> [f64; 2] {
         self.offset_mm
     }
 
-    /// Radius of the disc over which the tip spreads its force, by (1 − r²/R²)², mm.
+    /// Returns the radius of the disc over which the tip spreads its force, by (1 − r²/R²)², mm.
     pub fn tip_radius_mm(&self) -> f64 {
         self.tip_radius_mm
     }
 
-    /// (F_x, F_y, F_z) in N, as the label says: the force on the film in the reading
-    /// [`Contact::Force`], otherwise |F| along the tip's way.
+    /// Returns the label's vector (F_x, F_y, F_z) in N. In the reading [`Contact::Force`] it is the
+    /// force on the film, otherwise |F| along the tip's direction of travel.
     pub fn vector_n(&self) -> [f64; 3] {
         self.vector_n
     }
 
-    /// |F| in N, ≥ 0.
+    /// Returns |F| in N, ≥ 0.
     pub fn magnitude_n(&self) -> f64 {
         self.magnitude_n
     }
 
-    /// α in degrees, −90 to 90; 0 at rest.
+    /// Returns α in degrees, −90 to 90; 0 at rest.
     pub fn alpha_deg(&self) -> f64 {
         self.alpha_deg
     }
 
-    /// β in degrees, −90 to 90; 0 at rest.
+    /// Returns β in degrees, −90 to 90; 0 at rest.
     pub fn beta_deg(&self) -> f64 {
         self.beta_deg
     }

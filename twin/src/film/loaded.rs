@@ -10,17 +10,18 @@ use crate::film::{Contact, DiscMotion, FilmError, Load, MARKER_CENTRES_MM, field
 
 /// Half the distance between the posts that hold the film, in mm (the paper's a = 14 mm).
 pub const HALF_SIDE_MM: f64 = 14.0;
-/// The largest force that the film's tables hold for, N.
+/// The largest force for which the film's tables hold, N.
 pub const MAX_FORCE_N: f64 = 0.25;
-/// The largest tangential force, in parts of the normal one.
+/// The largest ratio of tangential to normal force.
 pub const MAX_RATIO: f64 = 0.8;
-/// How far from the middle, along x and along y, a tip may press, mm.
+/// The largest distance of a tip's place from the middle, along x and along y, mm.
 pub const MAX_PLACE_MM: f64 = 5.0;
-/// The largest label where the tip sticks or slides, N: the force on the film is larger.
+/// The largest label if the tip sticks or slides, N. The force on the film is larger.
 pub const MAX_LABEL_N: f64 = 0.22;
-/// The largest of |F_x / F_z| and |F_y / F_z| of a label where the tip sticks or slides: tan 12°.
+/// The largest of |F_x / F_z| and |F_y / F_z| of a label if the tip sticks or slides: tan 12°.
 pub const MAX_TANGENT: f64 = 0.212_556_561_670_022_13;
-/// How far from the middle, along x and along y, such a tip may first touch the film, mm.
+/// The largest distance from the middle, along x and along y, at which such a tip may first touch
+/// the film, mm.
 pub const MAX_OFFSET_MM: f64 = 0.25;
 
 /// The nominal film.
@@ -33,37 +34,37 @@ static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
     }
 });
 
-/// What its own weight does.
+/// The effect of the nominal film's own weight.
 static WEIGHT: LazyLock<Weight> = LazyLock::new(|| {
     let weight = Weight::from_bytes(include_bytes!("../../data/weight.bin"));
     weight.expect("the committed table is one of weight")
 });
 
-/// How far from one a direction's length may be.
+/// The largest difference of a direction's length from 1.
 const UNIT_LENGTH: f64 = 1e-3;
 
-/// The film by its tables: markers within 0.1 px of the full solution at 320×240
-/// (`shell/README.md`); the film between them roughly.
+/// The film, computed from its tables. Its markers are within 0.1 px of the full solution at
+/// 320×240 (`shell/README.md`); between them the film is approximate.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Film {
     tables: Arc<Tables>,
     unit: Unit,
-    /// Where gravity pulls, in parts of g; none: it weighs nothing.
+    /// Direction of gravity in parts of g; `None` means that the film weighs nothing.
     down: Option<[f64; 3]>,
 }
 
 impl Default for Film {
-    /// The nominal film: the paper's, 28 × 28 mm between its posts.
+    /// Returns the nominal film: the paper's, 28 × 28 mm between its posts.
     fn default() -> Film {
         NOMINAL.clone()
     }
 }
 
 impl Film {
-    /// The film as one unit has it.
+    /// Returns the film of one unit.
     ///
     /// # Errors
-    /// When the unit is farther from the nominal one than the tables hold.
+    /// If the unit differs more from the nominal one than the tables allow.
     pub fn of(unit: Unit) -> Result<Film, FilmError> {
         unit.check()?;
         Ok(Film {
@@ -72,12 +73,12 @@ impl Film {
         })
     }
 
-    /// The same film with a weight, held so that gravity pulls along `down`, a unit vector in the
-    /// film's frame; of none it weighs nothing. Markers are within 0.1 px of the full solution
-    /// (`shell/README.md`) at rest and from 20 mN on.
+    /// Returns the same film with its weight, held so that gravity pulls along `down`, a unit
+    /// vector in the film's frame. With `None` it weighs nothing. Markers are within 0.1 px of the
+    /// full solution (`shell/README.md`) at rest and from 20 mN on.
     ///
     /// # Errors
-    /// When `down` is no unit vector.
+    /// If `down` is not a unit vector.
     pub fn with_down(self, down: Option<[f64; 3]>) -> Result<Film, FilmError> {
         let length = |[x, y, z]: [f64; 3]| libm::sqrt(x * x + y * y + z * z);
         let length = down.map_or(1.0, length);
@@ -90,10 +91,10 @@ impl Film {
         Ok(Film { down, ..self })
     }
 
-    /// Whether the film can take this load.
+    /// Checks that the film can take this load.
     ///
     /// # Errors
-    /// When the load is outside what the tables hold for.
+    /// If the load is outside the range of the tables.
     pub fn check(&self, load: &Load) -> Result<(), FilmError> {
         let radius = load.tip_radius_mm();
         if !(SMALLEST_RADIUS_MM..=LARGEST_RADIUS_MM).contains(&radius) {
@@ -132,8 +133,8 @@ impl Film {
         within("|F|", load.magnitude_n(), MAX_LABEL_N, "N")
     }
 
-    /// The film under a load that [`Film::check`] accepts. Under another one it stays at the
-    /// tables' limit.
+    /// Returns the film under a load that [`Film::check`] accepts. Under any other load the film
+    /// stays at the limit of the tables.
     pub fn press(&self, load: &Load) -> Pressed {
         let pressed = self.pressed(load);
         match self.down {
@@ -142,7 +143,7 @@ impl Film {
         }
     }
 
-    /// As if it weighed nothing.
+    /// Returns the film under a load, without its weight.
     fn pressed(&self, load: &Load) -> Pressed {
         if load.magnitude_n() == 0.0 {
             return Pressed {
@@ -162,7 +163,7 @@ impl Film {
         }
     }
 
-    /// With what weight does to a film that is pressed so.
+    /// Adds the effect of the weight to a pressed film.
     fn weighted(&self, mut pressed: Pressed, down: [f64; 3]) -> Pressed {
         let pose = self.pose(pressed.force_n, pressed.touches_mm);
         let mut sag_mm = 0.0;
@@ -175,8 +176,8 @@ impl Film {
         pressed
     }
 
-    /// How the film around one marker moves, by its identity 0–3: [`Self::press`] without what it
-    /// says of the others and of the tip.
+    /// Returns the motion of the film around one marker, by its identity 0–3. It is the marker's
+    /// part of [`Self::press`], without the other markers and the tip.
     pub fn marker_motion(&self, load: &Load, marker: usize) -> DiscMotion {
         let mut pose = Pose::default();
         let mut disc = DiscMotion::default();
@@ -190,7 +191,7 @@ impl Film {
         }
     }
 
-    /// The load and the force, N, that a load which presses comes to.
+    /// Returns the pose and the force on the film, N, that a pressing load leads to.
     fn reached(&self, load: &Load) -> (Pose, [f64; 3]) {
         match load.contact() {
             Contact::Force => (
@@ -202,7 +203,7 @@ impl Film {
         }
     }
 
-    /// The load of a force, N, at a place, mm; at the tables' limit where it is beyond.
+    /// Returns the pose of a force, N, at a place, mm. It is clamped to the limits of the tables.
     fn pose(&self, force_n: [f64; 3], place_mm: [f64; 2]) -> Pose {
         let stiffness = self.unit.bending_and_stretching();
         let mut pose = Pose::of_force(force_n, place_mm, stiffness);
@@ -212,7 +213,7 @@ impl Film {
         pose
     }
 
-    /// The load and the force, N, of a label whose tip is on a stage.
+    /// Returns the pose and the force on the film, N, of a label whose tip is on a stage.
     fn on_stage(&self, load: &Load, friction: f64) -> (Pose, [f64; 3]) {
         let [x, y, z] = load.vector_n();
         let stage = Stage {
@@ -229,14 +230,14 @@ impl Film {
         (pose, pose.direction().map(|part| magnitude_n * part))
     }
 
-    /// Where the markers' centres are at rest, by identity, mm.
+    /// Returns the places of the markers' centres at rest, by identity, mm.
     pub fn markers_mm(&self) -> [[f64; 2]; 4] {
         let centre = |k: usize, c: usize| MARKER_CENTRES_MM[k][c] + self.unit.markers_mm[k][c];
         std::array::from_fn(|k| [0, 1].map(|c| centre(k, c)))
     }
 }
 
-/// A film under a tip of a radius.
+/// A film under a tip of one radius.
 struct Under<'a> {
     film: &'a Film,
     radius_mm: f64,
@@ -252,19 +253,19 @@ impl Felt for Under<'_> {
     }
 }
 
-/// The film in one state.
+/// The film in one state: at rest or under a load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressed {
-    /// Where the tip went, mm, film frame (z away from the camera: a press goes to z < 0).
+    /// The tip's displacement, mm, film frame (z away from the camera: a press goes to z < 0).
     pub tip_mm: [f64; 3],
     /// The tip's force on the film, N.
     pub force_n: [f64; 3],
-    /// Which point of the film the tip is on, by where it rests, mm: a tip that slides leaves the
-    /// load's offset.
+    /// The point of the film that the tip touches, given by its place at rest, mm. It differs from
+    /// the load's offset if the tip slides.
     pub touches_mm: [f64; 2],
-    /// Where the markers' centres rest, by identity, mm.
+    /// The markers' centres at rest, by identity, mm.
     pub centres_mm: [[f64; 2]; 4],
-    /// How the film moved at the markers, by identity.
+    /// The motion of the film at the markers, by identity.
     pub discs: [DiscMotion; 4],
 }
 
@@ -282,11 +283,12 @@ impl Default for Pressed {
 }
 
 impl Pressed {
-    /// Where the point of the film's camera side that rests at (x, y) mm moves, mm, film frame.
+    /// Returns the displacement, mm, film frame, of the point of the film's camera side that rests
+    /// at (x, y) mm.
     ///
-    /// On a marker this is the marker's own motion; elsewhere an interpolation between tip, markers
-    /// and posts that is off the full solution by up to 0.4 mm at 0.25 N: good for a thing that
-    /// distracts, not for one that measures.
+    /// On a marker this is the marker's own motion. Elsewhere it is an interpolation between tip,
+    /// markers and posts, with errors up to 0.4 mm against the full solution at 0.25 N. That is
+    /// good enough for things that distract, not for things that measure.
     pub fn displacement(&self, rest_mm: [f64; 2]) -> [f64; 3] {
         field::displacement(self, rest_mm)
     }
@@ -302,7 +304,7 @@ fn sum(a: &DiscMotion, b: &DiscMotion) -> DiscMotion {
 }
 
 fn within(what: &str, value: f64, most: f64, unit: &str) -> Result<(), FilmError> {
-    // Angles come back from a vector with a rounding.
+    // Angles computed from a vector have a rounding error.
     if value <= most * (1.0 + 1e-9) {
         return Ok(());
     }

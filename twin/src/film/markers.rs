@@ -1,4 +1,4 @@
-//! Where the markers are on the film at rest.
+//! The markers' places on the film at rest.
 
 /// Distance of the markers' centres from the film's middle along x and along y, mm.
 pub const MARKER_REST_MM: f64 = 3.717;

@@ -1,12 +1,13 @@
-//! The film of a HiVTac sensor: from a load to where tip and markers go, for every frame.
+//! The film of a HiVTac sensor: from a load to the displacements of tip and markers, for every
+//! frame.
 //!
-//! The film is a nonlinear shell; its finite elements (`hivtac-shell`) take more than half a second for
-//! one press. What a frame needs of it are tables in `data/`, made from full solutions by a command
-//! of that package.
+//! The film is a nonlinear shell. Its finite elements (`hivtac-shell`) take more than half a second
+//! for one press. A frame uses tables in `data/` instead, which a command of that package makes
+//! from full solutions.
 //!
-//! The same bits on every machine: transcendental functions come from `libm` only, and nothing is
-//! fused. Frame and units as in `docs/architecture.md`: x right and y down in the image, z away
-//! from the camera; mm, N.
+//! The results have the same bits on every machine: transcendental functions come from `libm` only,
+//! and no operations are fused. Frame and units are those of `docs/architecture.md`: x right and y
+//! down in the image, z away from the camera; mm, N.
 //!
 //! | file | subject |
 //! |---|---|

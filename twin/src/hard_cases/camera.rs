@@ -1,11 +1,11 @@
-//! What the camera does to a good film.
+//! Hard cases that the camera causes on a good film.
 
 use super::{Expected, HardCase};
 use crate::{
     Camera, Catch, Lens, MARKERS, Motion, Mounting, Options, Paint, Salt, Scene, Shutter, Vibration,
 };
 
-/// The camera knocked so far that the upper markers leave the frame, by its upper edge.
+/// A knock to the camera that moves the upper markers out of the frame at its upper edge.
 pub(super) fn leaving() -> Vec<HardCase> {
     let case = |(name, what, part): (&str, &str, f64)| {
         HardCase::new(name, what, Expected::Either, move |nominal| Options {
@@ -55,8 +55,8 @@ fn shifted(x: f64, y: f64) -> Mounting {
     }
 }
 
-/// A shift upwards that brings so much of marker 0's height out of the frame under the scene's
-/// load.
+/// Returns a shift upwards that moves this part of marker 0's height out of the frame under the
+/// scene's load.
 fn lifted(nominal: &Scene, part: f64) -> Mounting {
     let Some(marker) = nominal.truth(0.0).markers[0] else {
         return Mounting::default();
@@ -66,7 +66,7 @@ fn lifted(nominal: &Scene, part: f64) -> Mounting {
     shifted(0.0, -(top + part * 2.0 * radius))
 }
 
-/// A shift that brings marker 0 at rest out of the frame; a press brings it further.
+/// Returns a shift that moves marker 0 at rest out of the frame; a press moves it further.
 fn gone_px(camera: &Camera) -> f64 {
     let [x, y] = MARKERS[0].centre_mm;
     let lower_edge = y + 1.2 * MARKERS[0].radius_mm;
@@ -116,7 +116,7 @@ pub(super) fn noise() -> Vec<HardCase> {
     cases
 }
 
-/// Out of focus. Blur is in pixels of QVGA, and grows with the frame.
+/// Pictures out of focus. Blur is in pixels of QVGA, and grows with the frame.
 pub(super) fn unsharp() -> Vec<HardCase> {
     let blurred = |(qvga_px, expected): (f64, _)| {
         let name = format!("blur-{qvga_px}");
@@ -153,7 +153,7 @@ pub(super) fn unsharp() -> Vec<HardCase> {
     cases
 }
 
-/// Motion under a rolling shutter that takes a sixtieth of a second for a frame.
+/// Motion under a rolling shutter that takes 1/60 s for a frame.
 pub(super) fn moving() -> Vec<HardCase> {
     let case = |name: &str, what: &str, exposure_s, motion| {
         let still = HardCase::new(name, what, Expected::Either, move |_| Options {
@@ -188,7 +188,7 @@ pub(super) fn moving() -> Vec<HardCase> {
     ]
 }
 
-/// JPEG.
+/// Pictures compressed by JPEG.
 pub(super) fn compressed() -> Vec<HardCase> {
     let case = |(quality, expected): (u8, _)| {
         let name = format!("jpeg-{quality}");

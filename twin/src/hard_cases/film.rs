@@ -1,9 +1,9 @@
-//! Things on the film, and markers that are not as they should be.
+//! Hard cases on the film: extra things, and damaged markers.
 
 use super::{Expected, HardCase, patched};
 use crate::{MARKERS, Options, Paint, Patch, Specks};
 
-/// The marker that is tampered with: upper right.
+/// The marker that a case changes: upper right.
 const TARGET: usize = 1;
 
 fn patch(centre_mm: [f64; 2], radius_mm: f64, paint: Paint) -> Patch {
@@ -14,14 +14,14 @@ fn patch(centre_mm: [f64; 2], radius_mm: f64, paint: Paint) -> Patch {
     }
 }
 
-/// A place so far from the target marker's centre, towards the film's middle, mm.
+/// Returns a place at a distance, mm, from the target marker's centre towards the film's middle.
 fn inwards(distance_mm: f64) -> [f64; 2] {
     let [x, y] = MARKERS[TARGET].centre_mm;
     let step = distance_mm * std::f64::consts::FRAC_1_SQRT_2;
     [x - step, y + step]
 }
 
-/// Red things besides the markers.
+/// Red things in addition to the markers.
 pub(super) fn red_things() -> Vec<HardCase> {
     let case = |(name, what, expected, centre_mm, radius_mm)| {
         HardCase::new(name, what, expected, move |_| {
@@ -111,7 +111,7 @@ pub(super) fn merged() -> Vec<HardCase> {
     [(0, 1), (1, 2), (0, 2)].into_iter().map(case).collect()
 }
 
-/// Discs in a row that together are a stripe of a half width, mm.
+/// Returns discs in a row that together form a stripe of a half width, mm.
 fn stripe(from_mm: [f64; 2], to_mm: [f64; 2], half_mm: f64, paint: Paint) -> Vec<Patch> {
     let (dx, dy) = (to_mm[0] - from_mm[0], to_mm[1] - from_mm[1]);
     let count = ((dx * dx + dy * dy).sqrt() / half_mm * 2.0).ceil().max(1.0);
@@ -123,7 +123,7 @@ fn stripe(from_mm: [f64; 2], to_mm: [f64; 2], half_mm: f64, paint: Paint) -> Vec
     (0..=count as u32).map(at).collect()
 }
 
-/// Markers that have come off.
+/// Markers that came off.
 pub(super) fn missing() -> Vec<HardCase> {
     let without = |name: String, what: &str, gone: &'static [usize], patches: Vec<Patch>| {
         HardCase::new(name, what, Expected::Rejected, move |_| Options {
@@ -157,14 +157,14 @@ pub(super) fn missing() -> Vec<HardCase> {
     cases
 }
 
-/// A marker cut by a stripe of the film's colour, or bitten from a side.
+/// A marker that a stripe of the film's colour cuts in two, or that is bitten from a side.
 pub(super) fn cut() -> Vec<HardCase> {
     let [x, y] = MARKERS[TARGET].centre_mm;
     let through = move |width_mm: f64| {
         let name = format!("cut-{width_mm:.2}-mm");
         let what = "a stripe through a marker, in the film's colour";
         HardCase::new(name, what, Expected::Either, move |_| {
-            // A little beside the middle, so that its halves differ.
+            // The stripe is a little off the middle, to make unequal halves.
             let (x, half) = (x + 0.1, width_mm / 2.0);
             patched(stripe([x, y - 0.7], [x, y + 0.7], half, Paint::Film))
         })

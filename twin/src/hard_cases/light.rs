@@ -1,10 +1,10 @@
-//! Too little light, or of the wrong colour.
+//! Hard cases of the light: too dim, or of the wrong colour.
 
 use super::{Expected, HardCase};
 use crate::Options;
 
-/// Dark all over. The default threshold asks for a value of 45 of 255, which red tape reaches at a
-/// gain of about 0.3; a second look does not ask for it.
+/// A dark picture. The default threshold needs a value of 45 of 255, which red tape reaches at a
+/// gain of about 0.3. A second look does not need it.
 pub(super) fn dark() -> Vec<HardCase> {
     let case = |(gain, expected)| {
         let name = format!("gain-{gain:.2}");
@@ -22,7 +22,7 @@ pub(super) fn dark() -> Vec<HardCase> {
     gains.into_iter().map(case).collect()
 }
 
-/// Dark on one side.
+/// A picture that is dark on one side.
 pub(super) fn one_sided() -> Vec<HardCase> {
     let case = |(name, what, gain, gradient, expected)| {
         HardCase::new(name, what, expected, move |_| Options {
@@ -65,7 +65,7 @@ pub(super) fn one_sided() -> Vec<HardCase> {
     cases.into_iter().map(case).collect()
 }
 
-/// Stray light and casts.
+/// Stray light and colour casts.
 pub(super) fn veiled() -> Vec<HardCase> {
     let haze = |haze: f64| {
         let name = format!("haze-{haze}");

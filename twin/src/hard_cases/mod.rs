@@ -1,4 +1,4 @@
-//! Scenes in which markers are hard to find: the catalogue that the sensing is held against.
+//! The catalogue of scenes in which markers are hard to find; the sensing is tested against it.
 
 mod camera;
 mod film;
@@ -11,37 +11,37 @@ use crate::{Load, Motion, Options, Patch, Preset, Scene, SceneError};
 
 /// A scene in which markers are hard to find.
 ///
-/// The rule for every one of them: the markers are found within [`HardCase::tolerance_px`] of the
-/// truth, or there is no force and a status that says why. Never is a force silently wrong.
+/// The rule for each of them: the sensing finds the markers within [`HardCase::tolerance_px`] of
+/// the truth, or gives no force and a status with the reason. A force is never silently wrong.
 #[derive(Clone)]
 pub struct HardCase {
     /// Its name, such as `gain-0.30`; unique.
     pub name: String,
-    /// What is hard about it, for a reader.
+    /// What makes it hard, for a reader.
     pub what: String,
-    /// What sensing should make of it.
+    /// The correct result of the sensing.
     pub expected: Expected,
     motion: Motion,
     noisy: bool,
     conditions: Conditions,
 }
 
-/// The options of a case; where things are in the picture depends on the nominal scene.
+/// The options of a case. They depend on the nominal scene, which has the places in the picture.
 type Conditions = Arc<dyn Fn(&Scene) -> Options + Send + Sync>;
 
-/// What sensing should make of a case.
+/// The correct result of the sensing in a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Expected {
-    /// The markers are plain to see: rejecting them is a fault.
+    /// The markers are plain to see: it is a fault to reject them.
     Found,
-    /// What the frame shows does not say where the markers are: any force is a fault.
+    /// The frame does not show where the markers are: any force is a fault.
     Rejected,
-    /// Whichever it is, if it is right.
+    /// Both results are correct, as long as a force is right.
     Either,
 }
 
 impl Expected {
-    /// `found`, `rejected` or `either`.
+    /// Returns `found`, `rejected` or `either`.
     pub fn name(self) -> &'static str {
         match self {
             Expected::Found => "found",
@@ -68,11 +68,11 @@ impl HardCase {
         }
     }
 
-    /// The case as a scene. Nothing moves in most: they show 0.1 N at α = 4°, β = −3°, and
+    /// Returns the case as a scene. Most cases do not move: they show 0.1 N at α = 4°, β = −3°, and
     /// [`Scene::render_load`] shows them under any other load. See [`HardCase::moves`].
     ///
     /// # Errors
-    /// When the frame size is not one.
+    /// If the frame size is not one of the preset's.
     pub fn scene(
         &self,
         preset: Preset,
@@ -86,14 +86,15 @@ impl HardCase {
         nominal.with_options(options)
     }
 
-    /// Whether the case is about motion: [`Scene::frame`] at several times shows it, a constant
-    /// load does not.
+    /// Returns whether the case is about motion. [`Scene::frame`] at several times shows it, a
+    /// constant load does not.
     pub fn moves(&self) -> bool {
         !matches!(self.motion, Motion::Static(_))
     }
 
-    /// How far a marker may be found from the truth in frames of a width, px: 0.3 up to QVGA, 0.15
-    /// at 800×600, linear between them; 1 where the noise is four times the usual.
+    /// Returns the largest allowed distance of a marker from the truth in frames of a width, px. It
+    /// is 0.3 up to QVGA, 0.15 at 800×600, linear between them; 1 in cases with four times the
+    /// usual noise.
     pub fn tolerance_px(&self, width: u32) -> f64 {
         if self.noisy {
             return 1.0;
@@ -115,7 +116,7 @@ impl fmt::Debug for HardCase {
     }
 }
 
-/// Every hard case.
+/// Returns every hard case.
 pub fn hard_cases() -> Vec<HardCase> {
     let groups = [
         light::dark(),
@@ -136,7 +137,7 @@ pub fn hard_cases() -> Vec<HardCase> {
     groups.into_iter().flatten().collect()
 }
 
-/// Loads under which a still case should be tried: rest, and presses over the calibrated range.
+/// Returns the loads for trying a still case: rest, and presses over the calibrated range.
 pub fn hard_loads() -> Vec<Load> {
     let presses = [
         (0.0, 0.0, 0.0),

@@ -1,4 +1,5 @@
-//! Objects in a gripper, of which the sensor is one finger: it feels half of what they weigh.
+//! The force of objects in a gripper. The sensor is one of its two fingers and carries half of an
+//! object's weight.
 
 use std::f64::consts::PI;
 
@@ -13,9 +14,10 @@ const GRAVITY: f64 = 9.806_65;
 /// Grasp an object from a table, lift it, hold it, put it down, let go (the paper's Section 7.3 and
 /// Figure 15).
 ///
-/// The grip rises; lifting takes the weight off the table, speeds up and slows down again; all of
-/// it backwards at the end. The paper's objects weigh 30 and 36 g, which pull more steeply than the
-/// 12° of its calibration and of the film's default range: the default object is lighter.
+/// The grip rises. Lifting takes the weight off the table, accelerates and slows down again; the
+/// end is the same backwards. The paper's objects weigh 30 and 36 g. They pull more steeply than
+/// the 12° of the paper's calibration and of the film's default range: the default object is
+/// lighter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -24,22 +26,22 @@ pub struct Grasp {
     pub grip_n: f64,
     /// Mass of the object, 0–1000 g; two fingers share it.
     pub mass_g: f64,
-    /// Where down is, degrees from x towards y, ±360.
+    /// Direction of down, degrees from x towards y, ±360.
     pub down_deg: f64,
-    /// Largest acceleration on the way, 0–10 m/s².
+    /// Largest acceleration during the lift, 0–10 m/s².
     pub acceleration: f64,
-    /// When the gripper closes, s.
+    /// Time at which the gripper closes, s.
     pub start_s: f64,
-    /// How long it closes, and at the end opens, s.
+    /// Time that it takes to close, and to open at the end, s.
     pub close_s: f64,
-    /// How long it lifts, and at the end puts down, s.
+    /// Time that it takes to lift, and to put down at the end, s.
     pub lift_s: f64,
-    /// How long it holds, s.
+    /// Time for which it holds, s.
     pub hold_s: f64,
 }
 
 impl Default for Grasp {
-    /// 5 g in a grip of 0.15 N, hanging towards +y; lifted within 0.4 s at up to 1 m/s².
+    /// 5 g in a grip of 0.15 N, with down towards +y; lifted within 0.4 s at up to 1 m/s².
     fn default() -> Grasp {
         Grasp {
             grip_n: 0.15,
@@ -71,8 +73,8 @@ impl Grasp {
         let lowered_s = closed_s + self.lift_s + self.hold_s;
         let gripped = ramp(time_s - self.start_s, self.close_s)
             - ramp(time_s - lowered_s - self.lift_s, self.close_s);
-        // The table bears nothing any more after a tenth of the way up, and again a tenth before
-        // the end.
+        // The table carries no weight from a tenth of the lift on, until a tenth before the end of
+        // the descent.
         let tenth_s = self.lift_s / 10.0;
         let hanging = ramp(time_s - closed_s, tenth_s)
             - ramp(time_s - lowered_s - self.lift_s + tenth_s, tenth_s);
@@ -82,7 +84,7 @@ impl Grasp {
         pressed_and_pulled(self.grip_n * gripped, weight_n, self.down_deg)
     }
 
-    /// Acceleration of a way that begins at time 0: speeds up, slows down; m/s².
+    /// Returns the acceleration of a lift that begins at time 0, first up, then down; m/s².
     fn speeding(&self, time_s: f64) -> f64 {
         if time_s <= 0.0 || time_s >= self.lift_s {
             return 0.0;
@@ -94,8 +96,8 @@ impl Grasp {
 /// Catch an object: it hits, bounces on the film with decaying force, and is held (the paper's
 /// Figure 1).
 ///
-/// From the impact on, |F| = hold · (1 − d·cos ωt) + peak · d·sin ωt with d = exp(−t / decay), and
-/// nothing while that is negative, when the object has left the film. The direction of the impact
+/// From the impact on, |F| = hold · (1 − d·cos ωt) + peak · d·sin ωt with d = exp(−t / decay). If
+/// that is negative, the object has left the film and the force is 0. The direction of the impact
 /// dies away as d does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
@@ -103,23 +105,23 @@ impl Grasp {
 pub struct Catch {
     /// Amplitude of the impact, N; the largest force is a little more or less.
     pub peak_n: f64,
-    /// Force when it is held, N.
+    /// Force while the object is held, N.
     pub hold_n: f64,
     /// Direction of the impact, degrees.
     pub alpha_deg: f64,
     /// Direction of the impact, degrees.
     pub beta_deg: f64,
-    /// Frequency of object on film, 0.1–1000 Hz.
+    /// Frequency of the object on the film, 0.1–1000 Hz.
     pub frequency_hz: f64,
     /// Time in which the oscillation falls to 1/e, 0.001–1000 s.
     pub decay_s: f64,
-    /// When it hits, s.
+    /// Time of the impact, s.
     pub start_s: f64,
 }
 
 impl Default for Catch {
-    /// Hits with 0.2 N at α = 8°, β = −5° and ends in 0.06 N; 10 Hz, gone in 0.1 s: some 30 g on a
-    /// film of 0.1 N/mm.
+    /// An impact of 0.2 N at α = 8°, β = −5° that ends in 0.06 N; 10 Hz, gone in 0.1 s. That is an
+    /// object of about 30 g on a film of 0.1 N/mm.
     fn default() -> Catch {
         Catch {
             peak_n: 0.2,

@@ -1,4 +1,4 @@
-//! Loads in time.
+//! Motions: loads as functions of time.
 
 mod grip;
 mod press;
@@ -13,22 +13,22 @@ pub use slide::Drag;
 
 use crate::{Load, SceneError};
 
-/// What presses the film, as a function of time. Before time 0, and at a time that is no number,
-/// nothing does.
+/// The load on the film as a function of time. Before time 0, and at a time that is not finite, it
+/// is zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// Nothing presses.
+    /// No load.
     Rest,
     /// One load, from time 0 on.
     Static(Load),
     /// A tenth of a second of rest, then a tip whose force wanders smoothly: |F| 0.02–0.2 N, |α| ≤
     /// 8°, |β| ≤ 6°.
     Demo {
-        /// Decides where α and β start.
+        /// Decides the start of α and β.
         seed: u64,
     },
-    /// |F| goes 0 → 0.2 N → 0 in 4 s, again and again; straight, then tilted by α = ±8° and by β =
-    /// ±6°.
+    /// |F| goes 0 → 0.2 N → 0 in 4 s, again and again: straight, then tilted by α = ±8° and by
+    /// β = ±6°.
     Sweep,
     /// Press, hold, release.
     Press(Press),
@@ -42,7 +42,8 @@ pub enum Motion {
     Vibration(Vibration),
 }
 
-/// How long of a motion is tried on the film before it is accepted, and in which steps.
+/// Length of the part of a motion that is tried on the film before the motion is accepted, and its
+/// step.
 const TRIED_S: f64 = 10.0;
 const TRIED_STEP_S: f64 = 0.001;
 
@@ -60,11 +61,11 @@ impl Motion {
         "vibration",
     ];
 
-    /// A motion by its name, with default parameters: one of [`Motion::NAMES`]. `static` is 0.1 N
-    /// at α = 4°, β = −3°. The seed decides where `demo` starts.
+    /// Returns a motion by its name, with default parameters: one of [`Motion::NAMES`]. `static` is
+    /// 0.1 N at α = 4°, β = −3°. The seed decides where `demo` starts.
     ///
     /// # Errors
-    /// When there is none of that name.
+    /// If no motion has that name.
     pub fn named(name: &str, seed: u64) -> Result<Motion, SceneError> {
         match name {
             "rest" => Ok(Motion::Rest),
@@ -80,7 +81,7 @@ impl Motion {
         }
     }
 
-    /// The load at a time in seconds.
+    /// Returns the load at a time in seconds.
     pub fn load(&self, time_s: f64) -> Load {
         if !time_s.is_finite() || time_s < 0.0 {
             return Load::REST;
@@ -98,11 +99,11 @@ impl Motion {
         }
     }
 
-    /// Whether its parameters are possible and the film can take (`film` says) what it does in its
-    /// first ten seconds.
+    /// Checks that the parameters are possible, and by `film` that the film can take the loads of
+    /// the motion's first ten seconds.
     ///
     /// # Errors
-    /// When a parameter is outside its range, or the film cannot take a load on the way.
+    /// If a parameter is outside its range, or the film cannot take a load of the motion.
     pub(crate) fn check(
         &self,
         film: impl Fn(&Load) -> Result<(), SceneError>,
@@ -121,19 +122,19 @@ impl Motion {
     }
 }
 
-/// A load that is possible: a size from 0 up and angles of a press.
+/// Returns a load of a size ≥ 0 and the angles of a press; [`Load::REST`] if they are impossible.
 fn load(magnitude_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
     Load::from_angles(magnitude_n, alpha_deg, beta_deg).unwrap_or(Load::REST)
 }
 
-/// A load by its pressure on the film (N, ≥ 0) and its pull along a direction in the film's plane
-/// (degrees from x towards y). What does not press does not pull.
+/// Returns a load from its pressure on the film (N, ≥ 0) and its pull along a direction in the
+/// film's plane (degrees from x towards y). Without pressure there is no pull.
 fn pressed_and_pulled(normal_n: f64, lateral_n: f64, direction_deg: f64) -> Load {
     let (sin, cos) = libm::sincos(crate::camera::radians(direction_deg));
     Load::from_vector([lateral_n * cos, lateral_n * sin, -normal_n]).unwrap_or(Load::REST)
 }
 
-/// From 0 at time 0 to 1 after `rise_s`, smoothly (half a cosine); at once when that is 0.
+/// Rises smoothly (half a cosine) from 0 at time 0 to 1 after `rise_s`; at once if that is 0.
 fn ramp(time_s: f64, rise_s: f64) -> f64 {
     if time_s <= 0.0 {
         return 0.0;
@@ -167,7 +168,7 @@ mod tests {
                 .collect();
             for (n, pair) in loads.windows(2).enumerate() {
                 let step = pair[1].magnitude_n() - pair[0].magnitude_n();
-                // `demo` begins with 0.02 N at once.
+                // `demo` starts with a step of 0.02 N.
                 assert!(step.abs() < 0.021, "{name}: {step} N at {n} ms");
             }
             let largest = loads.iter().map(Load::magnitude_n).fold(0.0, f64::max);

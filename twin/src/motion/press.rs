@@ -6,11 +6,11 @@ use super::{load, ramp};
 use crate::options::within;
 use crate::{Load, SceneError};
 
-/// Longest time of a part of a motion, s.
+/// Range of the time of one part of a motion, s.
 pub(super) const LONGEST_S: [f64; 2] = [0.0, 1000.0];
-/// Forces that a motion may ask for, N; what the film can take is less.
+/// Range of forces in a motion, N; the film's own limit is lower.
 pub(super) const FORCES_N: [f64; 2] = [0.0, 1.0];
-/// Angles of a press, degrees.
+/// Range of a press's angles, degrees.
 pub(super) const ANGLES_DEG: [f64; 2] = [-45.0, 45.0];
 
 /// Press, hold, release: |F| rises and falls with half a cosine.
@@ -18,19 +18,19 @@ pub(super) const ANGLES_DEG: [f64; 2] = [-45.0, 45.0];
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Press {
-    /// |F| while it holds, N.
+    /// |F| during the hold, N.
     pub force_n: f64,
     /// Its direction, degrees.
     pub alpha_deg: f64,
     /// Its direction, degrees.
     pub beta_deg: f64,
-    /// When it begins, s.
+    /// Time at which it begins, s.
     pub start_s: f64,
-    /// How long it rises, s.
+    /// Time of the rise, s.
     pub rise_s: f64,
-    /// How long it holds, s.
+    /// Time of the hold, s.
     pub hold_s: f64,
-    /// How long it falls, s.
+    /// Time of the fall, s.
     pub fall_s: f64,
 }
 
@@ -69,8 +69,8 @@ impl Press {
     }
 }
 
-/// A press with a sinusoid on it, from its start to the end of time: |F| = force + amplitude · sin,
-/// once it has risen.
+/// A press with a sinusoid on it, from its start on without end: once it has risen, |F| = force +
+/// amplitude · sin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -85,9 +85,9 @@ pub struct Vibration {
     pub amplitude_n: f64,
     /// Its frequency, 0–1000 Hz.
     pub frequency_hz: f64,
-    /// When the press begins, s.
+    /// Time at which the press begins, s.
     pub start_s: f64,
-    /// How long it rises, s; the sinusoid rises with it.
+    /// Time of the rise, s; the sinusoid rises with it.
     pub rise_s: f64,
 }
 

@@ -9,37 +9,39 @@ use crate::{Load, SceneError};
 /// release.
 ///
 /// Coulomb friction: the pull grows to `friction_static` · N, then falls to `friction_sliding` · N
-/// within 20 ms. The film is known to a ratio of 0.8: what sticks better than that is out of reach.
+/// within 20 ms. The film's tables reach to a ratio of 0.8; a contact with more friction is out of
+/// their range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
 pub struct Drag {
-    /// The normal force N while it is dragged, N.
+    /// The normal force N during the drag, N.
     pub force_n: f64,
-    /// Where it is dragged to, degrees from x towards y, ±360.
+    /// Direction of the drag, degrees from x towards y, ±360.
     pub direction_deg: f64,
-    /// How fast the pull grows, 0.001–100 N/s.
+    /// Growth of the pull, 0.001–100 N/s.
     pub rate_n_per_s: f64,
-    /// Ratio of pull to normal force at which it slips, 0–2.
+    /// Ratio of pull to normal force at which the contact slips, 0–2.
     pub friction_static: f64,
-    /// Ratio while it slides, at most the static one.
+    /// Ratio during the slide, at most the static one.
     pub friction_sliding: f64,
-    /// When the press begins, s.
+    /// Time at which the press begins, s.
     pub start_s: f64,
-    /// How long it rises, and at the end falls, s.
+    /// Time of the rise, and of the fall at the end, s.
     pub rise_s: f64,
-    /// How long it slides, s.
+    /// Time of the slide, s.
     pub slide_s: f64,
-    /// How far its contact moves over the film meanwhile, from the middle on, 0–4 mm.
+    /// Distance by which the contact moves over the film during the slide, from the middle on, 0–4
+    /// mm.
     pub slide_mm: f64,
 }
 
-/// How long the pull takes to fall when the contact gives way, s.
+/// Time that the pull takes to fall after the contact gives way, s.
 const SLIP_S: f64 = 0.02;
 
 impl Default for Drag {
-    /// 0.12 N, pulled to the right at 0.05 N/s, slipping at a ratio of 0.2 and sliding for 0.5 s at
-    /// 0.15, on the spot.
+    /// 0.12 N, pulled to the right at 0.05 N/s. It slips at a ratio of 0.2 and slides for 0.5 s at
+    /// 0.15, without moving over the film.
     fn default() -> Drag {
         Drag {
             force_n: 0.12,
@@ -69,7 +71,7 @@ impl Drag {
         within("slide_mm", self.slide_mm, [0.0, 4.0])
     }
 
-    /// When the contact gives way, s.
+    /// Returns the time at which the contact gives way, s.
     fn slip_s(&self) -> f64 {
         let most_n = self.friction_static * self.force_n;
         self.start_s + self.rise_s + most_n / self.rate_n_per_s
@@ -84,12 +86,12 @@ impl Drag {
         let rising = ramp(time_s - self.start_s, self.rise_s);
         let falling = ramp(time_s - self.slip_s() - self.slide_s, self.rise_s);
         let left = rising - falling;
-        // The pull goes with the press: friction lets go of what is not pressed.
+        // The pull fades with the press: there is no friction without pressure.
         let load = pressed_and_pulled(self.force_n * left, lateral_n * left, self.direction_deg);
         load.with_offset_mm(self.place_mm(time_s)).unwrap_or(load)
     }
 
-    /// Where it touches the film.
+    /// Returns the place where the tip touches the film.
     fn place_mm(&self, time_s: f64) -> [f64; 2] {
         let sliding_s = time_s - self.slip_s();
         if sliding_s <= 0.0 || self.slide_mm == 0.0 {
@@ -112,7 +114,7 @@ mod tests {
             ..Drag::default()
         };
         let at = |time_s| drag.load(time_s).vector_n();
-        // Slips at 0.024 N, 0.48 s after the press is complete at 0.4 s.
+        // It slips at 0.024 N, 0.48 s after the press is complete at 0.4 s.
         assert!((drag.slip_s() - 0.88).abs() < 1e-12);
         let [x, y, z] = at(0.6);
         assert!(x.abs() < 1e-12 && (y - 0.01).abs() < 1e-12 && (z + 0.12).abs() < 1e-12);

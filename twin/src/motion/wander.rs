@@ -1,4 +1,5 @@
-//! `demo`, all over the film, and `sweep`, in its middle: through the paper's whole range.
+//! The motions `demo`, all over the film, and `sweep`, in its middle, through the paper's whole
+//! range.
 
 use std::f64::consts::PI;
 
@@ -8,17 +9,17 @@ use crate::noise::mix;
 
 /// Size of the largest load of the named scenes, N: the paper's range.
 const FULL_N: f64 = 0.2;
-/// How long `demo` rests before the tip comes, s: three frames at 30 per second.
+/// Time for which `demo` rests before the tip comes, s: three frames at 30 per second.
 const DEMO_REST_S: f64 = 0.1;
-/// How far from the film's middle the tip of `demo` comes along x and y, mm.
+/// Largest distance of the tip of `demo` from the film's middle along x and y, mm.
 const DEMO_REACH_MM: f64 = 3.0;
-/// `sweep` goes up and down once in this time, s.
+/// Time in which `sweep` goes up and down once, s.
 const SWEEP_S: f64 = 4.0;
 /// The directions of `sweep`, (α, β) in degrees, one after the other.
 const SWEEP_DIRECTIONS: [(f64, f64); 5] =
     [(0.0, 0.0), (8.0, 0.0), (-8.0, 0.0), (0.0, 6.0), (0.0, -6.0)];
 
-/// A tenth of a second of rest, then a tip that wanders over the film, as its force does.
+/// A tenth of a second of rest, then a tip that wanders over the film while its force changes.
 pub(super) fn demo(time_s: f64, seed: u64) -> Load {
     let pressed_s = time_s - DEMO_REST_S;
     if pressed_s < 0.0 {
@@ -26,7 +27,7 @@ pub(super) fn demo(time_s: f64, seed: u64) -> Load {
     }
     let wave = |period_s: f64, phase: f64| libm::sin(2.0 * PI * (pressed_s / period_s + phase));
     let phase = |index: u64| (mix(seed.wrapping_add(index)) >> 40) as f64 / f64::from(1 << 24);
-    // A quarter period back: the tip comes with the smallest force.
+    // The phase is a quarter period back: the tip starts with the smallest force.
     let magnitude_n = 0.11 + 0.09 * wave(0.9, -0.25);
     let place_mm =
         [(1.7, 3), (1.1, 4)].map(|(period_s, index)| DEMO_REACH_MM * wave(period_s, phase(index)));

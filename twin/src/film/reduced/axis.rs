@@ -1,27 +1,27 @@
 //! Cubic splines along one axis of the film.
 
-/// How many coefficients a spline's value at a point is made of.
+/// Number of coefficients that make up a spline's value at a point.
 pub const SPAN: usize = 4;
 
-/// The nodes of cubic splines, and the B-splines that they are sums of: one for each node, smooth
-/// over the second node and the last but one (not-a-knot).
+/// The nodes of cubic splines and the B-splines that the splines are sums of. There is one B-spline
+/// for each node, smooth over the second node and the last but one (not-a-knot).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
     nodes: Vec<f64>,
     knots: Vec<f64>,
 }
 
-/// What a value at a point is made of: so much of each coefficient from the first on.
+/// The weights of the coefficients in a value at a point, from the first coefficient on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
-    /// The first coefficient.
+    /// Index of the first coefficient.
     pub first: usize,
-    /// Parts of the value.
+    /// Weight of each coefficient.
     pub values: [f64; SPAN],
 }
 
 impl Axis {
-    /// Of at least six nodes, growing, mm.
+    /// Returns the axis of at least six nodes, in increasing order, mm.
     pub fn new(nodes: &[f64]) -> Axis {
         let (first, last) = (nodes[0], nodes[nodes.len() - 1]);
         let inner = &nodes[2..nodes.len() - 2];
@@ -32,12 +32,12 @@ impl Axis {
         }
     }
 
-    /// Its nodes, mm.
+    /// Returns the nodes, mm.
     pub fn nodes(&self) -> &[f64] {
         &self.nodes
     }
 
-    /// The value at x is made of these; beyond the last node, of those at the last.
+    /// Returns the weights of the value at x. Beyond the last node they are those of the last node.
     pub fn at(&self, x: f64) -> Weights {
         let knots = &self.knots;
         let x = x.clamp(knots[0], knots[knots.len() - 1]);

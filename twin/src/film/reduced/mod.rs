@@ -1,7 +1,7 @@
-//! The film under a tip anywhere, by tables made from full solutions.
+//! The film under a tip at any place, by tables made from full solutions.
 //!
-//! One marker's tables serve all four: mirroring the film at its axes puts every marker into the
-//! corner (+, +), and mirroring it at the diagonal makes of what moves along x what moves along y.
+//! The tables of one marker serve all four. Mirroring the film at its axes puts every marker into
+//! the corner (+, +). Mirroring it at the diagonal turns motion along x into motion along y.
 
 mod axis;
 mod pose;

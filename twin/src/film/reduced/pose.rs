@@ -1,27 +1,27 @@
-//! A load in the variables in which the film's answer is nearly a polynomial.
+//! A load in variables in which the film's answer is nearly a polynomial.
 
-/// A load of size s is a force of `LINEAR_N`·s + s³ newton: s grows like the depth, from where
-/// bending holds the film to where stretching does.
+/// A load of size s is a force of `LINEAR_N`·s + s³ newton. Thus s grows like the depth, both where
+/// bending holds the film and where stretching does.
 pub const LINEAR_N: f64 = 0.01;
-/// The size of the largest load, of 0.255 N.
+/// The size of the largest load, 0.255 N.
 pub const LARGEST_SIZE: f64 = 0.628_8;
 /// The largest tilt, rad: the tangential force is 0.8 of the normal one.
 pub const LARGEST_TILT: f64 = 0.674_740_942_223_553_1;
 
-/// Which force presses where.
+/// A force and its place.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
-    /// See [`LINEAR_N`]; 0 to [`LARGEST_SIZE`].
+    /// The size, see [`LINEAR_N`]; 0 to [`LARGEST_SIZE`].
     pub size: f64,
     /// The force's polar angle, split along x and y, rad; at most [`LARGEST_TILT`] long.
     pub tilt: [f64; 2],
-    /// Where the tip touches the film, mm.
+    /// The place where the tip touches the film, mm.
     pub place_mm: [f64; 2],
 }
 
 impl Pose {
-    /// Of a force (N, F_z < 0, or none) at a place (mm) on a film that is so many times as stiff as
-    /// the nominal one in bending and in stretching.
+    /// Returns the pose of a force (N, F_z < 0 or the zero vector) at a place (mm). `stiffness` are
+    /// the factors of the film's bending and stretching stiffness over the nominal film's.
     pub fn of_force(force_n: [f64; 3], place_mm: [f64; 2], stiffness: [f64; 2]) -> Pose {
         let [x, y, z] = force_n;
         let sideways = libm::hypot(x, y);
@@ -40,13 +40,13 @@ impl Pose {
         }
     }
 
-    /// The force on the nominal film, N.
+    /// Returns the force on the nominal film, N.
     pub fn force_n(&self) -> [f64; 3] {
         let size_n = LINEAR_N * self.size + self.size * self.size * self.size;
         self.direction().map(|part| size_n * part)
     }
 
-    /// The force's direction, a unit vector.
+    /// Returns the force's direction, a unit vector.
     pub fn direction(&self) -> [f64; 3] {
         let [x, y] = self.tilt;
         let angle = libm::hypot(x, y);
@@ -58,7 +58,7 @@ impl Pose {
         [part * x, part * y, -libm::cos(angle)]
     }
 
-    /// The same load seen in a mirror: x and y by these signs.
+    /// Returns the load mirrored: x and y take these signs.
     pub fn mirrored(&self, [sx, sy]: [f64; 2]) -> Pose {
         let mirror = |[x, y]: [f64; 2]| [sx * x, sy * y];
         Pose {
@@ -68,7 +68,7 @@ impl Pose {
         }
     }
 
-    /// The same load mirrored at the diagonal x = y.
+    /// Returns the load mirrored at the diagonal x = y.
     pub fn swapped(&self) -> Pose {
         let swap = |[x, y]: [f64; 2]| [y, x];
         Pose {
@@ -79,7 +79,7 @@ impl Pose {
     }
 }
 
-/// The root s of linear·s + s³ = f, for linear > 0.
+/// Returns the root s of linear·s + s³ = f, for linear > 0.
 pub(super) fn size_of(f: f64, linear: f64) -> f64 {
     // Cardano's formula without cancellation: s = 2 √(linear / 3) sinh(asinh(…) / 3).
     let scale = 2.0 * libm::sqrt(linear / 3.0);

@@ -1,11 +1,13 @@
-//! Numbers that depend on a load: splines over its place, sums of terms in its size and tilt.
+//! Tables of numbers that depend on a load: splines over its place, sums of terms in its size and
+//! tilt.
 
 use super::axis::{Axis, SPAN};
 use super::pose::Pose;
 use super::terms::{LANES, Terms, Values};
 use crate::film::FilmError;
 
-/// Coefficients are kept in so many steps of the largest of their term and output.
+/// A coefficient is stored in steps; this many steps are the largest coefficient of its term and
+/// output.
 const STEPS: f64 = 32_767.0;
 
 /// Outputs, each a sum of terms whose coefficients are splines over the place.
@@ -14,19 +16,19 @@ pub struct Table {
     axis: Axis,
     terms: Terms,
     outputs: usize,
-    /// By node along y, node along x, output and term, filled up to whole lanes.
+    /// By node along y, node along x, output and term, padded to whole lanes.
     coefficients: Vec<f32>,
 }
 
-/// The parts of a table's coefficients at a pose.
+/// The weights of a table's coefficients at a pose.
 pub struct At {
-    /// Of 16 pairs of nodes: where their coefficients begin, and their part.
+    /// For 16 pairs of nodes: the index of their coefficients, and their weight.
     nodes: [(usize, f32); SPAN * SPAN],
     values: Values,
 }
 
 impl Table {
-    /// Of coefficients by node along y, node along x, output and term.
+    /// Returns the table of coefficients by node along y, node along x, output and term.
     pub fn new(axis: Axis, terms: Terms, outputs: usize, coefficients: &[f64]) -> Table {
         let (count, padded) = (terms.count(), terms.padded());
         let rows = coefficients.chunks(count).flat_map(|row| {
@@ -41,7 +43,7 @@ impl Table {
         }
     }
 
-    /// What its outputs are made of at a pose.
+    /// Returns the weights of the outputs at a pose.
     pub fn at(&self, pose: &Pose) -> At {
         let [along_x, along_y] = pose.place_mm.map(|part| self.axis.at(part));
         let length = self.outputs * self.terms.padded();
@@ -58,7 +60,7 @@ impl Table {
         }
     }
 
-    /// `N` outputs from one on.
+    /// Returns `N` outputs from `first` on.
     pub fn sums<const N: usize>(&self, at: &At, first: usize) -> [f64; N] {
         let padded = self.terms.padded();
         let values = at.values[..padded].as_chunks::<LANES>().0;
@@ -81,8 +83,8 @@ impl Table {
         sums.map(|lanes| lanes.iter().map(|part| f64::from(*part)).sum())
     }
 
-    /// Its coefficients as a file keeps them: the size of a step for each output and term, then the
-    /// steps.
+    /// Returns the coefficients as a file stores them: the size of a step for each output and term,
+    /// then the steps.
     pub fn to_bytes(&self) -> Vec<u8> {
         let rows = self.coefficients.chunks(self.row());
         let mut largest = vec![0.0_f32; self.row()];
@@ -107,7 +109,7 @@ impl Table {
     /// Takes a table from the front of a file's bytes.
     ///
     /// # Errors
-    /// When the file ends before.
+    /// If the bytes end too early.
     pub fn take(
         axis: Axis,
         terms: Terms,
@@ -133,12 +135,12 @@ impl Table {
         Ok(Table::new(axis, terms, outputs, &values))
     }
 
-    /// Numbers of a node.
+    /// Returns how many numbers a node has.
     fn row(&self) -> usize {
         self.outputs * self.terms.padded()
     }
 
-    /// A node's numbers without those that fill lanes.
+    /// Iterates over a node's numbers without the padding of lanes.
     fn kept<T: Copy>(&self, row: &[T]) -> impl Iterator<Item = T> {
         let (count, padded) = (self.terms.count(), self.terms.padded());
         row.chunks(padded)

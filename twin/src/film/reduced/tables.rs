@@ -1,4 +1,4 @@
-//! The tables of a film, and what they say of its markers and of the tip.
+//! The tables of a film; they give the motion of its markers and of the tip.
 
 use super::axis::Axis;
 use super::pose::Pose;
@@ -8,49 +8,50 @@ use super::unit::Unit;
 
 use crate::film::{DiscMotion, FilmError, MARKER_CENTRES_MM, MAX_PLACE_MM};
 
-/// Places of the tip at which marker 2's motion is known, along x and along y, mm: close where the
-/// marker is.
+/// Nodes of the tip's place for marker 2's motion, along x and along y, mm: dense near the marker.
 const NODES_MM: [f64; 16] = [
     -5.0, -3.8, -2.5, -1.4, 0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0,
 ];
-/// Those at which it is known what a film's own differences and a tip's radius do, mm.
+/// Nodes for the effects of a film's own differences and of a tip's radius on it, mm.
 const UNIT_NODES_MM: [f64; 11] = [-5.0, -3.8, -2.5, -1.4, 0.0, 1.4, 2.5, 3.2, 3.8, 4.5, 5.0];
-/// Those at which the tip's own way is known: its quarter of the film, mm.
+/// Nodes for the tip's own displacement: its quarter of the film, mm.
 const TIP_NODES_MM: [f64; 12] = [0.0, 0.7, 1.4, 2.0, 2.5, 2.9, 3.2, 3.5, 3.8, 4.1, 4.5, 5.0];
-/// And those at which it is known what a tip's radius does to that, mm.
+/// Nodes for the effect of a tip's radius on that, mm.
 const TIP_RADIUS_NODES_MM: [f64; 7] = [0.0, 1.4, 2.5, 3.2, 3.8, 4.5, 5.0];
-/// The tip's radius in the first three tables, mm, and the largest in those of the radius.
+/// The tip's radius in the first three tables, mm, and the reference radius of the tables of the
+/// radius.
 pub const NOMINAL_RADIUS_MM: f64 = 0.5;
-/// The largest radius of the tip that a film knows, mm.
+/// The largest radius of a tip that the tables hold for, mm.
 pub const LARGEST_RADIUS_MM: f64 = 2.0;
-/// The smallest, mm.
+/// The smallest radius of a tip that the tables hold for, mm.
 pub const SMALLEST_RADIUS_MM: f64 = 0.25;
-/// How far before and behind it is seen what changes on the way of a marker and a tip, in parts of
-/// that.
+/// Step of the finite difference along a marker's shift, in parts of that shift, in both
+/// directions.
 const STEP: f64 = 0.1;
-/// What a film's own differences are: thickness, grip, and the posts' places along x and y.
+/// Number of a film's own differences: thickness, grip, and the posts' places along x and y.
 pub const UNIT_PARTS: usize = 10;
 
-/// What a table tells.
+/// The quantity that a table gives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Marker 2's motion, mm: along x, along z.
     Moved,
     /// Its slopes: of the motion along x by x and by y, along z by x.
     Slopes,
-    /// The way of a tip in the corner (+, +), mm: along x, along z.
+    /// The displacement of a tip in the corner (+, +), mm: along x, along z.
     Tip,
-    /// What the first, second and third power of ρ = (R² − 0.25) / 3.75 add for a tip of radius R
-    /// mm: to the motion along x and along z, power by power.
+    /// For a tip of radius R mm, what the first, second and third power of ρ = (R² − 0.25) / 3.75
+    /// add: to the motion along x and along z, power by power.
     Radius,
-    /// The same for the tip's own way.
+    /// The same for the tip's own displacement.
     TipRadius,
-    /// What each of the film's own differences adds per unit: to the motion along x and along z.
+    /// The change per unit of each of the film's own differences: of the motion along x and along
+    /// z.
     Unit,
 }
 
 impl Kind {
-    /// All, in the order of a file.
+    /// All kinds, in the order of a file.
     pub const ALL: [Kind; 6] = [
         Kind::Moved,
         Kind::Slopes,
@@ -60,7 +61,7 @@ impl Kind {
         Kind::Unit,
     ];
 
-    /// Its nodes along x and along y.
+    /// Returns the nodes along x and along y.
     pub fn axis(self) -> Axis {
         match self {
             Kind::Tip => Axis::new(&TIP_NODES_MM),
@@ -70,18 +71,18 @@ impl Kind {
         }
     }
 
-    /// Its terms.
+    /// Returns the terms.
     pub fn terms(self) -> Terms {
         match self {
             Kind::Moved | Kind::Tip => Terms::up_to(7, 4, 1),
             Kind::Slopes => Terms::up_to(5, 3, 1),
-            // Of these no derivatives by the force are known: two rings of tilts tell no third
-            // degree.
+            // No derivatives by the force are known for these kinds, and two rings of tilts do not
+            // determine the third degree.
             Kind::Radius | Kind::TipRadius | Kind::Unit => Terms::up_to(4, 2, 1),
         }
     }
 
-    /// How many numbers it tells.
+    /// Returns the number of outputs.
     pub fn outputs(self) -> usize {
         match self {
             Kind::Moved | Kind::Tip => 2,
@@ -97,7 +98,8 @@ impl Kind {
 pub struct Tables([Table; 6]);
 
 impl Tables {
-    /// Of each kind's coefficients: by node along y, node along x, output and term.
+    /// Makes the tables from each kind's coefficients: by node along y, node along x, output and
+    /// term.
     pub fn new(coefficients: impl Fn(Kind) -> Vec<f64>) -> Tables {
         Tables(Kind::ALL.map(|kind| {
             let values = coefficients(kind);
@@ -105,15 +107,15 @@ impl Tables {
         }))
     }
 
-    /// As a file keeps them.
+    /// Returns the tables as a file stores them.
     pub fn to_bytes(&self) -> Vec<u8> {
         self.0.iter().flat_map(Table::to_bytes).collect()
     }
 
-    /// From a file's bytes.
+    /// Reads the tables from a file's bytes.
     ///
     /// # Errors
-    /// When there are fewer or more of them.
+    /// If there are too few or too many bytes.
     pub fn from_bytes(mut bytes: &[u8]) -> Result<Tables, FilmError> {
         let mut tables = Vec::new();
         for kind in Kind::ALL {
@@ -137,7 +139,7 @@ impl Tables {
         &self.0[kind as usize]
     }
 
-    /// The tip's way, mm.
+    /// Returns the tip's displacement, mm.
     pub fn tip_mm(&self, pose: &Pose, radius_mm: f64) -> [f64; 3] {
         let signs = pose.place_mm.map(|part| 1.0_f64.copysign(part));
         let here = pose.mirrored(signs);
@@ -147,7 +149,8 @@ impl Tables {
         [signs[0] * x, signs[1] * y, z]
     }
 
-    /// How the film moves around the place of marker `k`, `markers_mm` beside the nominal one.
+    /// Returns the motion of the film around marker `k`, which sits `markers_mm` off its nominal
+    /// place.
     pub fn disc(&self, pose: &Pose, radius_mm: f64, unit: &Unit, k: usize) -> DiscMotion {
         let parts = unit.parts();
         let signs = MARKER_CENTRES_MM[k].map(f64::signum);
@@ -161,7 +164,7 @@ impl Tables {
         mirrored_disc(disc, signs)
     }
 
-    /// Marker 2's motion.
+    /// Returns marker 2's motion.
     fn corner_disc(&self, pose: &Pose, radius_mm: f64, own: Option<&Parts>) -> DiscMotion {
         let poses = [*pose, pose.swapped()];
         let kinds = [Kind::Moved, Kind::Radius];
@@ -182,8 +185,8 @@ impl Tables {
         }
     }
 
-    /// The first outputs of a table of motions along x and z under a tip of a radius, by the table
-    /// of what that adds.
+    /// Returns the first outputs of a table of motions along x and z, for a tip of a radius. The
+    /// second table gives the effect of the radius.
     fn under<const N: usize>(
         &self,
         [nominal, by_radius]: [Kind; 2],
@@ -215,10 +218,10 @@ impl Tables {
         })
     }
 
-    /// The motion of a marker glued `beside_mm` marker 2's place: that of marker 2 with the tip as
-    /// far beside it, and what changes on the way as both go on to where they are. That changes
-    /// little and evenly, where the motion of a place near the tip is quite another a little
-    /// beside.
+    /// Returns the motion of a marker glued `beside_mm` off marker 2's place. It is marker 2's
+    /// motion with the tip shifted by as much in the opposite direction, plus the change as both
+    /// move to their real places. That change is small and even. The motion of a fixed place near
+    /// the tip, however, differs much from that of its neighbour.
     fn beside(
         &self,
         pose: &Pose,
@@ -236,7 +239,7 @@ impl Tables {
         };
         let (disc, place_mm) = at(1.0);
         let ((back, from), (forth, to)) = (at(1.0 + STEP), at(1.0 - STEP));
-        // Along the way on which it is clamped the tip does not go on.
+        // In a direction in which its place is clamped, the tip does not move on.
         let gone = |c: usize| {
             let whole = to[c] - from[c];
             if whole == 0.0 {
@@ -256,7 +259,7 @@ impl Tables {
     }
 }
 
-/// The variable of the tables of the radius.
+/// Returns the variable of the tables of the radius.
 pub fn rho(radius_mm: f64) -> f64 {
     let square = |r: f64| r * r;
     let [own, nominal, largest] = [radius_mm, NOMINAL_RADIUS_MM, LARGEST_RADIUS_MM].map(square);
@@ -265,11 +268,12 @@ pub fn rho(radius_mm: f64) -> f64 {
 
 type Parts = [f64; UNIT_PARTS];
 
-/// Which post is where another was, after mirroring x, mirroring y, and at the diagonal.
+/// For mirroring x, mirroring y, and mirroring at the diagonal: the post that takes each post's
+/// place.
 const MIRRORED: [[usize; 4]; 2] = [[1, 0, 3, 2], [3, 2, 1, 0]];
 const SWAPPED: [usize; 4] = [0, 3, 2, 1];
 
-/// A film's differences seen in a mirror.
+/// Returns a film's differences mirrored.
 fn mirrored(parts: Parts, signs: [f64; 2]) -> Parts {
     let mut seen = parts;
     for (axis, places) in MIRRORED.into_iter().enumerate() {
@@ -285,7 +289,7 @@ fn mirrored(parts: Parts, signs: [f64; 2]) -> Parts {
     seen
 }
 
-/// A film's differences mirrored at the diagonal.
+/// Returns a film's differences mirrored at the diagonal.
 fn swapped(parts: Parts) -> Parts {
     let mut seen = parts;
     for (post, from) in SWAPPED.into_iter().enumerate() {
@@ -295,7 +299,7 @@ fn swapped(parts: Parts) -> Parts {
     seen
 }
 
-/// A disc's motion seen in a mirror.
+/// Returns a disc's motion mirrored.
 pub(super) fn mirrored_disc(disc: DiscMotion, [sx, sy]: [f64; 2]) -> DiscMotion {
     let mirror = |[x, y, z]: [f64; 3], sign: f64| [sign * sx * x, sign * sy * y, sign * z];
     DiscMotion {

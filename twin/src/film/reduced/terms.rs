@@ -1,33 +1,34 @@
-//! The polynomials in size and tilt that the film's answer at one place is a sum of.
+//! The polynomials in size and tilt whose sum is the film's answer at one place.
 
 use super::pose::{LARGEST_SIZE, LARGEST_TILT, Pose};
 
-/// Terms are kept in groups of so many, which a processor adds side by side.
+/// Terms are stored in groups of this many, which a processor adds in parallel.
 pub const LANES: usize = 8;
-/// Terms of a set at most.
+/// The largest number of terms of a set.
 pub const MOST_TERMS: usize = 88;
 const MOST_SIZES: usize = 8;
 const MOST_TILTS: usize = 5;
 
-/// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the
-/// tilt (a, b) in parts of the largest.
+/// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k. T_i are Chebyshev polynomials of the size s; a and b
+/// are the tilt in parts of the largest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Terms {
     powers: Vec<[u8; 3]>,
 }
 
-/// The values of a set's terms, filled up with zeros to whole [`LANES`].
+/// The values of a set's terms, padded with zeros to whole [`LANES`].
 pub type Values = [f32; MOST_TERMS];
 
 impl Terms {
-    /// Those of tilts up to a degree, with so many sizes without tilt and fewer with it: one less
-    /// for each `per_size` degrees of tilt, or part of them.
+    /// Returns the terms of tilts up to a degree, with `sizes` sizes without tilt and fewer with
+    /// it: one less for each `per_size` degrees of tilt, or part of them.
     pub fn up_to(sizes: u8, degree: u8, per_size: u8) -> Terms {
         let left = |tilt: u8| sizes.saturating_sub(tilt.div_ceil(per_size));
         Terms::with_sizes((0..=degree).map(left))
     }
 
-    /// Those with so many sizes without tilt, so many with its first degree, and so on.
+    /// Returns the terms with the first number of sizes without tilt, the second with its first
+    /// degree, and further on.
     pub fn with_sizes(sizes: impl IntoIterator<Item = u8>) -> Terms {
         let mut powers = Vec::new();
         for (tilt, left) in (0..).zip(sizes) {
@@ -39,17 +40,17 @@ impl Terms {
         Terms { powers }
     }
 
-    /// How many there are.
+    /// Returns the number of terms.
     pub fn count(&self) -> usize {
         self.powers.len()
     }
 
-    /// How many there are with what fills the last group.
+    /// Returns the number of terms including the padding of the last group.
     pub fn padded(&self) -> usize {
         self.powers.len().next_multiple_of(LANES)
     }
 
-    /// Their values at a pose.
+    /// Returns the terms' values at a pose.
     pub fn values(&self, pose: &Pose) -> Values {
         let factors = Factors::at(pose);
         let mut values = [0.0; MOST_TERMS];
@@ -60,7 +61,7 @@ impl Terms {
         values
     }
 
-    /// Their values and their derivatives by size and tilt (1/rad), row by row.
+    /// Returns the terms' values and their derivatives by size and tilt (1/rad), row by row.
     pub fn rows(&self, pose: &Pose) -> [Vec<f64>; 4] {
         let at = Factors::at(pose);
         let row = |what: &dyn Fn([usize; 3]) -> f64| {
@@ -80,7 +81,7 @@ impl Terms {
     }
 }
 
-/// What terms are products of.
+/// The factors of the terms.
 struct Factors {
     sizes: [f64; MOST_SIZES],
     size_slopes: [f64; MOST_SIZES],

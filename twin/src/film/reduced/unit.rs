@@ -1,8 +1,8 @@
-//! How one film differs from the nominal one.
+//! The differences of one film from the nominal one.
 
 use crate::film::FilmError;
 
-/// A film as it was made: each part beside the nominal film's.
+/// A film as it was made, relative to the nominal film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -11,11 +11,12 @@ pub struct Unit {
     pub stiffness: f64,
     /// Thickness in parts of the nominal 0.5 mm, 0.7 to 1.3.
     pub thickness: f64,
-    /// The grip of its posts in parts of the nominal 20 N/mm³, 0.2 to 5.
+    /// Stiffness of the posts' grip in parts of the nominal 20 N/mm³, 0.2 to 5.
     pub grip: f64,
-    /// How far each post is off its place, by the identity of the marker beside it, mm, within ±1.
+    /// Each post's shift from its nominal place, by the identity of the marker next to it, mm,
+    /// within ±1.
     pub posts_mm: [[f64; 2]; 4],
-    /// How far each marker's centre is off its place, mm, within ±1.
+    /// Shift of each marker's centre from its nominal place, mm, within ±1.
     #[cfg_attr(feature = "file", serde(skip))]
     pub markers_mm: [[f64; 2]; 4],
 }
@@ -34,7 +35,7 @@ impl Default for Unit {
 }
 
 impl Unit {
-    /// How many times as stiff as the nominal film it is in bending and in stretching.
+    /// Returns the factors of bending and stretching stiffness over the nominal film's.
     pub(crate) fn bending_and_stretching(&self) -> [f64; 2] {
         let Unit {
             stiffness: e,
@@ -45,7 +46,7 @@ impl Unit {
     }
 
     /// # Errors
-    /// When a part is outside its range.
+    /// If a part is outside its range.
     pub fn check(&self) -> Result<(), FilmError> {
         let parts = [
             ("the film's stiffness", self.stiffness, [0.5, 2.0]),
@@ -67,7 +68,7 @@ impl Unit {
         Ok(())
     }
 
-    /// What the film's tables are multiplied with: see [`super::tables::UNIT_PARTS`].
+    /// Returns the factors of the film's tables: see [`super::tables::UNIT_PARTS`].
     pub(super) fn parts(&self) -> [f64; 10] {
         let grip = libm::log(self.grip / self.stiffness);
         let thickness = libm::log(self.thickness);

@@ -1,10 +1,10 @@
-//! What a film's own weight does to its markers, at rest and under a load.
+//! The effect of a film's own weight on its markers, at rest and under a load.
 //!
-//! Weight along the normal acts as a load of its own that is spread over the film: with it the film
-//! is as large a load's as the root a of L·a + a³ = L·s + s³ − k·g_z, s being the tip's. What it
-//! moves is nearly in proportion to Δ = a − s, from hanging freely to under a deep press; the rest
-//! of it are powers of Δ and, under a load, sums of the [`Terms`]. Weight along the film moves it
-//! in proportion.
+//! Weight along the normal acts as a load of its own that is spread over the film. It raises the
+//! size s of the tip's load to the root a of L·a + a³ = L·s + s³ − k·g_z. The displacement by
+//! weight is nearly in proportion to Δ = a − s, from hanging freely to under a deep press. The rest
+//! of it are powers of Δ and, under a load, sums of the [`Terms`]. Weight along the film moves the
+//! film in proportion.
 
 use super::LINEAR_N;
 use super::axis::Axis;
@@ -14,24 +14,24 @@ use super::terms::Terms;
 use super::unit::Unit;
 use crate::film::{DiscMotion, FilmError, MARKER_CENTRES_MM};
 
-/// The straight press that sinks the film as its weight does, N: of the film's 4.1 mN the posts
-/// carry the rest.
+/// The straight press that sinks the film as its weight does, N. The posts carry the rest of the
+/// film's 4.1 mN.
 pub const AS_A_PRESS_N: f64 = 2.2e-3;
-/// Places of the tip at which it is known what weight does, along x and along y, mm.
+/// Nodes of the tip's place for the effect of weight, along x and along y, mm.
 const NODES_MM: [f64; 9] = [-5.0, -3.8, -2.6, -1.3, 0.0, 1.3, 2.6, 3.8, 5.0];
-/// What weight does at rest is a sum of so many functions of gravity.
+/// The number of functions of gravity whose sum is the effect of weight at rest.
 const AT_REST: usize = 7;
-/// What it does otherwise under a load is one of so many.
+/// The number of functions of gravity whose sum is the change of that effect under a load.
 const UNDER_LOAD: usize = 4;
-/// Numbers of a [`DiscMotion`].
+/// Count of numbers in a [`DiscMotion`].
 const DISC: usize = 9;
 
-/// What weight does to marker 2 of the nominal film.
+/// The effect of weight on marker 2 of the nominal film.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weight {
-    /// Its motion and slopes at rest by each of [`Pull::at_rest`].
+    /// Motion and slopes at rest per function of [`Pull::at_rest`].
     at_rest: [[f64; DISC]; AT_REST],
-    /// What a load adds to the motion along x and along z by each of [`Pull::under_load`].
+    /// What a load adds to the motion along x and along z per function of [`Pull::under_load`].
     under_load: Table,
 }
 
@@ -40,12 +40,13 @@ pub struct Weight {
 pub struct Pull {
     /// Along x and y, in parts of g on the nominal film.
     along: [f64; 2],
-    /// How much larger the load is with the film's weight.
+    /// Difference of the load's size with and without the film's weight.
     larger: f64,
 }
 
 impl Pull {
-    /// On a film whose tip presses with a load of this size; gravity in parts of g.
+    /// Returns the pull on a film whose tip presses with a load of this size; gravity in parts of
+    /// g.
     pub fn new(size: f64, down: [f64; 3], unit: &Unit) -> Pull {
         let [bending, stretching] = unit.bending_and_stretching();
         let linear = LINEAR_N * bending / stretching;
@@ -57,7 +58,7 @@ impl Pull {
         }
     }
 
-    /// The functions of which what weight does at rest is a sum.
+    /// Returns the functions of gravity whose sum is the effect of weight at rest.
     pub fn at_rest(&self) -> [f64; AT_REST] {
         let Pull {
             along: [x, y],
@@ -66,7 +67,7 @@ impl Pull {
         [d, d * d, d * d * d, x, y, x * d, y * d]
     }
 
-    /// Those of which a sum is added under a load.
+    /// Returns the functions of gravity whose sum is added under a load.
     pub fn under_load(&self) -> [f64; UNDER_LOAD] {
         let [d, square, _, x, y, ..] = self.at_rest();
         [d, square, x, y]
@@ -82,19 +83,19 @@ impl Pull {
 }
 
 impl Weight {
-    /// Nodes along x and along y of places of the tip.
+    /// Returns the nodes of the tip's place along x and along y.
     pub fn axis() -> Axis {
         Axis::new(&NODES_MM)
     }
 
-    /// Terms of what a load adds.
+    /// Returns the terms of what a load adds.
     pub fn terms() -> Terms {
         Terms::up_to(4, 2, 1)
     }
 
-    /// Of what the functions [`Pull::at_rest`] make of marker 2's motion and slopes, and of the
-    /// coefficients of what a load adds: by node along y, node along x, function of
-    /// [`Pull::under_load`], motion along x and z, and term.
+    /// Makes it from the motion and slopes of marker 2 per function of [`Pull::at_rest`], and from
+    /// the coefficients of what a load adds. These are ordered by node along y, node along x,
+    /// function of [`Pull::under_load`], motion along x and z, and term.
     pub fn new(at_rest: [DiscMotion; AT_REST], coefficients: &[f64]) -> Weight {
         let outputs = 2 * UNDER_LOAD;
         Weight {
@@ -103,7 +104,7 @@ impl Weight {
         }
     }
 
-    /// As a file keeps it.
+    /// Returns the bytes that a file stores.
     pub fn to_bytes(&self) -> Vec<u8> {
         let at_rest = self.at_rest.as_flattened().iter();
         let mut bytes: Vec<u8> = at_rest
@@ -113,10 +114,10 @@ impl Weight {
         bytes
     }
 
-    /// From a file's bytes.
+    /// Reads it from a file's bytes.
     ///
     /// # Errors
-    /// When there are fewer or more of them.
+    /// If there are too few or too many bytes.
     pub fn from_bytes(bytes: &[u8]) -> Result<Weight, FilmError> {
         let wrong = |why: &str| FilmError::Tables(format!("what weight does {why}: make it anew"));
         let (own, mut left) = bytes
@@ -138,9 +139,9 @@ impl Weight {
         }
     }
 
-    /// What gravity, in parts of g in the film's frame, adds to how the film moves around marker
-    /// `k`, `unit.markers_mm` beside its place. Of a unit's own differences only its stiffness and
-    /// thickness count.
+    /// Returns what gravity, in parts of g in the film's frame, adds to the motion of the film
+    /// around marker `k`, which sits `unit.markers_mm` off its place. Of a unit's own differences
+    /// only stiffness and thickness count.
     pub fn disc(&self, pose: &Pose, down: [f64; 3], unit: &Unit, k: usize) -> DiscMotion {
         let signs = MARKER_CENTRES_MM[k].map(f64::signum);
         let [x, y, z] = down;
@@ -165,7 +166,7 @@ impl Weight {
         super::tables::mirrored_disc(DiscMotion { moved_mm, ..disc }, signs)
     }
 
-    /// What a load adds to the motion along x and along z.
+    /// Returns what a load adds to the motion along x and along z.
     fn more(&self, pose: &Pose, pull: &Pull) -> [f64; 2] {
         let sums: [f64; 2 * UNDER_LOAD] = self.under_load.sums(&self.under_load.at(pose), 0);
         let pairs = sums.as_chunks::<2>().0.iter().zip(pull.under_load());
