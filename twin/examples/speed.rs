@@ -1,4 +1,4 @@
-//! Frames rendered per second, and what the film costs of one, on one core:
+//! Measures the frames rendered per second, and the film's share of a frame's time, on one core:
 //! `cargo run --release -p hivtac-scene --example speed`.
 
 use std::time::Instant;
@@ -6,14 +6,14 @@ use std::time::Instant;
 use hivtac_twin::film::Film;
 use hivtac_twin::{Contact, Load, Preset, Scene, SceneError};
 
-/// Frames per measurement; the fastest of a few is printed, as others may use the machine.
+/// Frames per measurement. The fastest of several is printed, because others may use the machine.
 const FRAMES: u32 = 100;
 const REPEATS: u32 = 5;
-/// The film's measurements are short, so that some fall between two turns of others.
+/// The film's measurements are short; with many, some are undisturbed by other programs.
 const FILM_REPEATS: u32 = 400;
 
 fn main() -> Result<(), SceneError> {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     for preset in [Preset::Paper, Preset::Ov7725] {
         for (width, height) in [(320, 240), (800, 600)] {
@@ -35,7 +35,7 @@ fn main() -> Result<(), SceneError> {
     Ok(())
 }
 
-/// What one load costs, mean of many.
+/// Returns the time of one load, µs, as the mean of many.
 fn film_us(contact: Contact) -> Result<f64, SceneError> {
     const LOADS: u32 = 250;
     let film = Film::default();

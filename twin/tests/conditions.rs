@@ -1,4 +1,4 @@
-//! What each option does to a picture.
+//! Tests of the effect of each option on a picture.
 
 use hivtac_twin::{
     Contact, Creep, Discs, Frame, Lens, Load, Mechanics, Motion, Mounting, Options, Paint, Patch,
@@ -18,7 +18,7 @@ fn rendered(options: Options) -> Frame {
     scene(options).render_load(&press(), 3).unwrap()
 }
 
-/// Without noise and falloff.
+/// Returns options without noise and falloff.
 fn clear() -> Options {
     Options {
         noise: 0.0,
@@ -37,14 +37,14 @@ fn near(found: [i32; 3], expected: [i32; 3]) {
     assert!(apart.max() <= Some(5), "{found:?}, not {expected:?}");
 }
 
-/// How much redder than the film, per pixel.
+/// Returns the redness per pixel, relative to the film.
 fn redness(frame: &Frame) -> Vec<f64> {
     let rgb = frame.to_rgb888();
     let red = |p: &[u8]| f64::from(p[0]) - (f64::from(p[1]) + f64::from(p[2])) / 2.0 - 15.5;
     rgb.chunks_exact(3).map(red).collect()
 }
 
-/// Sum, centroid and variance along x of the redness around a marker.
+/// Returns sum, centroid and variance along x of the redness around a marker.
 fn spot(frame: &Frame, id: usize) -> [f64; 4] {
     let [x, y] = frame.truth.markers[id].unwrap().centroid_px;
     let weights = redness(frame);
@@ -89,7 +89,7 @@ fn glare_is_white_however_dark() {
         ..clear()
     });
     let bright = frame.pixels.iter().filter(|&&pixel| pixel == 0xffff);
-    // 0.4 mm in the middle, where the press has brought the film nearer: some 10 px of radius.
+    // 0.4 mm in the middle, where the press has brought the film nearer: a radius of about 10 px.
     assert!((150..700).contains(&bright.count()));
 }
 
@@ -125,7 +125,7 @@ fn specks_lie_on_the_film() {
         ..clear()
     });
     let red = redness(&frame).iter().filter(|r| **r > 30.0).count();
-    // 200 of about 7 px² each; a few lie outside the picture or on one another.
+    // 200 of about 7 px² each; a few are outside the picture or on one another.
     assert!((500..2500).contains(&red), "{red}");
 }
 
@@ -190,7 +190,7 @@ fn blur_widens_markers_and_leaves_them_in_place() {
             assert!((a[0] / b[0] - 1.0).abs() < 0.1, "{a:?} {b:?}");
             assert!((a[1] - b[1]).abs() < 0.1 && (a[2] - b[2]).abs() < 0.1);
             let added = (b[3] - a[3]).sqrt();
-            // The outermost levels are lost in RGB565's steps.
+            // The steps of RGB565 lose the outermost levels.
             assert!((0.75 * sigma.start..sigma.end).contains(&added), "{added}");
         }
     }
@@ -235,7 +235,7 @@ fn an_exposure_smears_what_moves() {
     let area = |frame: &Frame| frame.truth.markers[1].unwrap().area_px2;
     assert!((area(&sharp) / area(&smeared) - 1.0).abs() < 0.05);
     assert!(spot(&smeared, 1)[3] > spot(&sharp, 1)[3] + 0.1);
-    // Under a constant load nothing moves.
+    // Under a constant load the film does not move.
     let still = |exposure_s| scene(options(exposure_s)).render_load(&press(), 1).unwrap();
     assert_eq!(still(0.05).pixels, still(0.0).pixels);
 }
@@ -257,7 +257,7 @@ fn pitch_and_projection_scale_the_picture() {
         projection: Projection::Pinhole,
         ..Lens::default()
     });
-    // 175 px · 0.3717, and the disc's far half weighs no less than its near one.
+    // 175 px · 0.3717. The far half of the disc weighs as much as its near one.
     assert!((pinhole - 65.05).abs() < 0.05, "{pinhole}");
     let by_centre = at(Lens {
         discs: Discs::ByCentre,
@@ -321,7 +321,7 @@ fn the_truth_tells_which_point_of_the_film_the_tip_is_on() {
     assert!(x > 0.05 && y.abs() < 1e-9, "it slid to ({x}, {y})");
 }
 
-/// How far the first marker is from its place on another scene, px.
+/// Returns the distance of the first marker's images in two scenes, px.
 fn apart(one: &Scene, other: &Scene, time_s: f64) -> f64 {
     let [a, b] = [one, other].map(|scene| scene.truth(time_s).markers[0].unwrap().centroid_px);
     libm::hypot(a[0] - b[0], a[1] - b[1])
@@ -359,12 +359,12 @@ fn creep_moves_markers_and_not_the_truth() {
     );
     assert_eq!(truth.touches_mm, Some([1.0, -1.0]));
     assert!(truth.tip_mm[2] < known.tip_mm[2]);
-    // Let go: what remains dies away.
+    // After the release the rest of the motion dies away.
     let [left, less] = [11.0, 60.0].map(|time_s| apart(&elastic, &creeping, time_s));
     assert!(less > 0.02 && left > 2.0 * less, "{left} px, {less} px");
     assert_eq!(creeping.truth(11.0).force.magnitude_n(), 0.0);
     assert_eq!(creeping.truth(11.0).touches_mm, None);
-    // Through a shutter it is the same film.
+    // A shutter does not change the film.
     let rolling = Shutter {
         exposure_s: 0.0,
         readout_s: 0.02,

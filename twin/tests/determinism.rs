@@ -1,8 +1,8 @@
-//! A frame is the same bytes in every run and on every machine.
+//! Tests that a frame has the same bytes in every run and on every machine.
 
 use hivtac_twin::{Format, Frame, Mounting, Options, Paint, Patch, Preset, Scene};
 
-/// FNV-1a over the pixels.
+/// Returns FNV-1a over the pixels.
 fn checksum(frame: &Frame) -> u64 {
     let words = frame.pixels.iter().flat_map(|pixel| pixel.to_le_bytes());
     let bytes = words.chain(frame.mono.iter().copied());
@@ -15,7 +15,7 @@ fn demo(preset: Preset, width: u32, seed: u64) -> Scene {
     Scene::preset("demo", preset, width, width / 4 * 3, seed).unwrap()
 }
 
-/// Twelve frames of the demo as one checksum.
+/// Returns one checksum over twelve frames of the demo.
 fn film_strip(scene: &Scene) -> u64 {
     let frames = (0..12).map(|n| scene.frame(n, n as f64 / 30.0));
     frames.fold(0, |sum, frame| sum.rotate_left(5) ^ checksum(&frame))

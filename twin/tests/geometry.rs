@@ -1,4 +1,4 @@
-//! Where the markers are seen, and how that changes with the load.
+//! Tests of the markers' places in the picture, and of their change with the load.
 
 use proptest::prelude::*;
 
@@ -18,7 +18,7 @@ fn press(force_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
     Load::from_angles(force_n, alpha_deg, beta_deg).unwrap()
 }
 
-/// True centroids relative to the picture's middle, px.
+/// Returns the true centroids relative to the picture's middle, px.
 fn centroids(scene: &Scene, load: Load) -> [[f64; 2]; 4] {
     let camera = *scene.camera();
     let truth = scene.clone().with_load(load).unwrap().truth(0.0);
@@ -49,8 +49,8 @@ fn at_rest_markers_are_where_the_lens_puts_them() {
         let rho = MARKER_REST_MM * 2.0_f64.sqrt();
         let of_centre = scene.camera().focal_px() * libm::atan(rho / FILM_DISTANCE_MM);
         for marker in centroids(scene, Load::REST) {
-            // A disc's centroid is a little nearer than its centre's image, and the more pixels the
-            // more.
+            // A disc's centroid is a little nearer to the middle than the image of its centre; in
+            // pixels the difference grows with the frame.
             let nearer = (of_centre - radius(marker)) / scene.camera().focal_px();
             assert!((0.0007..0.0010).contains(&nearer), "{nearer} focal lengths");
         }
@@ -166,7 +166,7 @@ fn truth_says_what_is_missing_cut_or_gone() {
         },
         ..Options::default()
     };
-    // At 0.2 N markers are 91 px from the middle: the upper and the lower border each cut two of
+    // At 0.2 N markers are 91 px from the middle. The upper and the lower border each cut two of
     // them.
     let cut = |down| under(shifted([0.0, down]), press(0.2, 0.0, 0.0)).map(|m| m.unwrap().visible);
     let is_cut = |parts: [f64; 4]| parts.map(|part| (0.1..0.9).contains(&part));

@@ -1,5 +1,5 @@
-//! What the pictures show: discs where the truth says, colours that the default threshold tells
-//! apart.
+//! Tests of the pictures: discs are at the true places, and the default threshold separates their
+//! colour from the film's.
 
 use hivtac_twin::{Format, Frame, Load, Options, Paint, Patch, Preset, Scene};
 
@@ -12,7 +12,7 @@ fn rendered(preset: Preset, (w, h): (u32, u32), options: &Options, load: &Load) 
     scene.render_load(load, 5).unwrap()
 }
 
-/// 8-bit channels of an RGB565 pixel, its upper bits repeated below.
+/// Returns the 8-bit channels of an RGB565 pixel; the upper bits are repeated in the low ones.
 fn channels(pixel: u16) -> [i32; 3] {
     let [r, g, b] = [pixel >> 11, (pixel >> 5) & 63, pixel & 31].map(i32::from);
     [
@@ -34,11 +34,11 @@ fn is_red(pixel: u16) -> bool {
     if value < 45 || r < value || 255 * (value - least) < 100 * value {
         return false;
     }
-    // Hue 30 · (g − b) / (value − least), within ±10 where red is the largest.
+    // Hue 30 · (g − b) / (value − least), within ±10 if red is the largest.
     30 * (g - b).abs() <= 10 * (value - least)
 }
 
-/// Loads over the calibrated range and its corners.
+/// Returns loads over the calibrated range and its corners.
 fn loads() -> Vec<Load> {
     let angles = [(0.0, 0.0), (10.0, 8.0), (-10.0, 8.0), (3.3, -7.1)];
     let forces = [0.0, 0.013, 0.05, 0.117, 0.2];
@@ -50,8 +50,8 @@ fn loads() -> Vec<Load> {
         .collect()
 }
 
-/// Neither noise, which the truth does not know, nor falloff, which shifts the weight (and shifts
-/// the border between two codes of RGB565 across a disc).
+/// Options without noise, which the truth does not include. There is no falloff either: it shifts
+/// the centroid's weight, and the border between two codes of RGB565 across a disc.
 fn clear() -> Options {
     Options {
         noise: 0.0,
@@ -60,8 +60,8 @@ fn clear() -> Options {
     }
 }
 
-/// The largest distance of a rendered marker's redness-weighted centroid from the truth, px. Each
-/// marker is told from the film by the difference from the frame without markers.
+/// Returns the largest distance of a rendered marker's redness-weighted centroid from the truth,
+/// px. The difference from the frame without markers separates each marker from the film.
 fn worst_centroid_error(preset: Preset, size: (u32, u32), options: &Options) -> f64 {
     let bare = Options {
         missing: [true; 4],
@@ -177,7 +177,7 @@ fn patches_add_and_take_away_red() {
         paint,
     };
     let plain = red_with(vec![]);
-    // In the middle the lens shows more of it: 17.5 px/mm.
+    // In the middle the lens magnifies more: 17.5 px/mm.
     let disc = std::f64::consts::PI * 8.75 * 8.75;
     let fifth = red_with(vec![patch(0.0, 0.0, Paint::Red)]) - plain;
     assert!((fifth / disc - 1.0).abs() < 0.1, "{fifth} of {disc}");
@@ -228,7 +228,8 @@ fn a_ppm_holds_the_pixels() {
     assert_eq!(ppm.len(), header.len() + 160 * 120 * 3);
 }
 
-/// What the default threshold's counterpart in each format passes, as a share of the true discs.
+/// Returns the area that passes each format's counterpart of the default threshold, as a share of
+/// the true discs.
 fn markers_found(format: Format, passes: impl Fn(&Frame, usize) -> bool) -> f64 {
     let options = Options {
         format,

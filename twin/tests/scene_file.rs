@@ -1,4 +1,4 @@
-//! Scene files: what `docs/scene-file.md` says of them, and what is said of bad ones.
+//! Tests of scene files: they follow `docs/scene-file.md`, and bad files give clear errors.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ fn said_of(text: &str) -> String {
     Scene::from_toml(text).unwrap_err().to_string()
 }
 
-/// The example of the document.
+/// Returns the example of the document.
 fn example() -> &'static str {
     let (_, rest) = DOCUMENT.split_once("```toml\n").unwrap();
     rest.split_once("```").unwrap().0
@@ -45,7 +45,7 @@ fn the_documents_example_is_what_it_says() {
     assert_eq!(scene.frame(1, 1.0).truth.force.magnitude_n(), 0.18);
 }
 
-/// The sections of the document with their rows: key, default.
+/// Returns the sections of the document with their rows: key, default.
 fn documented() -> Vec<(String, Vec<(String, String)>)> {
     let (_, keys) = DOCUMENT.split_once("## Keys").unwrap();
     let sections = keys.split("\n### ").map(|section| {
@@ -64,7 +64,7 @@ fn documented() -> Vec<(String, Vec<(String, String)>)> {
     sections.collect()
 }
 
-/// A file with one line in a section.
+/// Returns a file with one line in a section.
 fn with_line(section: &str, line: &str) -> String {
     match section {
         "" => line.to_owned(),
@@ -73,7 +73,7 @@ fn with_line(section: &str, line: &str) -> String {
     }
 }
 
-/// The keys of a section, as the error for a key that there is not lists them.
+/// Returns the keys of a section, as the error for an unknown key lists them.
 fn known(section: &str) -> BTreeSet<String> {
     let said = said_of(&with_line(section, "no_such_key = 1"));
     let (_, expected) = said.split_once("expected").expect(&said);
@@ -88,7 +88,7 @@ fn every_key_is_documented_and_every_documented_key_is_one() {
     let names: BTreeSet<&str> = sections.iter().map(|(name, _)| name.as_str()).collect();
     for (name, rows) in &sections {
         let mut rows: BTreeSet<String> = rows.iter().map(|(key, _)| key.clone()).collect();
-        // Tables in this one have a section of their own.
+        // Tables in this section have a section of their own.
         let inner = |key: &String| match name.as_str() {
             "" => key.clone(),
             _ => format!("{name}.{key}"),

@@ -1,4 +1,5 @@
-//! The paper's Figure 6 by the full solver: the film driven 10 mm by a normal and by a shear force.
+//! Draws the paper's Figure 6 by the full solver: the film driven 10 mm by a normal and by a shear
+//! force.
 //!
 //! `cargo run --release -p hivtac-shell --example figure6 -- docs/pictures`
 
@@ -8,14 +9,14 @@ use std::process::ExitCode;
 use hivtac_shell::{Contact, Design, Equilibrium, Film, ShellError, paper_camera};
 use hivtac_twin::{Camera, MARKERS};
 
-/// How far the tip goes, mm, and in steps of how much.
+/// The tip's travel, mm, and its steps.
 const TRAVEL_MM: f64 = 10.0;
 const STEP_MM: f64 = 0.5;
-/// A shear needs a tip that touches, mm.
+/// Depth of the touch that a shear needs, mm.
 const TOUCH_MM: f64 = 0.5;
 /// Arrows along one side of the film.
 const ARROWS: usize = 23;
-/// Side of the left picture and height of the right one, and what is above both.
+/// Side of the left picture and height of the right one, and the space above both.
 const SIDE: f64 = 420.0;
 const TOP: f64 = 60.0;
 const LEFT: f64 = 20.0;
@@ -28,7 +29,7 @@ struct Arrow {
 }
 
 fn main() -> ExitCode {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     let words: Vec<String> = std::env::args().skip(1).collect();
     let done = match &words[..] {
@@ -47,7 +48,7 @@ fn main() -> ExitCode {
 fn draw(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let film = Film::new(&Design::default())?;
     let normal = |mm: f64| [0.0, 0.0, -mm];
-    // Towards the upper right of the picture, as the paper's.
+    // Towards the upper right of the picture, as in the paper.
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let shear = |mm: f64| [half * mm, -half * mm, -TOUCH_MM];
     let pressed = driven(&film, "normal", normal)?;
@@ -66,7 +67,7 @@ fn draw(folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// The film after the tip's way, each step from the one before.
+/// Returns the film after the tip's travel; each step starts from the one before.
 fn driven(
     film: &Film,
     name: &str,
@@ -120,14 +121,14 @@ fn picture(
     Ok(svg + "</svg>\n")
 }
 
-/// Places on the film, row by row.
+/// Returns places on the film, row by row.
 fn grid(edge_mm: f64) -> Vec<[f64; 2]> {
     let at = |i: usize| edge_mm * (2.0 * i as f64 / (ARROWS - 1) as f64 - 1.0);
     let rows = (0..ARROWS).flat_map(|j| (0..ARROWS).map(move |i| [at(i), at(j)]));
     rows.collect()
 }
 
-/// A point's sideways motion, mm: what the paper calls the camera's view.
+/// Returns a point's sideways motion, mm: the paper calls it the camera's view.
 fn on_film(film: &Film, state: &Equilibrium, [x, y]: [f64; 2]) -> Arrow {
     let [dx, dy, _] = film.displacement(state, [x, y]);
     Arrow {
@@ -136,7 +137,8 @@ fn on_film(film: &Film, state: &Equilibrium, [x, y]: [f64; 2]) -> Arrow {
     }
 }
 
-/// Its motion in the fisheye's picture, px; `None` for a point that reaches the pinhole's plane.
+/// Returns a point's motion in the fisheye's picture, px. Returns `None` if the point reaches the
+/// pinhole's plane.
 fn seen(film: &Film, state: &Equilibrium, [x, y]: [f64; 2], camera: &Camera) -> Option<Arrow> {
     let [dx, dy, dz] = film.displacement(state, [x, y]);
     (dz > -9.9).then(|| Arrow {
@@ -147,7 +149,7 @@ fn seen(film: &Film, state: &Equilibrium, [x, y]: [f64; 2], camera: &Camera) -> 
 
 fn film_panel(edge_mm: f64, arrows: &[Arrow]) -> String {
     let largest = arrows.iter().map(Arrow::length).fold(0.0, f64::max);
-    // The longest arrow is drawn three spacings long.
+    // The longest arrow is three spacings long.
     let spacing = 2.0 * edge_mm / (ARROWS - 1) as f64;
     let magnify = (3.0 * spacing / largest).min(20.0);
     let scale = SIDE / (2.0 * edge_mm);
@@ -207,7 +209,7 @@ fn camera_panel(camera: &Camera, arrows: &[Arrow], points: usize) -> String {
 }
 
 impl Arrow {
-    /// Its part away from the middle.
+    /// Returns the arrow's component away from the middle.
     fn outward(&self) -> f64 {
         let ([x, y], [tx, ty]) = (self.from, self.to);
         let radius = x.hypot(y).max(f64::MIN_POSITIVE);
@@ -219,7 +221,7 @@ impl Arrow {
     }
 }
 
-/// A line with a head; red, and the stronger the larger.
+/// Draws a line with a head in red; larger arrows have a stronger red.
 fn shaft([[ax, ay], [bx, by]]: [[f64; 2]; 2], strength: f64) -> String {
     let length = (bx - ax).hypot(by - ay);
     if length < 0.3 {

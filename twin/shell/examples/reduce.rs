@@ -25,10 +25,10 @@ incomplete.
 --weight: makes FOLDER/weight.bin, what the film's own weight does, instead
 --check: hold the film that is built in against the full solution instead";
 
-/// Loads of a check.
+/// Number of loads of a check.
 const LOADS: usize = 100;
-/// How far from the middle they are, mm, and the tips' radii, mm: anywhere, where a sensor is
-/// calibrated, and with other tips.
+/// Largest distance of the places from the middle, mm, and the tips' radii, mm. They cover the
+/// whole film, the range where a sensor is calibrated, and other tips.
 const DOMAINS_MM: [(f64, [f64; 2]); 4] = [
     (5.0, [NOMINAL_RADIUS_MM; 2]),
     (4.0, [NOMINAL_RADIUS_MM; 2]),
@@ -36,13 +36,13 @@ const DOMAINS_MM: [(f64, [f64; 2]); 4] = [
     (4.0, [1.0, LARGEST_RADIUS_MM]),
 ];
 
-/// Forces under which weight is checked, N, how tilted they are at most, and where it pulls.
+/// Forces under which weight is checked, N, their largest tilt, and the directions of gravity.
 const WEIGHT_N: [[f64; 2]; 2] = [[0.002, 0.02], [0.02, 0.2]];
 const WEIGHT_RATIO: f64 = 0.4;
 const DOWN: [[f64; 3]; 3] = [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.8, 0.0, 0.6]];
 
 fn main() -> ExitCode {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
@@ -87,8 +87,8 @@ fn weigh(folder: &Path) -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// All solutions under a tip of a radius at the places of a table: those of its file, and the rest,
-/// which are added to it.
+/// Returns all solutions under a tip of a radius at the places of a table. They come from its file;
+/// the missing ones are solved and added to the file.
 fn sweep(radius_mm: f64, kind: Kind) -> Result<Vec<Solved>, Box<dyn Error>> {
     let path = PathBuf::from(format!("target/film-{radius_mm}.bin"));
     let known = read(&path)?;
@@ -191,7 +191,7 @@ fn threads() -> Result<usize, std::io::Error> {
     Ok(std::thread::available_parallelism()?.get())
 }
 
-/// A line that counts.
+/// Shows a counting line.
 fn progress(task: &str) -> impl Fn(usize, usize) + Sync {
     const WIDTH: usize = 30;
     let (begin, task) = (Instant::now(), task.to_owned());
@@ -200,7 +200,7 @@ fn progress(task: &str) -> impl Fn(usize, usize) + Sync {
         let full = "#".repeat(WIDTH * done / all);
         let end = if done == all { "\n" } else { "" };
         eprint!("\r{task} [{full:WIDTH$}] {done} of {all}, {left:.0} s left   {end}");
-        // A progress that cannot be shown is no reason to stop.
+        // A line that cannot be shown must not stop the work.
         let _ = std::io::stderr().flush();
     }
 }

@@ -1,4 +1,4 @@
-//! Presses the film once and prints what the tip, the markers and the camera make of it.
+//! Presses the film once and prints the motion of tip and markers and the camera's picture of it.
 //!
 //! `cargo run --release -p hivtac-shell --example solve -- --force-n 0.1 --alpha-deg 5`
 
@@ -15,7 +15,7 @@ const USAGE: &str = "solve [--force-n 0.1] [--alpha-deg 0] [--beta-deg 0] [--con
                      0.05,0] [--thickness-curve 0,0,0.05] [--down 0,0,-1] [--dot-stiffening 0.5] \
                      [--gauss-points 3]";
 
-/// What to press, and how.
+/// The press that the command line describes.
 struct Request {
     tip_radius_mm: f64,
     design: Design,
@@ -27,7 +27,7 @@ struct Request {
 }
 
 fn main() -> ExitCode {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     match Request::parse(std::env::args().skip(1)).and_then(|request| request.run()) {
         Ok(()) => ExitCode::SUCCESS,
@@ -142,7 +142,7 @@ impl Request {
     }
 }
 
-/// Numbers with commas between them.
+/// Reads numbers with commas between them.
 fn numbers<const N: usize>(name: &str, value: &str, slots: &mut [f64; N]) -> Result<(), String> {
     let read: Result<Vec<f64>, _> = value.split(',').map(str::parse).collect();
     *slots = read

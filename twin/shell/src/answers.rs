@@ -1,4 +1,4 @@
-//! How a pressed film answers to small changes: of its load, and of what it is made of.
+//! Derivatives of a pressed film's state by its load and by the film's own properties.
 
 use crate::film::{Tip, mean, tip_shares, weighted};
 use crate::grid::Grid;
@@ -6,32 +6,32 @@ use crate::point::{V3, cross, dot};
 use crate::shell::{Hold, Shell};
 use crate::{Design, Equilibrium, Film, ShellError};
 
-/// Steps by which forces are differentiated: tip's place and radius, posts' places, and what moves
-/// cells with it, mm.
+/// Steps of finite differences, mm: of the tip's place and radius, of the posts' places, and of
+/// what moves cells with them.
 const TIP_STEP_MM: f64 = 1e-3;
 const POST_STEP_MM: f64 = 2e-2;
 const MORPH_STEP_MM: f64 = 1e-3;
-/// Step by which the surface is differentiated along the film, mm.
+/// Step of finite differences of the surface along the film, mm.
 const SURFACE_STEP_MM: f64 = 1e-3;
-/// Films beside the one that is asked about.
+/// The directions of a change, for films on both sides of the one in question.
 const BESIDE: [f64; 2] = [-1.0, 1.0];
 
-/// Something that a film's state answers to, with its unit.
+/// A quantity by which a film's state is differentiated, with its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     /// The force along x, y or z, N.
     Force(usize),
-    /// The place of the tip along x or y with the force kept, mm.
+    /// The place of the tip along x or y at constant force, mm.
     Place(usize),
     /// The tip's radius, mm.
     TipRadius,
-    /// The film's thickness with its grip kept, mm.
+    /// The film's thickness at constant grip, mm.
     Thickness,
     /// The posts' grip, in parts of itself.
     Grip,
     /// A post's place along x or y, mm.
     Post(usize, usize),
-    /// Young's modulus with the grip and the weight kept, in parts of itself.
+    /// Young's modulus at constant grip and weight, in parts of itself.
     Youngs,
     /// The stretch along x or y.
     Stretch(usize),
@@ -39,9 +39,9 @@ pub enum Change {
     NeoHooke,
     /// [`crate::Law::stiffening`].
     Stiffening,
-    /// [`Design::thickness_slope`]'s part.
+    /// A component of [`Design::thickness_slope`].
     ThicknessSlope(usize),
-    /// [`Design::thickness_curve`]'s part.
+    /// A component of [`Design::thickness_curve`].
     ThicknessCurve(usize),
     /// [`Design::dot_stiffening`].
     DotStiffening,
@@ -49,12 +49,12 @@ pub enum Change {
     Down(usize),
     /// The posts' radius, mm.
     PostRadius,
-    /// How far the film reaches beyond the posts' centres, mm.
+    /// Reach of the film beyond the posts' centres, mm.
     Overhang,
 }
 
 impl Change {
-    /// All of them.
+    /// Iterates over all changes.
     pub fn all() -> impl Iterator<Item = Change> {
         Change::of_sweep()
             .chain([Change::Youngs])
@@ -67,7 +67,7 @@ impl Change {
             .chain([Change::PostRadius, Change::Overhang])
     }
 
-    /// Those that the reduced film is made from, in the order of its records.
+    /// Iterates over the changes for the reduced film, in the order of its records.
     pub fn of_sweep() -> impl Iterator<Item = Change> {
         let posts = (0..4).flat_map(|post| (0..2).map(move |way| Change::Post(post, way)));
         (0..3)
@@ -77,7 +77,7 @@ impl Change {
             .chain(posts)
     }
 
-    /// Which of the thickness's numbers it is.
+    /// Returns the index of the thickness's term that it changes; `None` if it changes no term.
     pub(crate) fn term(self) -> Option<usize> {
         match self {
             Change::ThicknessSlope(k) => Some(k),
@@ -86,7 +86,7 @@ impl Change {
         }
     }
 
-    /// Whether it is one of the sheet itself, in its place.
+    /// Returns whether it changes the sheet itself, without moving cells.
     fn of_sheet(self) -> bool {
         self.term().is_some()
             || matches!(
@@ -101,7 +101,7 @@ impl Change {
             )
     }
 
-    /// Which of [`Beside::morphed`] it is: it moves the cells.
+    /// Returns its index in [`Beside::morphed`]; `None` if it does not move the cells.
     fn morph(self) -> Option<usize> {
         match self {
             Change::PostRadius => Some(0),
@@ -111,18 +111,18 @@ impl Change {
     }
 }
 
-/// How a state answers to a small change: its derivatives, per unit of the change.
+/// A state's derivatives per unit of a change.
 #[derive(Clone, Debug)]
 pub struct Response {
     pub(crate) unknowns: Vec<f64>,
-    /// The tip's way, mm per unit.
+    /// The tip's displacement, mm per unit.
     pub tip_mm: V3,
-    /// What it answers to; none: to several changes of the load.
+    /// The change; `None` for several changes of the load at once.
     change: Option<Change>,
 }
 
 impl Response {
-    /// How a state answers to several changes of the load at once.
+    /// Returns the response to several changes of the load at once.
     pub fn to_all(responses: &[Response; 5], changes: [f64; 5]) -> Response {
         let mut sum = Response {
             unknowns: vec![0.0; responses[0].unknowns.len()],
@@ -140,29 +140,29 @@ impl Response {
         sum
     }
 
-    /// The largest part of it.
+    /// Returns the largest absolute value of its unknowns.
     pub fn size(&self) -> f64 {
         let parts = self.unknowns.iter();
         parts.fold(0.0, |most, part| most.max(part.abs()))
     }
 }
 
-/// What tells of films beside one, made when it is first asked for.
+/// Films next to this one, each made on first use.
 #[derive(Default)]
 pub(crate) struct Beside {
-    /// Each post moved along x and y, back and forth.
+    /// Each post moved along x and y, in both directions.
     posts: std::sync::OnceLock<Vec<[Hold; 2]>>,
     /// Smaller and larger posts; less and more overhang.
     morphed: [std::sync::OnceLock<[Shell; 2]>; 2],
 }
 
 impl Film {
-    /// How a state answers to each change, per unit of it, as long as the tip's force is what it
-    /// is: the stiffness is factored once.
+    /// Returns a state's derivatives by each change, per unit of it, at a constant force of the
+    /// tip. The stiffness is factored once.
     ///
     /// # Errors
-    /// When the stiffness is not positive definite: a force would not hold the film there. When the
-    /// state is of another mesh.
+    /// If the stiffness is not positive definite: a force would not hold the film there. If the
+    /// state belongs to another mesh.
     pub fn linearize(
         &self,
         state: &Equilibrium,
@@ -192,7 +192,7 @@ impl Film {
         let columns = sides.chunks(self.unknowns()).zip(changes);
         let answer = |(unknowns, &change): (&[f64], &Change)| {
             let mut tip_mm = mean(&tip, unknowns);
-            // A tip that moved, or cells that did, see another part of the film.
+            // A tip or cells that moved average over another part of the film.
             if let Some(shares) = self.shares_by(&state.touched, change) {
                 let seen = mean(&shares, state.unknowns());
                 for (sum, part) in tip_mm.iter_mut().zip(seen) {
@@ -208,11 +208,12 @@ impl Film {
         Ok(columns.map(answer).collect())
     }
 
-    /// How a state answers to one more newton along x, y and z, and to a tip that touches the film
-    /// one millimetre farther along x and y with the force kept: its derivatives.
+    /// Returns the derivatives of a state by the force along x, y and z, per newton, and by the
+    /// tip's place. The place is where the tip touches the film, along x and y at constant force,
+    /// per millimetre.
     ///
     /// # Errors
-    /// When the stiffness is not positive definite: a force would not hold the film there.
+    /// If the stiffness is not positive definite: a force would not hold the film there.
     pub fn responses(&self, state: &Equilibrium) -> Result<[Response; 5], ShellError> {
         let load: Vec<Change> = Change::of_sweep().take(5).collect();
         let answers = self.linearize(state, &load)?;
@@ -221,8 +222,8 @@ impl Film {
             .map_err(|_| ShellError::Solver("five changes have five answers".into()))
     }
 
-    /// The state beside this one that a response foretells, `units` away; only its unknowns are
-    /// changed.
+    /// Returns the neighbouring state that a response predicts, `units` away. Only the unknowns
+    /// change.
     pub fn beside(&self, state: &Equilibrium, response: &Response, units: f64) -> Equilibrium {
         let mut there = state.clone();
         for (u, part) in there.unknowns.iter_mut().zip(&response.unknowns) {
@@ -231,9 +232,9 @@ impl Film {
         there
     }
 
-    /// How [`Film::displacement`] at a point (mm, of the mounted film) answers to the change that a
-    /// response is to, mm per unit: by the film's motion, and by what the change itself makes of
-    /// the surface.
+    /// Returns the derivative of [`Film::displacement`] at a point (mm, of the mounted film) by the
+    /// change of a response, mm per unit. It includes the film's motion and the direct effect of
+    /// the change on the surface.
     pub fn surface_rate(
         &self,
         state: &Equilibrium,
@@ -277,7 +278,8 @@ impl Film {
         std::array::from_fn(|c| moved[c] - thinner * n[c] - half * leant[c] + up[c])
     }
 
-    /// How [`Film::displacement`] changes along the mounted film by x and by y, mm per mm.
+    /// Returns the derivatives of [`Film::displacement`] along the mounted film by x and by y, mm
+    /// per mm.
     pub fn surface_slopes(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [[f64; 3]; 2] {
         [0, 1].map(|way| {
             let [back, forth] = BESIDE.map(|sign| {
@@ -289,8 +291,8 @@ impl Film {
         })
     }
 
-    /// How half of the thickness at a point, where the area is `size` times that of the flat
-    /// mounted film and grows by `grown` of itself, answers to a change, mm per unit.
+    /// Returns the derivative of half of the thickness at a point by a change, mm per unit. The
+    /// area there is `size` times that of the flat mounted film and grows by `grown` of itself.
     fn half_rate(&self, point: [f64; 2], size: f64, grown: f64, change: Option<Change>) -> f64 {
         let sheet = self.shell().sheet();
         let [across, down] = sheet.scales();
@@ -310,7 +312,7 @@ impl Film {
         own - unstretched * rubber / stretched * grown
     }
 
-    /// The force on each unknown that one unit of a change leaves unbalanced, N.
+    /// Returns the force on each unknown that one unit of a change leaves unbalanced, N.
     fn force_of(&self, state: &Equilibrium, change: Change) -> Vec<f64> {
         let (u, grid) = (state.unknowns(), self.shell().grid());
         match change {
@@ -345,7 +347,8 @@ impl Film {
         }
     }
 
-    /// How the tip's shares change, per unit of a change that they answer to.
+    /// Returns the derivative of the tip's shares by a change, per unit; `None` if they do not
+    /// depend on it.
     fn shares_by(&self, tip: &Tip, change: Change) -> Option<Vec<f64>> {
         let grid = self.shell().grid();
         let there = |sign: f64| -> Option<(&Grid, Tip)> {
@@ -439,7 +442,7 @@ mod tests {
         there
     }
 
-    /// Every answer is the difference of full solutions.
+    /// Checks that every derivative is the difference of full solutions.
     fn answers_are_differences(design: &Design, force: [f64; 3]) {
         let film = Film::new(design).unwrap();
         let state = film.press(Contact::Force(force), &film.rest()).unwrap();
@@ -476,7 +479,7 @@ mod tests {
                 ),
                 ("tip", answers[k].tip_mm, slope(back.1, forth.1)),
             ];
-            // Forces at rest are none.
+            // At rest there are no forces.
             if !Change::of_sweep().take(6).any(|load| load == change) {
                 let told = film.surface_rate(&film.rest(), &at_rest[k], POINT_MM);
                 pairs.push(("rest", told, slope(back.2, forth.2)));
@@ -499,7 +502,7 @@ mod tests {
             tip_offset_mm: [2.0, 1.0],
             ..Design::default()
         };
-        // Where numbers may go both ways.
+        // Values that may change in both directions.
         design.overhang_mm = 0.01;
         design.law = Law {
             neo_hooke: 0.01,

@@ -1,21 +1,21 @@
-//! The stiffness of one cell, summed over points: what assembly spends its time on.
+//! The stiffness of one cell, summed over points. Assembly spends most of its time here.
 
 use pulp::Simd;
 
 use crate::point::{Second, V3, VECTORS};
 use crate::shell::LOCAL;
 
-/// Points that are summed at once.
+/// Number of points that are summed together.
 const BATCH: usize = 9;
 /// The pairs of components c ≤ e.
 pub const PAIRS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
-/// Rows of functions that are summed at once.
+/// Number of rows of functions that are summed together.
 const ROWS: usize = 8;
 
 /// One number for each function of a cell.
 pub type Row = [f64; LOCAL];
-/// For each pair of components c ≤ e, what component c of a function and e of another meet in; of
-/// equal ones, the lower triangle.
+/// For each pair of components c ≤ e, the stiffness between component c of a function and e of
+/// another. For c = e only the lower triangle is filled.
 pub type CellStiffness = [[Row; LOCAL]; PAIRS.len()];
 
 /// A sum over points of slopes · second derivatives · slopes.
@@ -23,12 +23,12 @@ pub struct CellSum {
     left: [Row; VECTORS * BATCH],
     right: [[Row; VECTORS * BATCH]; PAIRS.len()],
     points: usize,
-    /// What is summed so far; [`CellSum::finish`] adds the rest.
+    /// The sum of the complete batches; [`CellSum::finish`] adds the rest.
     pub stiffness: CellStiffness,
 }
 
 impl CellSum {
-    /// Of no points.
+    /// Returns a sum over no points.
     pub fn new() -> Box<CellSum> {
         Box::new(CellSum {
             left: [[0.0; LOCAL]; VECTORS * BATCH],
@@ -38,7 +38,7 @@ impl CellSum {
         })
     }
 
-    /// Forgets all points.
+    /// Removes all points.
     pub fn clear(&mut self) {
         self.points = 0;
         self.stiffness = [[[0.0; LOCAL]; LOCAL]; PAIRS.len()];
@@ -91,7 +91,7 @@ impl CellSum {
         }
     }
 
-    /// Sums what is left.
+    /// Sums the points that remain.
     #[inline(always)]
     pub fn finish<S: Simd>(&mut self, simd: S) {
         let count = VECTORS * self.points;
@@ -120,7 +120,7 @@ impl CellSum {
     }
 }
 
-/// The slopes' sum over a gradient: the force on each function.
+/// Adds the slopes' product with a gradient: the force on each function.
 #[inline(always)]
 pub fn add_force(sum: &mut [V3; LOCAL], slopes: &[Row; VECTORS], gradient: &[V3; VECTORS]) {
     for (a, total) in sum.iter_mut().enumerate() {

@@ -1,4 +1,4 @@
-//! Holds the reduced film against the full solution.
+//! Compares the reduced film with the full solution.
 
 use std::f64::consts::PI;
 
@@ -10,41 +10,42 @@ use crate::parallel::in_parallel;
 use crate::path::halton;
 use crate::{Design, Film, Loaded, ShellError, press_load};
 
-/// What is drawn: sizes of forces and radii evenly, tilts and places evenly over their areas.
+/// The random draw: sizes of forces and radii uniformly, tilts and places uniformly over their
+/// areas.
 const FORCE_N: [f64; 2] = [0.002, 0.25];
 
-/// How far the tables are from the full solution, over loads that they were not made from.
+/// The errors of the tables against the full solution, over loads that they were not made from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Check {
-    /// Loads solved.
+    /// Number of loads solved.
     pub loads: usize,
-    /// The largest distance of a marker's centroid at 320×240 `ov7725`, px.
+    /// The largest error of a marker's centroid at 320×240 `ov7725`, px.
     pub worst_px: f64,
-    /// The load that it is at.
+    /// The load with that error.
     pub worst_at: Option<Load>,
-    /// Its root mean square, px.
+    /// The root mean square of the errors, px.
     pub rms_px: f64,
     /// The largest error of the tip's place, mm.
     pub worst_tip_mm: f64,
 }
 
-/// Loads at which the film is held against the full solution.
+/// The range of loads in which the film is compared with the full solution.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
     /// |F|, N.
     pub force_n: [f64; 2],
-    /// Tangential over normal force at most.
+    /// The largest ratio of tangential to normal force.
     pub ratio: f64,
-    /// How far from the middle they are along x and y, mm.
+    /// The largest distance of the places from the middle along x and y, mm.
     pub reach_mm: f64,
-    /// The tip's radius, mm.
+    /// The range of the tip's radius, mm.
     pub radii_mm: [f64; 2],
-    /// Where gravity pulls; of none the film weighs nothing.
+    /// Direction of gravity; `None` means that the film weighs nothing.
     pub down: Option<[f64; 3]>,
 }
 
 impl Domain {
-    /// All forces on a weightless film.
+    /// Returns the domain of all forces on a weightless film.
     pub fn within(reach_mm: f64, radii_mm: [f64; 2]) -> Domain {
         Domain {
             force_n: FORCE_N,
@@ -56,10 +57,10 @@ impl Domain {
     }
 }
 
-/// Holds the reduced film against the full solution of a unit at so many random loads.
+/// Compares the reduced film of a unit with its full solution at a number of random loads.
 ///
 /// # Errors
-/// When the film cannot be made or an equilibrium is not found.
+/// If the film cannot be made or an equilibrium is not found.
 pub fn check(
     unit: &Unit,
     domain: &Domain,
@@ -95,7 +96,7 @@ pub fn check(
     Ok(check)
 }
 
-/// The tip's error in mm and the markers' in px.
+/// Returns the tip's error in mm and the markers' in px.
 fn errors(
     film: &mut Film,
     reduced: &ReducedFilm,
@@ -115,7 +116,7 @@ fn errors(
     Ok((tip_mm.sum::<f64>().sqrt(), discs.map(distance)))
 }
 
-/// A load of the stated domain, from a sequence that fills it evenly.
+/// Returns a load of the domain, from a sequence that fills it evenly.
 fn case(index: usize, domain: &Domain) -> Result<Load, FilmError> {
     let Domain {
         force_n,

@@ -1,4 +1,4 @@
-//! What a film is: its dimensions, its material and how finely it is computed.
+//! The design of a film: its dimensions, its material and its mesh.
 
 use std::f64::consts::PI;
 use std::sync::{Arc, LazyLock};
@@ -14,25 +14,25 @@ use crate::shell::{Hold, Shell};
 use crate::sparse::Pattern;
 use crate::spline::Axis;
 
-/// Points along a post by which it holds the film, both ways.
+/// Number of points along a post at which it holds the film, in both directions.
 const POST_POINTS: usize = 20;
 /// Rings and rays of the points on which a tip presses.
 const TIP_RINGS: usize = 10;
 const TIP_RAYS: usize = 32;
-/// How far from the middle a tip may press where cells are small, mm: a tip of half a millimetre
-/// anywhere within ±5 mm, or a larger one a little nearer.
+/// The largest distance from the middle, mm, that a tip's disc may reach within the small cells.
+/// This is a tip of half a millimetre anywhere within ±5 mm, or a larger one a little nearer.
 const TIP_REACH_MM: f64 = 5.5;
-/// How fast cells grow away from posts and tip, mm per mm.
+/// Growth of cells away from posts and tip, mm per mm.
 const GROWTH: f64 = 0.25;
-/// Cells at fineness 1, mm: under the tip, at a post (where the film's grip ends within 0.2 mm),
-/// and anywhere.
+/// Sizes of cells at fineness 1, mm: under the tip, at a post (the film's grip ends within 0.2 mm
+/// there), and anywhere.
 const TIP_CELL_MM: f64 = 0.5;
 const POST_CELL_MM: f64 = 0.35;
 const LARGEST_CELL_MM: f64 = 1.6;
-/// Steps in which cells are laid out.
+/// Number of steps in the layout of cells.
 const SAMPLES: usize = 4000;
 
-/// The farthest that a post may be off its place along x and along y, mm.
+/// The largest shift of a post from its place along x and along y, mm.
 pub const MOST_POST_SHIFT_MM: f64 = 1.0;
 
 /// A film on four posts, pressed by a tip. Lengths in mm.
@@ -40,50 +40,49 @@ pub const MOST_POST_SHIFT_MM: f64 = 1.0;
 pub struct Design {
     /// Distance between neighbouring posts' centres, > 0 (the paper's 28).
     pub span_mm: f64,
-    /// How far the film reaches beyond the posts' centres, ≥ 0 (0: the paper's model; 6: its 40 ×
-    /// 40 mm cut).
+    /// Reach of the film beyond the posts' centres, ≥ 0 (0: the paper's model; 6: its 40 × 40 mm
+    /// cut).
     pub overhang_mm: f64,
-    /// What it is made of.
+    /// The material.
     pub material: Material,
-    /// How it answers to being stretched.
+    /// The law of its elasticity when it is stretched.
     pub law: Law,
-    /// The stretch with which it is mounted, along x and y: 0.012 has cut it 1.2 % shorter than it
-    /// is between the posts. −0.01 to 0.05.
+    /// The stretch of the mounted film along x and y, −0.01 to 0.05. With 0.012 it was cut 1.2 %
+    /// shorter than it is between the posts.
     pub stretch: [f64; 2],
-    /// How its thickness varies over the mounted film: t = thickness · (1 + sx X + sy Y + cxx X² +
-    /// cxy X Y + cyy Y²), X = x / 14 mm; this is (sx, sy). Nowhere below half nor above twice the
-    /// nominal thickness.
+    /// Variation of the thickness over the mounted film: t = thickness · (1 + sx X + sy Y + cxx X²
+    /// + cxy X Y + cyy Y²), X = x / 14 mm. This is (sx, sy). The thickness must stay between half
+    /// and twice the nominal one.
     pub thickness_slope: [f64; 2],
-    /// See there: (cxx, cxy, cyy).
+    /// (cxx, cxy, cyy) of [`Self::thickness_slope`].
     pub thickness_curve: [f64; 3],
-    /// Gravity in the film's frame, in parts of g; zeros: a weightless film. |down| ≤ 2.
+    /// Gravity in the film's frame, in parts of g, |down| ≤ 2. Zeros mean a weightless film.
     pub down: [f64; 3],
-    /// How much stiffer, in parts of the film's own stiffness, it is on dots of 1 mm diameter, 0 to
-    /// 3.
+    /// Additional stiffness on dots of 1 mm diameter, in parts of the film's own stiffness, 0 to 3.
     pub dot_stiffening: f64,
-    /// Where those dots are on the mounted film, mm from the middle.
+    /// The dots' places on the mounted film, mm from the middle.
     pub dots_mm: Vec<[f64; 2]>,
     /// Radius of the discs around the posts' centres on which the film is held, > 0.
     pub post_radius_mm: f64,
-    /// How far each post is off its place, in the order of the markers' identities; the film is cut
-    /// as if none were. Within ±[`MOST_POST_SHIFT_MM`].
+    /// Shift of each post from its place, in the order of the markers' identities, within
+    /// ±[`MOST_POST_SHIFT_MM`]. The film is cut as for unshifted posts.
     pub post_shift_mm: [[f64; 2]; 4],
-    /// How stiffly a post holds the film, N/mm per mm², > 0. The film slips by √(membrane stiffness
-    /// / grip) at a post's rim: 0.18 mm at the default 20, as if the post were that much smaller. A
-    /// rubber film that is clamped on both faces gives by shear through its thickness, about 12
-    /// G/t = 8 N/mm³: the default is no softer than that.
+    /// Stiffness of a post's grip on the film, N/mm per mm², > 0. At a post's rim the film slips by
+    /// √(membrane stiffness / grip): 0.18 mm at the default 20, as if the post were smaller by
+    /// that. A rubber film that is clamped on both faces yields by shear through its thickness,
+    /// about 12 G/t = 8 N/mm³. The default is not softer than that.
     pub post_grip_n_per_mm3: f64,
     /// Radius of the disc over which the tip spreads its force, > 0; by (1 − r²/R²)².
     pub tip_radius_mm: f64,
-    /// Where the tip meets the film at rest, from the centre.
+    /// The place where the tip meets the film at rest, from the centre.
     pub tip_offset_mm: [f64; 2],
-    /// 1: the default mesh; 2: cells of half the size; 0.25 to 8.
+    /// Fineness of the mesh, 0.25 to 8. 1 is the default mesh; 2 has cells of half the size.
     pub fineness: f64,
-    /// Cells along half of the edge, 4 to 400; none: as many as the fineness asks for. Films of as
-    /// many cells can be started from each other's states.
+    /// Number of cells along half of the edge, 4 to 400; `None` follows the fineness. Films with
+    /// the same number of cells can start from each other's states.
     pub cells: Option<usize>,
-    /// Points along a side of a cell at which the film is summed: 3, or 2, which takes half the
-    /// time and is as near to a finer mesh's solution.
+    /// Number of Gauss points along a side of a cell: 3, or 2, which takes half the time and is as
+    /// close to the solution of a finer mesh.
     pub gauss_points: usize,
 }
 
@@ -117,7 +116,7 @@ impl Default for Design {
 }
 
 impl Design {
-    /// The film of a unit, whose markers are the matter of whoever looks at it.
+    /// Returns the film of a unit. The unit's markers are not part of it.
     pub fn of(unit: &Unit) -> Design {
         let nominal = Design::default();
         Design {
@@ -132,20 +131,20 @@ impl Design {
         }
     }
 
-    /// Half the length of the film's edge.
+    /// Returns half the length of the film's edge.
     pub fn half_edge_mm(&self) -> f64 {
         self.span_mm / 2.0 + self.overhang_mm
     }
 
-    /// The thickness before the film is mounted of a point of the mounted film (mm), mm.
+    /// Returns the thickness before mounting, mm, at a point (mm) of the mounted film.
     pub fn thickness_mm_at(&self, point_mm: [f64; 2]) -> f64 {
         self.material.thickness_mm * self.sheet().relative(point_mm)
     }
 
-    /// Whether such a film can be.
+    /// Checks that such a film is possible.
     ///
     /// # Errors
-    /// When a number is out of its range, or the tip would press on a post.
+    /// If a number is out of its range, or the tip would press on a post.
     pub fn check(&self) -> Result<(), ShellError> {
         let Design { material, .. } = self;
         positive("span", self.span_mm)?;
@@ -212,7 +211,7 @@ impl Design {
         Ok(())
     }
 
-    /// The film as a sheet, whatever holds it.
+    /// Returns the film as a sheet, without what holds it.
     pub(crate) fn sheet(&self) -> Sheet {
         let ([sx, sy], [cxx, cxy, cyy]) = (self.thickness_slope, self.thickness_curve);
         Sheet {
@@ -226,13 +225,13 @@ impl Design {
         }
     }
 
-    /// Cells along half of the edge.
+    /// Returns the number of cells along half of the edge.
     pub fn cells(&self) -> usize {
         self.cells
             .unwrap_or_else(|| self.counts().last().map_or(0.0, |most| most.ceil()) as usize)
     }
 
-    /// Whether a tip there (mm) is clear of the posts.
+    /// Checks that a tip at this place (mm) does not touch the posts.
     pub(crate) fn check_tip_at(
         &self,
         offset_mm: [f64; 2],
@@ -249,7 +248,7 @@ impl Design {
         Ok(())
     }
 
-    /// The film's cells.
+    /// Returns the film's cells.
     pub(crate) fn grid(&self) -> Grid {
         let breaks = self.breaks();
         Grid {
@@ -258,7 +257,8 @@ impl Design {
         }
     }
 
-    /// The film, held by its posts; `pattern` is that of a film of as many cells.
+    /// Returns the film held by its posts. `pattern` is that of a film with the same number of
+    /// cells.
     pub(crate) fn shell(&self, pattern: Option<&Arc<Pattern>>) -> Shell {
         let (grid, sheet) = (self.grid(), self.sheet());
         let mut shell = match pattern {
@@ -270,21 +270,23 @@ impl Design {
         shell
     }
 
-    /// What holds the film, N/mm at points; of all posts or one.
+    /// Iterates over the springs that hold the film, N/mm at points: of one post, or of all if
+    /// `None`.
     pub(crate) fn springs(&self, post: Option<usize>) -> impl Iterator<Item = ([f64; 2], f64)> {
         let grip = self.post_grip_n_per_mm3;
         let points = self.points_of_posts(post).into_iter();
         points.map(move |(point, area)| (point, area * grip))
     }
 
-    /// The points of the film on which the tip presses, mm at rest, with their shares of its force.
+    /// Returns the points of the film on which the tip presses, mm at rest, with their shares of
+    /// its force.
     pub fn tip_points(&self) -> Vec<([f64; 2], f64)> {
         tip_points(self.tip_offset_mm, self.tip_radius_mm)
     }
 
-    /// The points of the film on posts, mm at rest, with their areas in mm²: Gauss's over the angle
-    /// whose sine is x, and along the chord there. They follow a post that is shifted, and the
-    /// film's edge cuts them, without a jump.
+    /// Returns the points of the film on posts, mm at rest, with their areas in mm². They are
+    /// Gauss's points over the angle whose sine is x, and along the chord there. They follow a
+    /// shifted post, and the film's edge cuts them, without a jump.
     pub fn post_points(&self) -> Vec<([f64; 2], f64)> {
         self.points_of_posts(None)
     }
@@ -312,7 +314,8 @@ impl Design {
         points
     }
 
-    /// Cell borders along one side: even steps in the integral of 1 / (wanted size), symmetric.
+    /// Returns the cell borders along one side: even steps in the integral of 1 / (wanted size),
+    /// symmetric.
     fn breaks(&self) -> Vec<f64> {
         let step = self.half_edge_mm() / SAMPLES as f64;
         let counts = self.counts();
@@ -332,7 +335,8 @@ impl Design {
         left.chain([0.0]).chain(half.iter().copied()).collect()
     }
 
-    /// How many cells are wanted from the middle to each of many even steps towards the edge.
+    /// Returns the wanted number of cells from the middle to each of many even steps towards the
+    /// edge.
     fn counts(&self) -> Vec<f64> {
         let step = self.half_edge_mm() / SAMPLES as f64;
         let mut counts = vec![0.0];
@@ -343,7 +347,7 @@ impl Design {
         counts
     }
 
-    /// The wanted size of a cell `at` mm from the middle: small wherever a tip may press, and at
+    /// Returns the wanted size of a cell `at` mm from the middle: small in the tip's range and at
     /// the posts.
     fn cell_mm(&self, at: f64) -> f64 {
         let tip = TIP_CELL_MM + GROWTH * (at - TIP_REACH_MM).max(0.0);
@@ -353,7 +357,7 @@ impl Design {
     }
 }
 
-/// The points on which a tip presses, mm, with their shares of its force.
+/// Returns the points on which a tip presses, mm, with their shares of its force.
 pub(crate) fn tip_points(place_mm: [f64; 2], radius: f64) -> Vec<([f64; 2], f64)> {
     let points: Vec<_> = disc(place_mm, radius, TIP_RINGS, TIP_RAYS)
         .map(|(point, area, r)| (point, area * (1.0 - (r / radius).powi(2)).powi(2)))
@@ -365,7 +369,7 @@ pub(crate) fn tip_points(place_mm: [f64; 2], radius: f64) -> Vec<([f64; 2], f64)
         .collect()
 }
 
-/// Gauss's points on a length, with their weights: none on one that is not there.
+/// Iterates over Gauss's points on a length, with their weights. An empty length has no points.
 fn gauss([from, to]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
     static POINTS: LazyLock<[(f64, f64); POST_POINTS]> = LazyLock::new(gauss_points);
     let (middle, half) = ((from + to) / 2.0, ((to - from) / 2.0).max(0.0));
@@ -375,7 +379,8 @@ fn gauss([from, to]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
         .filter(|(_, weight)| *weight > 0.0)
 }
 
-/// Gauss's points and weights on [−1, 1]: the roots of Legendre's polynomial by Newton's method.
+/// Returns Gauss's points and weights on [−1, 1]: the roots of Legendre's polynomial by Newton's
+/// method.
 fn gauss_points() -> [(f64, f64); POST_POINTS] {
     let n = POST_POINTS as f64;
     std::array::from_fn(|i| {
@@ -397,7 +402,7 @@ fn gauss_points() -> [(f64, f64); POST_POINTS] {
     })
 }
 
-/// Points of a disc in rings: place, area and distance from its centre.
+/// Returns the points of a disc in rings: place, area and distance from its centre.
 fn disc(
     [cx, cy]: [f64; 2],
     radius: f64,

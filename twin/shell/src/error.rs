@@ -3,23 +3,23 @@ use std::fmt;
 use hivtac_twin::SceneError;
 use hivtac_twin::film::FilmError;
 
-/// Why a film cannot be made or pressed.
+/// The reasons why a film cannot be made or pressed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShellError {
-    /// A dimension, a material or a mesh that cannot be.
+    /// An impossible dimension, material or mesh.
     Design(String),
-    /// A contact that cannot be.
+    /// An impossible contact.
     Contact(String),
     /// Newton's method ended without an equilibrium.
     NoEquilibrium {
         /// Steps taken.
         steps: usize,
-        /// The largest force left over, N.
+        /// The largest unbalanced force, N.
         left_over_n: f64,
     },
-    /// The sparse solver gave up.
+    /// The sparse solver failed.
     Solver(String),
-    /// A camera or a load cannot be.
+    /// An impossible camera or load.
     Scene(String),
 }
 

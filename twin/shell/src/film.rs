@@ -1,4 +1,4 @@
-//! The film under a tip.
+//! The film under a tip: finds its equilibrium for each contact.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -12,33 +12,33 @@ use crate::shell::Shell;
 use crate::sparse::{COMPONENTS, Factors, Solver};
 use crate::{Design, ShellError};
 
-/// A slack film is pushed by so much to begin with, so that it knows which way to bulge, mm.
+/// A slack film is first pushed by this much, mm, to decide the side on which it bulges.
 const PUSH_MM: f64 = 1e-2;
 
-/// What the tip does to the film (`docs/architecture.md` has the frame: z away from the camera, a
+/// The tip's action on the film (`docs/architecture.md` has the frame: z away from the camera, a
 /// press has F_z < 0).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Contact {
-    /// It presses with this force (N) and goes where the film lets it: the `force` reading.
+    /// The tip presses with this force (N) and goes where the film lets it: the `force` reading.
     Force([f64; 3]),
-    /// It goes this far (mm, from the flat mounted film) with the film stuck to it, whatever the
-    /// force.
+    /// The tip goes this far (mm, from the flat mounted film) with the film stuck to it, at
+    /// whatever force that needs.
     Travel([f64; 3]),
-    /// From the film at rest it moves along a direction (of any length) with the film stuck to it,
-    /// until the force along that direction is `force_n`, as a gauge on a stage reads it: the
-    /// `stick` reading.
+    /// From the film at rest the tip moves along a direction (of any length) with the film stuck to
+    /// it. It stops when the force along that direction is `force_n`, as a gauge on a stage reads
+    /// it: the `stick` reading.
     Stick {
-        /// Where the tip moves; its third part < 0.
+        /// The tip's direction of travel; its third component is < 0.
         direction: [f64; 3],
-        /// The force along it, N.
+        /// The force along the direction, N.
         force_n: f64,
-        /// How far the tip has slid over the film from where its way began, mm: the film lags
-        /// behind it by so much.
+        /// The distance that the tip has slid over the film since the start of its travel, mm. The
+        /// film lags behind the tip by this.
         slid_mm: [f64; 2],
     },
 }
 
-/// Where a tip is and how large.
+/// A tip's place and size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tip {
     /// Its middle on the mounted film, mm.
@@ -54,7 +54,7 @@ pub struct Film {
     solver: Arc<Solver>,
     /// The share of each coefficient in the tip's mean displacement.
     tip: Vec<f64>,
-    /// The unknowns at rest, mm, and the steps that they took.
+    /// The unknowns at rest, mm, with the number of steps that found them.
     rest: Solution,
     around: Beside,
 }
@@ -64,22 +64,22 @@ pub struct Film {
 pub struct Equilibrium {
     pub(crate) unknowns: Vec<f64>,
     pub(crate) touched: Tip,
-    /// Where the tip's disc went from the flat mounted film (mean over it, weighted as its force),
-    /// mm.
+    /// The displacement of the tip's disc from the flat mounted film, mm (the mean over the disc,
+    /// weighted as its force).
     pub tip_mm: [f64; 3],
     /// The tip's force on the film, N.
     pub force_n: [f64; 3],
     /// The posts' force on the film, N.
     pub reaction_n: [f64; 3],
-    /// Newton steps that it took.
+    /// Number of Newton steps that found it.
     pub steps: usize,
 }
 
 impl Film {
-    /// Prepares the film of a design and finds how it rests.
+    /// Prepares the film of a design and finds its rest.
     ///
     /// # Errors
-    /// When the design cannot be ([`Design::check`]), memory runs out, or the film finds no rest.
+    /// If the design is impossible ([`Design::check`]), memory runs out, or the film finds no rest.
     pub fn new(design: &Design) -> Result<Film, ShellError> {
         design.check()?;
         let shell = design.shell(None);
@@ -87,9 +87,9 @@ impl Film {
         Film::of(design, shell, solver, None)
     }
 
-    /// The film of another design with as many cells as this one, whatever
-    /// [`Design::cells`] says: its rest is found from this one's, and this one's states are starts
-    /// for its own.
+    /// Returns the film of another design with as many cells as this one, independent of
+    /// [`Design::cells`]. Its rest is found from this one's, and this film's states are valid
+    /// starts for its own.
     ///
     /// # Errors
     /// As [`Film::new`].
@@ -124,10 +124,10 @@ impl Film {
         })
     }
 
-    /// Puts the tip elsewhere (mm from the centre). States found before stay good to start from.
+    /// Moves the tip to another place (mm from the centre). States found before stay valid starts.
     ///
     /// # Errors
-    /// When the tip would press on a post.
+    /// If the tip would press on a post.
     pub fn move_tip(&mut self, offset_mm: [f64; 2], radius_mm: f64) -> Result<(), ShellError> {
         self.check_tip(offset_mm, radius_mm)?;
         self.tip = tip_shares(self.shell.grid(), offset_mm, radius_mm);
@@ -140,18 +140,18 @@ impl Film {
         self.design.check_tip_at(offset_mm, radius_mm)
     }
 
-    /// What it was made from.
+    /// Returns the design that the film was made from.
     pub fn design(&self) -> &Design {
         &self.design
     }
 
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.shell.grid().unknowns()
     }
 
-    /// The film at rest: flat where it is neither stretched nor heavy. A slack film that weighs
-    /// nothing bulges towards the camera.
+    /// Returns the film at rest. It is flat if it is neither stretched nor heavy. A slack,
+    /// weightless film bulges towards the camera.
     pub fn rest(&self) -> Equilibrium {
         let unknowns = self.rest.unknowns.clone();
         Equilibrium {
@@ -164,20 +164,21 @@ impl Film {
         }
     }
 
-    /// The film under a contact, found from the state `start` (of this film or of another with as
-    /// many cells; the nearer, the quicker).
+    /// Returns the film under a contact, found from the state `start`. That is a state of this film
+    /// or of another with as many cells; a nearer one makes the search quicker.
     ///
     /// # Errors
-    /// When the contact's numbers are not finite, its direction is none, no equilibrium is found,
-    /// or the start is of another mesh.
+    /// If the contact's numbers are not finite, its direction is zero, no equilibrium is found, or
+    /// the start belongs to another mesh.
     pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, ShellError> {
         self.press_tip(self.own_tip(), contact, start)
     }
 
-    /// The same with the tip elsewhere, mm on the mounted film, and of another radius, mm.
+    /// As [`Film::press`], with the tip at another place, mm on the mounted film, and with another
+    /// radius, mm.
     ///
     /// # Errors
-    /// The same, and when the tip would press on a post.
+    /// As [`Film::press`], and if the tip would press on a post.
     pub fn press_at(
         &self,
         place_mm: [f64; 2],
@@ -193,8 +194,8 @@ impl Film {
         self.press_tip(tip, contact, start)
     }
 
-    /// The film under a force, N, of a tip of its design's radius at a point of it, mm: found from
-    /// a state nearby, or else from rest.
+    /// Returns the film under a force, N, of a tip with its design's radius at a point of the film,
+    /// mm. It is found from a nearby state if there is one, otherwise from rest.
     ///
     /// # Errors
     /// As [`Film::press_at`].
@@ -240,14 +241,15 @@ impl Film {
         Ok(self.equilibrium(solution, force, &guided, tip))
     }
 
-    /// How the camera-side surface point of the mounted film at (x, y) mm is displaced from where
-    /// it is in the flat mounted film, mm: half the thickness below the middle surface, along its
-    /// normal. How it moved since rest is the difference to [`Film::rest`]'s.
+    /// Returns the displacement, mm, of the point of the camera-side surface of the mounted film at
+    /// (x, y) mm, relative to the flat mounted film. That surface is half the thickness below the
+    /// middle surface, along its normal. The motion since rest is the difference to the
+    /// displacement in [`Film::rest`].
     pub fn displacement(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [f64; 3] {
         self.surface(state, point_mm, 0.0)
     }
 
-    /// The same of a film that is `thicker_mm` thicker.
+    /// As [`Film::displacement`], for a film that is `thicker_mm` thicker.
     pub(crate) fn surface(
         &self,
         state: &Equilibrium,
@@ -268,8 +270,8 @@ impl Film {
         [dx - x, dy - y, dz + flat - z]
     }
 
-    /// Half of the thickness at a point whose area is `size` times that of the flat mounted film:
-    /// rubber's falls as it is stretched.
+    /// Returns half of the thickness at a point whose area is `size` times that of the flat mounted
+    /// film. Rubber gets thinner as it is stretched.
     pub(crate) fn half_mm(&self, point_mm: [f64; 2], size: f64, thicker_mm: f64) -> f64 {
         let sheet = self.shell.sheet();
         let [across, down] = sheet.scales();
@@ -278,14 +280,14 @@ impl Film {
         0.5 * (sheet.material.thickness_mm + thicker_mm) * sheet.relative(point_mm) * thinned
     }
 
-    /// Half of the flat mounted film's thickness at a point, mm: how far its camera-side surface is
-    /// from the plane of its middle.
+    /// Returns half of the flat mounted film's thickness at a point, mm: the distance of its
+    /// camera-side surface from its middle plane.
     pub fn half_thickness_mm(&self, point_mm: [f64; 2]) -> f64 {
         self.half_mm(point_mm, 1.0, 0.0)
     }
 
-    /// The point of the mounted film (its coordinates where it is flat, mm) whose camera side is at
-    /// (x, y) mm in a state, as that at rest. The inverse of [`Film::lab_place`].
+    /// Returns the point of the mounted film (its coordinates in the flat film, mm) whose camera
+    /// side is at (x, y) mm in a state, for example at rest. The inverse of [`Film::lab_place`].
     pub fn material_point(&self, state: &Equilibrium, lab_mm: [f64; 2]) -> [f64; 2] {
         let mut point = lab_mm;
         for _ in 0..100 {
@@ -299,13 +301,13 @@ impl Film {
         point
     }
 
-    /// Where (x, y), mm, a state has the camera side of a point of the mounted film.
+    /// Returns (x, y), mm, of the camera side of a point of the mounted film in a state.
     pub fn lab_place(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [f64; 2] {
         let [x, y, _] = self.displacement(state, point_mm);
         [point_mm[0] + x, point_mm[1] + y]
     }
 
-    /// The force on the tip, and directions in which its travel is given (mm).
+    /// Returns the force on the tip, and the directions with a prescribed travel (mm).
     fn asked(&self, contact: Contact, at_rest: V3) -> Result<(V3, Vec<(V3, f64)>), ShellError> {
         match contact {
             Contact::Force(force) => finite("force", force).map(|force| (force, Vec::new())),
@@ -347,7 +349,7 @@ impl Film {
 }
 
 impl Film {
-    /// The factored stiffness of a state.
+    /// Returns the factored stiffness of a state.
     pub(crate) fn factors_at(&self, state: &Equilibrium) -> Result<Factors, ShellError> {
         let stiffness = self.shell.stiffness(&state.unknowns);
         let factors = self.solver.factor(self.shell.pattern(), &stiffness);
@@ -369,7 +371,7 @@ impl Film {
         }
     }
 
-    /// A tip's shares.
+    /// Returns a tip's shares.
     pub(crate) fn tip_of(&self, tip: &Tip) -> Cow<'_, [f64]> {
         if *tip == self.own_tip() {
             return Cow::Borrowed(&self.tip);
@@ -377,7 +379,7 @@ impl Film {
         Cow::Owned(tip_shares(self.shell.grid(), tip.place_mm, tip.radius_mm))
     }
 
-    /// Refuses a state of another mesh.
+    /// Rejects a state of another mesh.
     pub(crate) fn fits(&self, state: &Equilibrium) -> Result<(), ShellError> {
         let (own, other) = (self.unknowns(), state.unknowns.len());
         if own == other {
@@ -390,7 +392,7 @@ impl Film {
     }
 }
 
-/// How a film rests, found from `start` or from the flat film.
+/// Finds a film's rest from `start` or from the flat film.
 fn rest_of(
     design: &Design,
     shell: &Shell,
@@ -433,13 +435,13 @@ fn rest_of(
 }
 
 impl Equilibrium {
-    /// The film's unknowns, mm.
+    /// Returns the film's unknowns, mm.
     pub(crate) fn unknowns(&self) -> &[f64] {
         &self.unknowns
     }
 
-    /// The state at a place of a path that the polynomial through some known states of it
-    /// foretells: a start for [`Film::press`]. `None` of none.
+    /// Returns the state at a place of a path, predicted by the polynomial through known states: a
+    /// start for [`Film::press`]. Returns `None` if `path` is empty.
     pub fn foretold(path: &[(f64, &Equilibrium)], at: f64) -> Option<Equilibrium> {
         let mut state = (*path.last()?.1).clone();
         state.unknowns.fill(0.0);
@@ -455,7 +457,7 @@ impl Equilibrium {
     }
 }
 
-/// Σ share · displacement.
+/// Returns Σ share · displacement.
 pub(crate) fn mean(shares: &[f64], unknowns: &[f64]) -> V3 {
     let mut sum = [0.0; 3];
     for (share, u) in shares.iter().zip(unknowns.chunks(COMPONENTS)) {
@@ -466,7 +468,7 @@ pub(crate) fn mean(shares: &[f64], unknowns: &[f64]) -> V3 {
     sum
 }
 
-/// A vector on each coefficient by its share.
+/// Returns a vector at each coefficient, times the coefficient's share.
 pub(crate) fn weighted(shares: &[f64], vector: &V3) -> Vec<f64> {
     let parts = shares
         .iter()
@@ -474,7 +476,7 @@ pub(crate) fn weighted(shares: &[f64], vector: &V3) -> Vec<f64> {
     parts.collect()
 }
 
-/// The shares of a tip's force on each coefficient.
+/// Returns the shares of a tip's force on each coefficient.
 pub(crate) fn tip_shares(grid: &Grid, place_mm: [f64; 2], radius_mm: f64) -> Vec<f64> {
     let mut shares = vec![0.0; grid.unknowns() / COMPONENTS];
     for (point, share) in tip_points(place_mm, radius_mm) {
@@ -505,7 +507,7 @@ fn unit(vector: V3) -> Result<V3, ShellError> {
     )))
 }
 
-/// Two unit vectors across a unit vector that is not along x.
+/// Returns two unit vectors perpendicular to a unit vector that is not along x.
 fn across(along: &V3) -> [V3; 2] {
     let [x, y, z] = *along;
     let size = (y * y + z * z).sqrt();
@@ -555,7 +557,7 @@ mod tests {
             assert!(dz < -0.1);
             close(film.displacement(&state, [-x, y]), [-dx, dy, dz], 1e-8);
             close(film.displacement(&state, [x, -y]), [dx, -dy, dz], 1e-8);
-            // Points of posts lie by columns, so that the diagonal is met less closely.
+            // Points of posts lie by columns, therefore the symmetry at the diagonal is less exact.
             close(film.displacement(&state, [y, x]), [dy, dx, dz], 1e-6);
         }
     }
@@ -608,7 +610,7 @@ mod tests {
         };
         design.material.thickness_mm = 0.01;
         let film = Film::new(&design).unwrap();
-        // Shallow, but a hundred times the thickness.
+        // Shallow for the film, but a hundred times its thickness.
         let force = |depth: f64| pressed(&film, Contact::Travel([0.0, 0.0, -depth])).force_n[2];
         let order = (force(1.0) / force(0.5)).log2();
         println!("thin film: force with depth to the {order:.3}");

@@ -1,4 +1,4 @@
-//! Places on the film and the coefficients that say how they move.
+//! The grid of cells over the film, and the coefficients that describe its motion.
 
 use crate::point::V3;
 use crate::shell::LOCAL;
@@ -9,11 +9,11 @@ use crate::spline::{Axis, SUPPORT};
 pub struct Grid {
     /// Along x and along y.
     pub axes: [Axis; 2],
-    /// Gauss points along one side of a cell, 2 or 3.
+    /// Number of Gauss points along one side of a cell, 2 or 3.
     pub points: usize,
 }
 
-/// A point of the film, by the functions that are not zero there.
+/// A point of the film, described by the functions that are not zero there.
 pub struct Place {
     /// The first function along x and along y.
     pub origin: [usize; 2],
@@ -24,18 +24,18 @@ pub struct Place {
 }
 
 impl Grid {
-    /// Numbers of functions along x and along y.
+    /// Returns the numbers of functions along x and along y.
     pub fn functions(&self) -> [usize; 2] {
         [self.axes[0].functions(), self.axes[1].functions()]
     }
 
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub fn unknowns(&self) -> usize {
         let [columns, rows] = self.functions();
         COMPONENTS * columns * rows
     }
 
-    /// The place that rests at (x, y) mm.
+    /// Returns the place that rests at (x, y) mm.
     pub fn place(&self, [x, y]: [f64; 2]) -> Place {
         let origin = [self.axes[0].span_of(x), self.axes[1].span_of(y)];
         let along_x = self.axes[0].basis(origin[0], x);
@@ -50,13 +50,13 @@ impl Grid {
         }
     }
 
-    /// The index of a cell's coefficient `local`.
+    /// Returns the index of a cell's coefficient `local`.
     #[inline]
     pub fn coefficient(&self, [i, j]: [usize; 2], local: usize) -> usize {
         (j + local / SUPPORT) * self.axes[0].functions() + i + local % SUPPORT
     }
 
-    /// The coefficients of the functions that are not zero on a cell.
+    /// Returns the coefficients of the functions that are not zero on a cell.
     #[inline]
     pub fn gather(&self, u: &[f64], origin: [usize; 2]) -> [V3; LOCAL] {
         let mut gathered = [[0.0; 3]; LOCAL];
@@ -67,12 +67,12 @@ impl Grid {
         gathered
     }
 
-    /// The displacement of a place, mm.
+    /// Returns the displacement of a place, mm.
     pub fn interpolate(&self, u: &[f64], place: &Place) -> V3 {
         weighted(&place.values, &self.gather(u, place.origin))
     }
 
-    /// The derivatives of the displacement by x and by y at a place.
+    /// Returns the derivatives of the displacement by x and by y at a place.
     pub fn gradients(&self, u: &[f64], place: &Place) -> [V3; 2] {
         let local = self.gather(u, place.origin);
         [

@@ -1,10 +1,10 @@
-//! The film under the loads of a scene.
+//! The full solution of the film under the loads of a scene.
 
 use hivtac_twin::film::{Contact as Reading, Load, MAX_RATIO};
 
 use crate::{Contact, Equilibrium, Film, ShellError};
 
-/// A sliding tip is found when friction ratio and direction are met to this, N.
+/// Largest error of friction ratio and direction at which a sliding tip counts as found, N.
 const TOLERANCE_N: f64 = 1e-6;
 const MAX_STEPS: usize = 25;
 const SLOPE_STEP_MM: f64 = 1e-3;
@@ -14,24 +14,25 @@ const SLOPE_STEP_MM: f64 = 1e-3;
 pub struct Loaded {
     /// Its state.
     pub state: Equilibrium,
-    /// Which point of the film the tip is on, by where it rests, mm.
+    /// The point of the film that the tip touches, given by its place at rest, mm.
     pub touches_mm: [f64; 2],
 }
 
-/// A tip that slides: film, load and what is known of it so far.
+/// A sliding tip: film, load and the current estimate.
 struct Slide<'a> {
     film: &'a mut Film,
-    /// Where the tip began, mm.
+    /// The tip's place at the start, mm.
     from_mm: [f64; 3],
     load: &'a Load,
     mu: f64,
     state: Equilibrium,
 }
 
-/// The full solution for a load in its contact reading. The film's tip is left where the load ends.
+/// Returns the full solution for a load in its contact reading. The film's tip stays where the load
+/// ends.
 ///
 /// # Errors
-/// When the load cannot be, or no equilibrium is found.
+/// If the load is impossible, or no equilibrium is found.
 pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, ShellError> {
     film.move_tip(load.offset_mm(), load.tip_radius_mm())?;
     if load.magnitude_n() == 0.0 {
@@ -68,7 +69,8 @@ pub fn press_load(film: &mut Film, load: &Load) -> Result<Loaded, ShellError> {
     }
 }
 
-/// A tip on a stage that moves the way of the load's label, slid over the film by so much.
+/// Returns the contact of a tip on a stage that moves in the direction of the load's label and has
+/// slid over the film by `slid_mm`.
 fn stage(load: &Load, slid_mm: [f64; 2]) -> Contact {
     Contact::Stick {
         direction: load.vector_n(),
@@ -78,7 +80,7 @@ fn stage(load: &Load, slid_mm: [f64; 2]) -> Contact {
 }
 
 impl Slide<'_> {
-    /// Broyden's method for how far the tip has slid.
+    /// Finds the slide of the tip by Broyden's method.
     fn find(mut self) -> Result<Loaded, ShellError> {
         let [x, y, z] = self.state.force_n;
         let share = 1.0 - self.mu * -z / x.hypot(y);
@@ -103,7 +105,7 @@ impl Slide<'_> {
             gap = self.gap(slid)?;
             let square = step[0] * step[0] + step[1] * step[1];
             for (row, left) in slopes.iter_mut().zip(gap) {
-                // The old slopes promised no gap after this step.
+                // The old slopes predicted a gap of zero after this step.
                 *row = [0, 1].map(|k| row[k] + left * step[k] / square);
             }
         }
@@ -113,7 +115,8 @@ impl Slide<'_> {
         })
     }
 
-    /// What is missing of the friction ratio and of a slide along the sideways force, N.
+    /// Returns the remaining errors, N: of the friction ratio, and of a slide along the sideways
+    /// force.
     fn gap(&mut self, slid: [f64; 2]) -> Result<[f64; 2], ShellError> {
         let [x, y] = self.load.offset_mm();
         let radius_mm = self.load.tip_radius_mm();

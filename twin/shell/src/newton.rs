@@ -1,44 +1,44 @@
-//! Equilibrium by Newton's method.
+//! Finds equilibria by Newton's method.
 //!
-//! Finds the displacements where the energy less the loads' work is stationary, on the set where
-//! each guided sum of unknowns has its target. Every step solves the linearized problem by
-//! Cholesky's factors, with the guides by their Schur complement; a stiffness that is not positive
+//! An equilibrium is where the energy minus the loads' work is stationary, among displacements in
+//! which each guided sum of unknowns has its target. Every step solves the linearized problem by
+//! Cholesky's factors, with the guides by their Schur complement. A stiffness that is not positive
 //! definite is shifted until it is. Once the guides are met (after one full step: they are linear),
-//! a step is shortened until the energy falls. Near the equilibrium the last factors serve again,
-//! which costs a tenth of a step, as long as each use brings the film much nearer.
+//! a step is shortened until the energy falls. Near the equilibrium the last factors are used
+//! again, at a tenth of a step's cost, as long as each use brings the film much nearer.
 
 use crate::ShellError;
 use crate::shell::Shell;
 use crate::sparse::{Factors, Solver};
 
-/// Less left over than this is near: there the energy needs no watching, N.
+/// With unbalanced forces below this, N, the film is near: the energy needs no check.
 const NEAR_N: f64 = 1e-4;
-/// Factors serve again as long as each use leaves less than this part over.
+/// Factors are used again as long as each use leaves less than this part of the unbalanced force.
 const NEARER: f64 = 0.25;
-/// Equilibrium: no unknown has more force left over, N.
+/// At equilibrium no unknown has more unbalanced force than this, N.
 pub const FORCE_TOLERANCE_N: f64 = 1e-10;
 const TARGET_TOLERANCE_MM: f64 = 1e-11;
 const MAX_STEPS: usize = 80;
-/// The part of the promised fall of energy that a step must bring (Armijo).
+/// The part of the predicted fall of energy that a step must reach (Armijo).
 const SUFFICIENT: f64 = 1e-4;
-/// The fall of energy below which rounding hides it, N·mm: a full step is then taken.
+/// The fall of energy below which rounding hides it, N·mm. A full step is then taken.
 const HIDDEN_N_MM: f64 = 1e-12;
 
-/// A sum of unknowns that is led to a target.
+/// A sum of unknowns with a prescribed value.
 pub struct Guide {
     /// The unknowns' weights.
     pub weights: Vec<f64>,
-    /// What the sum shall be, mm.
+    /// The value of the sum, mm.
     pub target_mm: f64,
 }
 
-/// What is asked of the film.
+/// A problem to solve: the film, its load and its guides.
 pub struct Problem<'a> {
     /// The film.
     pub shell: &'a Shell,
     /// The force on each unknown, N.
     pub load: Vec<f64>,
-    /// At most a few guides.
+    /// A few guides at most.
     pub guides: Vec<Guide>,
 }
 
@@ -49,14 +49,14 @@ pub struct Solution {
     pub unknowns: Vec<f64>,
     /// The guides' forces, N.
     pub guide_n: Vec<f64>,
-    /// Newton steps taken.
+    /// Number of Newton steps taken.
     pub steps: usize,
 }
 
 /// An energy and its gradient.
 type First = (f64, Vec<f64>);
 
-/// A step towards equilibrium and what it was made of.
+/// A step towards equilibrium, with the force and factors that it was made from.
 struct Step {
     step: Vec<f64>,
     guide_n: Vec<f64>,
@@ -66,7 +66,7 @@ impl Problem<'_> {
     /// Finds the equilibrium from `start`.
     ///
     /// # Errors
-    /// When there is none within reach.
+    /// If there is none within reach.
     pub fn solve(&self, solver: &Solver, start: &[f64]) -> Result<Solution, ShellError> {
         let mut u = start.to_vec();
         let mut guide_n = vec![0.0; self.guides.len()];
@@ -81,7 +81,7 @@ impl Problem<'_> {
             if left_over_n.is_nan() {
                 break;
             }
-            // Guides' forces are known only after a step.
+            // Guides' forces are only known after a step.
             if met && left_over_n < FORCE_TOLERANCE_N && (steps > 0 || guide_n.is_empty()) {
                 return Ok(Solution {
                     unknowns: u,
@@ -112,7 +112,7 @@ impl Problem<'_> {
         })
     }
 
-    /// Load + guides' forces − the film's own, for each unknown.
+    /// Returns load + guides' forces − the film's own, for each unknown.
     fn left_over(&self, gradient: &[f64], guide_n: &[f64]) -> Vec<f64> {
         let pairs = self.load.iter().zip(gradient);
         let mut rest: Vec<f64> = pairs.map(|(f, g)| f - g).collect();
@@ -150,7 +150,8 @@ impl Problem<'_> {
         Ok(Step { step, guide_n })
     }
 
-    /// Solves the Schur complement: guides' weights · (step + Σ answer · force) = what is missing.
+    /// Solves the Schur complement: guides' weights · (step + Σ answer · force) = the missing part
+    /// of the targets.
     fn guide_forces(
         &self,
         step: &[f64],
@@ -168,7 +169,7 @@ impl Problem<'_> {
             .ok_or_else(|| ShellError::Solver("the guides depend on each other".into()))
     }
 
-    /// Factors of the stiffness, shifted if need be.
+    /// Returns the factors of the stiffness, shifted if it is not positive definite.
     fn factors(&self, solver: &Solver, stiffness: &[f64]) -> Result<Factors, ShellError> {
         let pattern = self.shell.pattern();
         if let Some(factors) = solver.factor(pattern, stiffness) {
@@ -190,8 +191,8 @@ impl Problem<'_> {
         Err(ShellError::Solver("the stiffness has no factors".into()))
     }
 
-    /// Takes all of the step, or the half, quarter … at which the energy falls most; the energy and
-    /// gradient there.
+    /// Takes all of the step, or the half, quarter … at which the energy falls most. Returns the
+    /// energy and the gradient there.
     fn shortened(&self, u: &mut Vec<f64>, at: &First, step: &[f64]) -> First {
         let here = at.0 - inner(&self.load, u);
         let slope = inner(&at.1, step) - inner(&self.load, step);
@@ -219,7 +220,7 @@ impl Problem<'_> {
     }
 }
 
-/// a · b.
+/// Returns a · b.
 pub fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
@@ -240,7 +241,8 @@ fn largest(values: &[f64]) -> f64 {
     })
 }
 
-/// Gauss elimination with pivoting, for systems of a few unknowns; `None` when singular.
+/// Gauss elimination with pivoting, for systems of a few unknowns. Returns `None` if the matrix is
+/// singular.
 pub fn solve_small(mut matrix: Vec<Vec<f64>>, mut side: Vec<f64>) -> Option<Vec<f64>> {
     let n = side.len();
     for k in 0..n {

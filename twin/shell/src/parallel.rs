@@ -1,10 +1,11 @@
-//! Many presses on several threads.
+//! Runs many presses on several threads.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::{Design, Film, ShellError};
 
-/// Runs `work` on each item, every thread with its own film; the results in the items' order.
+/// Runs `work` on each item, every thread with its own film. Returns the results in the items'
+/// order.
 pub fn in_parallel<T: Sync, R: Send>(
     design: &Design,
     items: &[T],

@@ -1,11 +1,11 @@
-//! States found one after the other, and loads spread evenly.
+//! Paths of states, each found from the ones before, and evenly spread loads.
 
 use crate::{Contact, Equilibrium, Film, ShellError};
 
-/// Known states that a start is foretold from.
+/// Number of known states from which a start is predicted.
 const FORETOLD_FROM: usize = 4;
 
-/// States found one after the other, each foretold by the latest.
+/// States found one after the other; the start of each is predicted from the latest.
 pub struct Path(Vec<(f64, Equilibrium)>);
 
 impl Path {
@@ -13,7 +13,7 @@ impl Path {
         Path(vec![(0.0, film.rest())])
     }
 
-    /// The state of the next place.
+    /// Returns the state of the next place.
     pub fn go(
         &mut self,
         film: &Film,
@@ -31,7 +31,8 @@ impl Path {
     }
 }
 
-/// Halton's sequence: the digits of `index` in `base` behind the point, reversed.
+/// Returns a number of Halton's sequence: the digits of `index` in `base`, reversed behind the
+/// point.
 pub fn halton(mut index: usize, base: usize) -> f64 {
     let (mut value, mut place) = (0.0, 1.0);
     while index > 0 {

@@ -4,12 +4,12 @@
 //!
 //! ψ = m · W(E) + b · ½ Kᵀ D K,
 //!
-//! E = (ε₁₁, ε₂₂, 2ε₁₂) with Green's membrane strain ε = (a_α·a_β − δ_αβ)/2, K = (κ₁₁, κ₂₂, 2κ₁₂)
-//! with the curvature κ_αβ = x,αβ · n of a film that rests flat; m and b are what a place has of
-//! the film's stiffness. W goes from Koiter's ½ Eᵀ A E (St Venant–Kirchhoff's plane stress, A = E
-//! t/(1−ν²) · [1 ν 0; ν 1 0; 0 0 (1−ν)/2]) to rubber's t C₁ (I + s I²) with I = I₁ − 3 of an
-//! incompressible film in plane stress and C₁ = E/6. Bending is Koiter's with the modulus at rest,
-//! D = A t²/12, for either. Nothing is linearized.
+//! E = (ε₁₁, ε₂₂, 2ε₁₂) with Green's membrane strain ε = (a_α·a_β − δ_αβ)/2. K = (κ₁₁, κ₂₂, 2κ₁₂)
+//! with the curvature κ_αβ = x,αβ · n of a film that rests flat. m and b are a place's shares of
+//! the film's stiffness. W goes from Koiter's ½ Eᵀ A E to rubber's t C₁ (I + s I²). The former is
+//! St Venant–Kirchhoff's plane stress, A = E t/(1−ν²) · [1 ν 0; ν 1 0; 0 0 (1−ν)/2]. The latter has
+//! I = I₁ − 3 of an incompressible film in plane stress and C₁ = E/6. Bending is Koiter's with the
+//! modulus at rest, D = A t²/12, for either. No term is linearized.
 
 /// A vector in space.
 pub type V3 = [f64; 3];
@@ -26,30 +26,30 @@ pub const DENSITY_KG_PER_M3: f64 = 1070.0;
 /// Its weight, N/mm³.
 pub const WEIGHT_N_PER_MM3: f64 = DENSITY_KG_PER_M3 * 9.806_65e-9;
 
-/// What a film is made of: an isotropic elastic sheet.
+/// A film's material: an isotropic elastic sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material {
     /// Young's modulus at rest, MPa (= N/mm²), > 0.
     pub youngs_mpa: f64,
-    /// Poisson's ratio, −1 < ν ≤ 0.5; a neo-Hookean film's is 0.5 whatever is said here, but in
-    /// bending.
+    /// Poisson's ratio, −1 < ν ≤ 0.5. A neo-Hookean film has 0.5 independent of this value, except
+    /// in bending.
     pub poisson: f64,
     /// Thickness before it is mounted, mm, > 0.
     pub thickness_mm: f64,
 }
 
 impl Material {
-    /// Membrane stiffness E t/(1−ν²), N/mm.
+    /// Returns the membrane stiffness E t/(1−ν²), N/mm.
     pub fn membrane_n_per_mm(&self) -> f64 {
         self.youngs_mpa * self.thickness_mm / (1.0 - self.poisson * self.poisson)
     }
 
-    /// Bending stiffness E t³/(12 (1−ν²)), N·mm.
+    /// Returns the bending stiffness E t³/(12 (1−ν²)), N·mm.
     pub fn bending_n_mm(&self) -> f64 {
         self.membrane_n_per_mm() * self.thickness_mm * self.thickness_mm / 12.0
     }
 
-    /// [1 ν 0; ν 1 0; 0 0 (1−ν)/2], times `stiffness`.
+    /// Returns [1 ν 0; ν 1 0; 0 0 (1−ν)/2], times `stiffness`.
     fn law(&self, stiffness: f64) -> M3 {
         let nu = self.poisson;
         [
@@ -60,13 +60,13 @@ impl Material {
     }
 }
 
-/// How a film answers to being stretched: 0 and 0 is St Venant–Kirchhoff's law.
+/// The law of a film's elasticity under stretch; 0 and 0 is St Venant–Kirchhoff's law.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Law {
-    /// The part of it that is rubber: 0 (St Venant–Kirchhoff) to 1 (W = C₁ (I₁−3) + C₂ (I₁−3)² of
-    /// an incompressible film, which also thins as it is stretched).
+    /// The part of rubber in the law, 0 (St Venant–Kirchhoff) to 1. At 1, W = C₁ (I₁−3) + C₂
+    /// (I₁−3)² of an incompressible film, which also gets thinner as it is stretched.
     pub neo_hooke: f64,
-    /// C₂/C₁ of that part, 0 (neo-Hooke) to 0.5 (Yeoh).
+    /// C₂/C₁ of the rubber part, 0 (neo-Hooke) to 0.5 (Yeoh).
     pub stiffening: f64,
 }
 
@@ -80,16 +80,16 @@ pub struct Laws {
     law: Law,
 }
 
-/// What a place has of the film's stiffness, for membrane and bending: times its area, mm².
+/// A place's share of the film's stiffness, for membrane and bending, times its area, mm².
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
-    /// Of the membrane's.
+    /// Share of the membrane's stiffness.
     pub membrane: f64,
-    /// Of bending's.
+    /// Share of the bending stiffness.
     pub bending: f64,
 }
 
-/// The whole stiffness, of a unit of area.
+/// The whole stiffness, for a unit of area.
 #[cfg(test)]
 pub const WHOLE: Share = Share {
     membrane: 1.0,
@@ -98,11 +98,11 @@ pub const WHOLE: Share = Share {
 
 /// The second derivatives of ψ: a 3×3 block for each pair of vectors.
 pub struct Second {
-    /// Of a₁ and a₂.
+    /// Blocks of a₁ and a₂.
     pub plane: [[M3; 2]; 2],
-    /// Of a_k and x,₁₁ x,₂₂ x,₁₂.
+    /// Blocks of a_k with x,₁₁ x,₂₂ x,₁₂.
     pub mixed: [[M3; 3]; 2],
-    /// Of two of the last three: this times the normal's products.
+    /// Blocks of two of the last three vectors: these factors times the products of the normal.
     pub far: M3,
     /// The normal.
     pub normal: V3,
@@ -144,7 +144,7 @@ impl Invariant {
 }
 
 impl Laws {
-    /// The laws of `material`.
+    /// Returns the laws of `material`.
     pub fn new(material: &Material, law: Law) -> Laws {
         Laws {
             membrane: material.law(material.membrane_n_per_mm()),
@@ -154,7 +154,7 @@ impl Laws {
         }
     }
 
-    /// W and its derivatives by E, N/mm.
+    /// Returns W and its derivatives by E, N/mm.
     #[inline(always)]
     fn tension(&self, strain: &V3) -> (f64, V3) {
         let linear = apply(&self.membrane, strain);
@@ -180,7 +180,7 @@ impl Laws {
         )
     }
 
-    /// The second derivatives of W by E, N/mm.
+    /// Returns the second derivatives of W by E, N/mm.
     #[inline(always)]
     fn tangent(&self, strain: &V3) -> M3 {
         if self.law.neo_hooke == 0.0 {
@@ -200,13 +200,13 @@ impl Laws {
         tangent
     }
 
-    /// ψ at a point.
+    /// Returns ψ at a point.
     #[cfg(test)]
     pub fn energy(&self, x: &Point, share: Share) -> f64 {
         self.first(x, share).0
     }
 
-    /// ψ and its gradient.
+    /// Returns ψ and its gradient.
     #[inline(always)]
     pub fn first(&self, x: &Point, share: Share) -> (f64, Point) {
         let (stretched, tension) = self.tension(&strain(x));
@@ -215,7 +215,7 @@ impl Laws {
         (energy, stretched_by(x, &tension, share.membrane, gradient))
     }
 
-    /// The gradients of membrane and bending, each of the whole stiffness.
+    /// Returns the gradients of membrane and bending, each for the whole stiffness.
     #[inline(always)]
     pub fn parts(&self, x: &Point) -> [Point; 2] {
         let (_, tension) = self.tension(&strain(x));
@@ -223,7 +223,7 @@ impl Laws {
         [stretched_by(x, &tension, 1.0, zero), self.bend(x, 1.0).1]
     }
 
-    /// How the membrane's gradient answers to the law's two numbers.
+    /// Returns the derivatives of the membrane's gradient by the law's two numbers.
     #[inline(always)]
     pub fn by_law(&self, x: &Point) -> [Point; 2] {
         let strain = strain(x);
@@ -239,7 +239,7 @@ impl Laws {
         ]
     }
 
-    /// Bending's energy and gradient.
+    /// Returns the energy and the gradient of bending.
     #[inline(always)]
     fn bend(&self, x: &Point, share: f64) -> (f64, Point) {
         let [a1, a2, ..] = x;
@@ -263,7 +263,7 @@ impl Laws {
         )
     }
 
-    /// The second derivatives of ψ.
+    /// Returns the second derivatives of ψ.
     #[inline(always)]
     pub fn second(&self, x: &Point, share: Share) -> Second {
         let strain = strain(x);
@@ -289,7 +289,7 @@ fn strain([a1, a2, ..]: &Point) -> V3 {
     ]
 }
 
-/// Adds the tension's part to a gradient.
+/// Adds the part of the tension to a gradient.
 #[inline(always)]
 fn stretched_by([a1, a2, ..]: &Point, tension: &V3, share: f64, mut gradient: Point) -> Point {
     let [t1, t2, t12] = times(tension, share);
@@ -322,7 +322,7 @@ fn add_stretch(plane: &mut [[M3; 2]; 2], [a1, a2, ..]: &Point, law: &M3, tension
     }
 }
 
-/// What the curvatures need of the deformed surface.
+/// The quantities of the deformed surface in the curvatures.
 struct Surface {
     /// |a₁ × a₂|.
     area: f64,
@@ -356,7 +356,7 @@ impl Surface {
         [dot(x11, n), dot(x22, n), 2.0 * dot(x12, n)]
     }
 
-    /// The second derivatives of ½ Kᵀ law K; the block of a₂ and a₁ is left out.
+    /// Returns the second derivatives of ½ Kᵀ law K. The block of a₂ and a₁ is left out.
     #[inline(always)]
     fn second(&self, x: &Point, law: &M3, moment: &V3) -> Second {
         let n = &self.normal;
@@ -370,7 +370,7 @@ impl Surface {
         let mut plane = [[[[0.0; 3]; 3]; 2]; 2];
         let mut mixed = [[[[0.0; 3]; 3]; 3]; 2];
         for k in 0..2 {
-            // law · gradients: what each curvature of a_k weighs.
+            // law · gradients: the weights of each curvature's gradient by a_k.
             let weighted = product(&transposed(law), &gradients[k]);
             for l in k..2 {
                 for j in 0..3 {
@@ -426,7 +426,7 @@ impl Surface {
 /// K's third entry is 2κ₁₂.
 const TWICE: V3 = [1.0, 1.0, 2.0];
 
-/// Σ weight_i · x_(2 + i).
+/// Returns Σ weight_i · x_(2 + i).
 #[inline(always)]
 fn sum_of(weights: &V3, x: &Point) -> V3 {
     let mut sum = [0.0; 3];
@@ -436,13 +436,13 @@ fn sum_of(weights: &V3, x: &Point) -> V3 {
     sum
 }
 
-/// a · b.
+/// Returns a · b.
 #[inline(always)]
 pub fn dot(a: &V3, b: &V3) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// a × b.
+/// Returns a × b.
 #[inline(always)]
 pub fn cross(a: &V3, b: &V3) -> V3 {
     [
@@ -452,13 +452,13 @@ pub fn cross(a: &V3, b: &V3) -> V3 {
     ]
 }
 
-/// The matrix of v ×.
+/// Returns the matrix of v ×.
 #[inline(always)]
 fn skew(v: &V3) -> M3 {
     [[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]]
 }
 
-/// I − n nᵀ.
+/// Returns I − n nᵀ.
 #[inline(always)]
 fn across(n: &V3) -> M3 {
     let mut matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -513,7 +513,7 @@ fn outer(a: &V3, b: &V3) -> M3 {
     [times(b, a[0]), times(b, a[1]), times(b, a[2])]
 }
 
-/// a − factor · b.
+/// Returns a − factor · b.
 #[inline(always)]
 fn less(a: &V3, b: &V3, factor: f64) -> V3 {
     [
@@ -553,7 +553,7 @@ mod tests {
         thickness_mm: 0.5,
     };
 
-    /// A surface stretched, sheared, turned and bent, and far from degenerate.
+    /// Generates surfaces that are stretched, sheared, turned and bent, and far from degenerate.
     fn any_point() -> impl Strategy<Value = Point> {
         prop::array::uniform5(prop::array::uniform3(-0.4..0.4)).prop_map(|mut x| {
             x[0][0] += 1.0;
@@ -562,7 +562,7 @@ mod tests {
         })
     }
 
-    /// One stretched less, which rubber's law makes no steep wall of.
+    /// Returns a less stretched surface, at which rubber's law is not steep.
     fn calm(mut x: Point) -> Point {
         for (k, vector) in x.iter_mut().enumerate().take(2) {
             for (c, part) in vector.iter_mut().enumerate() {
@@ -598,7 +598,7 @@ mod tests {
         moved
     }
 
-    /// All pairs' blocks.
+    /// Returns the blocks of all pairs.
     fn blocks(second: &Second) -> [[M3; VECTORS]; VECTORS] {
         let far = outer(&second.normal, &second.normal);
         std::array::from_fn(|p| {
@@ -700,7 +700,7 @@ mod tests {
         assert!((laws.energy(&twisted, WHOLE) - expected).abs() < 1e-15);
     }
 
-    /// Treloar's stresses (per area at rest) of uniaxial and equibiaxial tension, 2 (λ − λ⁻²) (C₁ +
+    /// Treloar's stresses (per area at rest) of uniaxial and equibiaxial tension: 2 (λ − λ⁻²) (C₁ +
     /// 2 C₂ I) and 2 (λ − λ⁻⁵) (C₁ + 2 C₂ I).
     #[test]
     fn rubber_has_its_stresses() {

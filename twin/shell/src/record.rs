@@ -1,5 +1,5 @@
-//! Full solutions as a file keeps them: rows of numbers, so that a sweep of an hour can be broken
-//! off and gone on with.
+//! Full solutions as a file stores them: rows of numbers. A sweep of an hour can thus be
+//! interrupted and continued.
 
 use hivtac_twin::film::DiscMotion;
 use hivtac_twin::film::reduced::Pose;
@@ -7,16 +7,16 @@ use hivtac_twin::film::reduced::Pose;
 use crate::Change;
 use crate::sweep::{Moved, Solved};
 
-/// Numbers of a disc and of a [`Moved`].
+/// Count of numbers of a disc and of a [`Moved`].
 const DISC: usize = 9;
 const MOVED: usize = 3 + 4 * DISC;
 
-/// Numbers of a record.
+/// Returns the count of numbers of a record.
 pub fn length() -> usize {
     5 + (1 + Change::of_sweep().count()) * MOVED
 }
 
-/// A solution as numbers.
+/// Returns a solution as numbers.
 pub fn numbers(solved: &Solved) -> Vec<f64> {
     let Pose {
         size,
@@ -33,7 +33,7 @@ pub fn numbers(solved: &Solved) -> Vec<f64> {
     numbers
 }
 
-/// The solution that numbers are; none of a record of another length.
+/// Returns the solution from its numbers; `None` if the record has another length.
 pub fn solved(numbers: &[f64]) -> Option<Solved> {
     if numbers.len() != length() {
         return None;

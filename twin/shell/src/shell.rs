@@ -15,7 +15,7 @@ use crate::spline::{Basis, SUPPORT};
 
 /// Functions that are not zero on a cell.
 pub const LOCAL: usize = SUPPORT * SUPPORT;
-/// At most so many Gauss points along one side of a cell.
+/// The largest number of Gauss points along one side of a cell.
 const GAUSS: usize = 3;
 /// Places in [−1, 1] and weights of two, 1/√3, and of three, √(3/5), 5/9 and 8/9.
 const TWO: [(f64, f64); 2] = [
@@ -27,19 +27,19 @@ const THREE: [(f64, f64); 3] = [
     (0.0, 8.0 / 9.0),
     (0.774_596_669_241_483_4, 5.0 / 9.0),
 ];
-/// How often each vector holds a derivative by x and by y.
+/// Order of each vector as a derivative by x and by y.
 const ORDERS: [[f64; 2]; VECTORS] = [[1.0, 0.0], [0.0, 1.0], [2.0, 0.0], [0.0, 2.0], [1.0, 1.0]];
-/// By what a stretch is changed to see what a point's forces answer.
+/// Step of the stretch in the finite difference of a point's forces.
 const STRETCH_STEP: f64 = 1e-4;
 
-/// A span's Gauss points: weight (mm before the film was stretched) and functions with their
-/// derivatives by the place before it was stretched.
+/// A span's Gauss points. Each has its weight (mm before the film was stretched), and the functions
+/// with their derivatives by the place before it was stretched.
 type Samples = Vec<(f64, Basis)>;
-/// A vector in space and a zero: as wide as what is added at once.
+/// A vector in space and a zero: the width that the processor adds at once.
 type Wide = [f64; 4];
-/// Sums along x at one of its Gauss points: for each line of functions and derivative by x.
+/// Sums along x at one of its Gauss points, for each line of functions and derivative by x.
 type Line = [[Wide; 3]; SUPPORT];
-/// At all of them.
+/// The sums at all Gauss points along x.
 type Lines = [Line; GAUSS];
 /// No stiffness.
 const NOTHING: Share = Share {
@@ -48,17 +48,16 @@ const NOTHING: Share = Share {
 };
 const NO_LINES: Lines = [[[[0.0; 4]; 3]; SUPPORT]; GAUSS];
 
-/// A film on springs: the sum of the points' energy over the cells and of what holds the film, less
-/// what its weight gives.
+/// A film on springs. Its energy is the sum of the points' energy over the cells and of the
+/// springs' energy, minus the work of its weight.
 ///
-/// Displacements are given by coefficients: unknown 3 · k + c is component c of coefficient k, in
-/// mm.
+/// Coefficients define the displacements: unknown 3 · k + c is component c of coefficient k, in mm.
 pub struct Shell {
     grid: Grid,
     sheet: Sheet,
     laws: Laws,
     samples: [Vec<Samples>; 2],
-    /// Of each cell's Gauss points.
+    /// The shares of each cell's Gauss points.
     shares: Vec<[[Share; GAUSS]; GAUSS]>,
     /// Points of the dots, by cells.
     spots: BTreeMap<[usize; 2], Vec<Spot>>,
@@ -73,11 +72,11 @@ pub struct Shell {
 struct Spot {
     slopes: [Row; VECTORS],
     at: [f64; 2],
-    /// What a stiffening of 1 adds there.
+    /// The share that a stiffening of 1 adds at this point.
     share: Share,
 }
 
-/// Springs that hold a film where it is flat, summed by cells.
+/// Springs that hold a film at its flat state, summed by cells.
 pub struct Hold {
     cells: BTreeMap<[usize; 2], Box<[Row; LOCAL]>>,
 }
@@ -91,7 +90,7 @@ pub struct Derivatives {
 }
 
 impl Hold {
-    /// Springs at points (mm, N/mm in every direction) of a film over `grid`.
+    /// Returns springs at points (mm, N/mm in every direction) of a film over `grid`.
     pub fn new(grid: &Grid, springs: impl IntoIterator<Item = ([f64; 2], f64)>) -> Hold {
         let mut cells = BTreeMap::new();
         for (point, stiffness) in springs {
@@ -108,8 +107,8 @@ impl Hold {
         Hold { cells }
     }
 
-    /// The gradient of the energy that displacements `u` give to the springs, N, added `factor`
-    /// times; that energy, N·mm.
+    /// Adds `factor` times the gradient, N, of the springs' energy under displacements `u`. Returns
+    /// that energy, N·mm.
     pub fn pull(&self, grid: &Grid, u: &[f64], factor: f64, sum: &mut [f64]) -> f64 {
         let mut energy = 0.0;
         for (&origin, matrix) in &self.cells {
@@ -129,14 +128,14 @@ impl Hold {
 }
 
 impl Shell {
-    /// A free film over `grid`.
+    /// Returns a free film over `grid`.
     pub fn new(grid: Grid, sheet: &Sheet) -> Shell {
         let [columns, rows] = grid.functions();
         let pattern = Arc::new(Pattern::new(columns, rows));
         Shell::of(grid, sheet, pattern)
     }
 
-    /// The same with the pattern that such grids have.
+    /// As [`Shell::new`], with the pattern of such grids.
     pub fn of(grid: Grid, sheet: &Sheet, pattern: Arc<Pattern>) -> Shell {
         let scales = sheet.scales();
         let samples = [0, 1].map(|way| samples(&grid, way, scales[way]));
@@ -158,7 +157,7 @@ impl Shell {
         shell
     }
 
-    /// Holds the film.
+    /// Sets the springs that hold the film.
     pub fn hold(&mut self, hold: Hold) {
         self.hold = hold;
     }
@@ -169,33 +168,33 @@ impl Shell {
         self.pins.push((unknown, stiffness));
     }
 
-    /// Where the coefficients are.
+    /// Returns the grid of the coefficients.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// The film as a sheet.
+    /// Returns the film as a sheet.
     pub fn sheet(&self) -> &Sheet {
         &self.sheet
     }
 
-    /// Which unknowns meet.
+    /// Returns the pattern: which pairs of unknowns have a stiffness.
     pub fn pattern(&self) -> &Arc<Pattern> {
         &self.pattern
     }
 
-    /// The energy of displacements `u`, N·mm.
+    /// Returns the energy of displacements `u`, N·mm.
     #[cfg(test)]
     pub fn energy(&self, u: &[f64]) -> f64 {
         self.first(u).0
     }
 
-    /// The energy of displacements `u`, N·mm, and its gradient, N.
+    /// Returns the energy of displacements `u`, N·mm, and its gradient, N.
     pub fn first(&self, u: &[f64]) -> (f64, Vec<f64>) {
         Arch::new().dispatch(First { shell: self, u })
     }
 
-    /// The second derivatives of the energy of displacements `u`, N/mm, in the order of
+    /// Returns the second derivatives of the energy of displacements `u`, N/mm, in the order of
     /// [`Shell::pattern`].
     pub fn stiffness(&self, u: &[f64]) -> Vec<f64> {
         Arch::new().dispatch(Assembly { shell: self, u })
@@ -211,14 +210,14 @@ impl Shell {
         }
     }
 
-    /// The gradient of the springs' energy, N.
+    /// Returns the gradient of the springs' energy, N.
     pub fn pull(&self, u: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; u.len()];
         self.hold.pull(&self.grid, u, 1.0, &mut sum);
         sum
     }
 
-    /// What the springs pull the film with, N: the sum of their forces.
+    /// Returns the total force of the springs on the film, N.
     pub fn reaction(&self, u: &[f64]) -> V3 {
         let mut sum = [0.0; 3];
         for force in self.pull(u).chunks(COMPONENTS) {
@@ -229,7 +228,7 @@ impl Shell {
         sum
     }
 
-    /// The energy of what holds the film and of its weight; their gradient is added.
+    /// Adds the gradient of the energy of springs, pins and weight. Returns that energy.
     fn held(&self, u: &[f64], gradient: &mut [f64]) -> f64 {
         let mut energy = self.hold.pull(&self.grid, u, 1.0, gradient);
         for &(unknown, stiffness) in &self.pins {
@@ -252,7 +251,7 @@ impl Shell {
         }
     }
 
-    /// The weight on each unknown, N.
+    /// Returns the weight on each unknown, N.
     fn weights(&self) -> Vec<f64> {
         let mut sum = vec![0.0; self.grid.unknowns()];
         if self.sheet.down == [0.0; 3] {
@@ -271,8 +270,8 @@ impl Shell {
         sum
     }
 
-    /// The gradient's derivatives by each of some changes of the sheet itself (of another change:
-    /// none), all in one pass.
+    /// Returns the gradient's derivatives by each of several changes of the sheet itself, in one
+    /// pass. They are zero for any other change.
     pub fn by_sheet(&self, u: &[f64], changes: &[Change]) -> Vec<Vec<f64>> {
         Arch::new().dispatch(BySheet {
             shell: self,
@@ -291,7 +290,7 @@ impl Shell {
         }
     }
 
-    /// The surface's vectors at a point: those of the flat film, plus the displacement's
+    /// Returns the surface's vectors at a point: those of the flat film, plus the displacement's
     /// derivatives.
     #[inline(always)]
     fn vectors(&self, line: &Line, y: &Basis) -> Point {
@@ -314,7 +313,7 @@ impl Shell {
         point
     }
 
-    /// The same at a point whose slopes are known.
+    /// As [`Self::vectors`], at a point with known slopes.
     #[inline(always)]
     fn surface(&self, slopes: &[Row; VECTORS], local: &[V3; LOCAL]) -> Point {
         let mut x = self.flat();
@@ -369,7 +368,7 @@ struct Cell<'a> {
 }
 
 impl Cell<'_> {
-    /// Where Gauss point (i, j) is, mm.
+    /// Returns the place of Gauss point (i, j), mm.
     fn at(&self, i: usize, j: usize) -> [f64; 2] {
         [
             place_of(self.grid, 0, self.origin[0], i),
@@ -458,7 +457,7 @@ impl WithSimd for Assembly<'_> {
     }
 }
 
-/// The pass for how the gradient answers to changes of the sheet.
+/// The pass for the gradient's derivatives by changes of the sheet.
 struct BySheet<'a> {
     shell: &'a Shell,
     u: &'a [f64],
@@ -504,7 +503,7 @@ impl WithSimd for BySheet<'_> {
     }
 }
 
-/// What is asked for that costs something.
+/// The costly derivatives that the caller asked for.
 #[derive(Clone, Copy)]
 struct Asked {
     law: bool,
@@ -512,7 +511,7 @@ struct Asked {
 }
 
 impl Shell {
-    /// The dots' part of how the gradient answers to changes.
+    /// Adds the dots' part of the gradient's derivatives by changes.
     fn add_dots(&self, u: &[f64], changes: &[Change], asked: Asked, sums: &mut [Vec<f64>]) {
         let stiffening = self.sheet.dot_stiffening;
         for (&origin, spots) in &self.spots {
@@ -535,11 +534,11 @@ impl Shell {
     }
 }
 
-/// How a point's gradient and weight answer to changes of the sheet.
+/// Derivatives of a point's gradient and weight by changes of the sheet.
 struct Rates<'a> {
     shell: &'a Shell,
     share: Share,
-    /// The thickness's terms, in parts of the thickness there.
+    /// The thickness's terms at the point, in parts of its thickness.
     terms: [f64; TERMS],
     parts: [Point; 2],
     by_law: [Point; 2],
@@ -577,7 +576,7 @@ impl<'a> Rates<'a> {
         }
     }
 
-    /// The gradient's answer.
+    /// Returns the gradient's derivative by a change.
     #[inline(always)]
     fn gradient(&self, change: Change) -> Point {
         let Share { membrane, bending } = self.share;
@@ -598,7 +597,7 @@ impl<'a> Rates<'a> {
         }
     }
 
-    /// Less the weight's answer, N.
+    /// Returns minus the weight's derivative by a change, N.
     #[inline(always)]
     fn weight(&self, change: Change) -> V3 {
         let sheet = &self.shell.sheet;
@@ -632,7 +631,8 @@ impl<'a> Rates<'a> {
     }
 }
 
-/// What the slopes' factors, the vectors and the area make of a stretch.
+/// Returns the gradient's derivative by a stretch, through the slopes' factors, the vectors and the
+/// area.
 #[inline(always)]
 fn by_stretch(shell: &Shell, x: &Point, share: Share, way: usize) -> Point {
     let scale = shell.sheet.scales()[way];
@@ -696,13 +696,13 @@ fn gauss(points: usize) -> &'static [(f64, f64)] {
     }
 }
 
-/// Where Gauss point `k` of a span along x or y is, mm.
+/// Returns the place of Gauss point `k` of a span along x or y, mm.
 fn place_of(grid: &Grid, way: usize, span: usize, k: usize) -> f64 {
     let [from, to] = grid.axes[way].ends(span);
     (from + to) / 2.0 + (to - from) / 2.0 * gauss(grid.points)[k].0
 }
 
-/// Derivatives by the place before the film was stretched.
+/// Converts to derivatives by the place before the film was stretched.
 fn stretched([values, first, second]: Basis, scale: f64) -> Basis {
     [
         values,
@@ -745,7 +745,7 @@ fn spots(grid: &Grid, sheet: &Sheet) -> BTreeMap<[usize; 2], Vec<Spot>> {
     spots
 }
 
-/// The derivatives of a cell's functions.
+/// Returns the derivatives of a cell's functions.
 #[inline(always)]
 fn slopes(x: &Basis, y: &Basis) -> [Row; VECTORS] {
     const ORDERS: [[usize; 2]; VECTORS] = [[1, 0], [0, 1], [2, 0], [0, 2], [1, 1]];
@@ -760,7 +760,7 @@ fn slopes(x: &Basis, y: &Basis) -> [Row; VECTORS] {
     slopes
 }
 
-/// Sums of a cell's coefficients along x.
+/// Sums a cell's coefficients along x.
 #[inline(always)]
 fn contracted(local: &[V3; LOCAL], x: &[(f64, Basis)]) -> Lines {
     let mut wide = [[0.0; 4]; LOCAL];
@@ -782,7 +782,7 @@ fn contracted(local: &[V3; LOCAL], x: &[(f64, Basis)]) -> Lines {
     lines
 }
 
-/// The other way round: the force on each coefficient.
+/// The inverse pass: returns the force on each coefficient.
 #[inline(always)]
 fn gathered(lines: &Lines, x: &[(f64, Basis)]) -> [V3; LOCAL] {
     let mut wide = [[0.0; 4]; LOCAL];
@@ -804,7 +804,7 @@ fn gathered(lines: &Lines, x: &[(f64, Basis)]) -> [V3; LOCAL] {
     local
 }
 
-/// A gradient's part of the sums along x.
+/// Adds a gradient's part to the sums along x.
 #[inline(always)]
 fn spread(line: &mut Line, y: &Basis, gradient: &Point) {
     let mut wide = [[0.0; 4]; VECTORS];
@@ -820,7 +820,7 @@ fn spread(line: &mut Line, y: &Basis, gradient: &Point) {
     }
 }
 
-/// A force's part of the sums along x.
+/// Adds a force's part to the sums along x.
 #[inline(always)]
 fn spread_value(line: &mut Line, y: &Basis, force: &V3) {
     for j in 0..SUPPORT {

@@ -17,18 +17,19 @@ use crate::cell::{CellStiffness, Row};
 use crate::shell::LOCAL;
 use crate::spline::SUPPORT;
 
-/// Components of a displacement, and so unknowns of a coefficient.
+/// Number of components of a displacement, and thus of unknowns per coefficient.
 pub const COMPONENTS: usize = 3;
 const REACH: usize = SUPPORT - 1;
-/// A rectangle of fewer coefficients a side, beside what separates it, is not halved.
+/// The side of a rectangle of coefficients, without the separator, below which it is not halved.
 const LEAF: usize = 4;
-/// Where a cell's stiffness has each pair of components.
+/// The index of each pair of components in a cell's stiffness.
 const PAIR: [[usize; 3]; 3] = [[0, 3, 4], [3, 1, 5], [4, 5, 2]];
 
-/// Which unknowns of a grid of coefficients meet in the energy: lower triangle, by columns.
+/// The pairs of unknowns of a grid of coefficients that share a term of the energy: lower triangle,
+/// by columns.
 ///
-/// Coefficient (i, j) has index j · columns + i, and its component c the unknown 3 · index + c. Two
-/// coefficients meet when neither i nor j differ by more than 3.
+/// Coefficient (i, j) has index j · columns + i, and its component c is unknown 3 · index + c. Two
+/// coefficients form a pair if neither i nor j differ by more than 3.
 pub struct Pattern {
     columns: usize,
     rows: usize,
@@ -37,7 +38,7 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The pattern of a grid of `columns` × `rows` coefficients.
+    /// Returns the pattern of a grid of `columns` × `rows` coefficients.
     pub fn new(columns: usize, rows: usize) -> Pattern {
         let mut pattern = Pattern {
             columns,
@@ -57,12 +58,12 @@ impl Pattern {
         pattern
     }
 
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.starts.len() - 1
     }
 
-    /// Number of entries of the lower triangle.
+    /// Returns the number of entries of the lower triangle.
     pub fn entries(&self) -> usize {
         self.entries.len()
     }
@@ -87,7 +88,7 @@ impl Pattern {
         });
     }
 
-    /// Adds springs that pull alike in all directions.
+    /// Adds springs of the same stiffness in all directions.
     pub fn add_springs(&self, values: &mut [f64], origin: [usize; 2], cell: &[Row; LOCAL]) {
         self.each_pair(origin, |column, row, starts, reach| {
             for d in 0..COMPONENTS {
@@ -96,8 +97,9 @@ impl Pattern {
         });
     }
 
-    /// Calls with each pair of a cell's coefficients (column, row ≥ column), the first entries of
-    /// the column's unknowns, and how far after the first of them the row's unknowns begin.
+    /// Calls `each` with every pair of a cell's coefficients: (column, row ≥ column), the first
+    /// entries of the column's unknowns, and the offset from the first of them to the row's
+    /// unknowns.
     #[inline(always)]
     fn each_pair(
         &self,
@@ -120,12 +122,12 @@ impl Pattern {
         }
     }
 
-    /// The entries on the diagonal, in order.
+    /// Returns the entries on the diagonal, in order.
     pub fn diagonal(&self) -> &[usize] {
         &self.starts[..self.unknowns()]
     }
 
-    /// (column, row, value) of each entry.
+    /// Iterates over (column, row, value) of each entry.
     #[cfg(test)]
     pub fn triplets<'a>(&'a self, values: &'a [f64]) -> impl Iterator<Item = (usize, usize, f64)> {
         (0..self.unknowns()).flat_map(move |column| {
@@ -138,7 +140,7 @@ impl Pattern {
         (i.saturating_sub(REACH), (i + REACH + 1).min(self.columns))
     }
 
-    /// The unknowns of the neighbours after coefficient `index`.
+    /// Returns the unknowns of the neighbours after coefficient `index`.
     fn later_neighbours(&self, index: usize) -> Vec<usize> {
         let (i, j) = (index % self.columns, index / self.columns);
         let (first, end) = self.neighbouring_columns(i);
@@ -151,8 +153,8 @@ impl Pattern {
             .collect()
     }
 
-    /// The unknowns of the coefficients in a rectangle (from, end along each side), so that two
-    /// that do not meet are kept apart by others that come after both.
+    /// Orders the unknowns of the coefficients in a rectangle (from, end along each side). Two that
+    /// are not a pair are separated by others that come after both.
     fn dissect(&self, [i, k]: [usize; 2], [j, l]: [usize; 2], order: &mut Vec<usize>) {
         let (wide, high) = (k - i, l - j);
         if wide.max(high) < 2 * REACH + LEAF {
@@ -187,11 +189,11 @@ pub struct Solver {
 }
 
 impl Solver {
-    /// Finds the elimination order: the grid is halved again and again, and what lies between the
-    /// halves comes last.
+    /// Finds the elimination order: the grid is halved again and again, and the separator between
+    /// the halves comes last.
     ///
     /// # Errors
-    /// When memory runs out.
+    /// If memory runs out.
     pub fn new(pattern: &Pattern) -> Result<Solver, ShellError> {
         let refused = |error: FaerError| ShellError::Solver(error.to_string());
         let mut order = Vec::with_capacity(pattern.unknowns());
@@ -215,8 +217,8 @@ impl Solver {
         })
     }
 
-    /// Cholesky's factors of the matrix with these entries; `None` when it is not positive
-    /// definite, or memory runs out.
+    /// Returns Cholesky's factors of the matrix with these entries. Returns `None` if it is not
+    /// positive definite, or memory runs out.
     pub fn factor(&self, pattern: &Pattern, values: &[f64]) -> Option<Factors> {
         let matrix = SparseColMatRef::new(pattern.symbolic(), values);
         let mut factors = vec![0.0; self.symbolic.len_val()];
@@ -267,7 +269,7 @@ impl Factors {
 mod tests {
     use super::*;
 
-    /// Every cell's numbers, with a diagonal that dominates; also in full.
+    /// Returns a matrix with entries in every cell and a dominant diagonal, also in full.
     fn filled(pattern: &Pattern) -> (Vec<f64>, Vec<Vec<f64>>) {
         let n = pattern.unknowns();
         let (mut values, mut full) = (vec![0.0; pattern.entries()], vec![vec![0.0; n]; n]);

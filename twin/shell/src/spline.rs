@@ -17,7 +17,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Splines over the spans between `breaks` (mm, increasing, at least two).
+    /// Returns splines over the spans between `breaks` (mm, increasing, at least two).
     pub fn new(breaks: &[f64]) -> Axis {
         let ends = |at: f64| std::iter::repeat_n(at, DEGREE);
         let (first, last) = (breaks[0], breaks[breaks.len() - 1]);
@@ -27,28 +27,28 @@ impl Axis {
         }
     }
 
-    /// Number of spans.
+    /// Returns the number of spans.
     pub fn spans(&self) -> usize {
         self.knots.len() - 2 * DEGREE - 1
     }
 
-    /// Number of functions, and so of coefficients.
+    /// Returns the number of functions, and thus of coefficients.
     pub fn functions(&self) -> usize {
         self.spans() + DEGREE
     }
 
-    /// Where span `span` begins and ends.
+    /// Returns the two ends of span `span`.
     pub fn ends(&self, span: usize) -> [f64; 2] {
         [self.knots[span + DEGREE], self.knots[span + DEGREE + 1]]
     }
 
-    /// The span that holds `x`; points beyond the ends belong to the outermost spans.
+    /// Returns the span that contains `x`. Points beyond the ends belong to the outermost spans.
     pub fn span_of(&self, x: f64) -> usize {
         let inner = &self.knots[DEGREE + 1..DEGREE + self.spans()];
         inner.partition_point(|&knot| knot <= x)
     }
 
-    /// The functions of span `span` at `x`, by de Boor's recurrence.
+    /// Returns the functions of span `span` at `x`, by de Boor's recurrence.
     pub fn basis(&self, span: usize, x: f64) -> Basis {
         let cubic = self.raise::<DEGREE>(span, x);
         let quadratic = self.raise::<2>(span, x);
@@ -59,14 +59,14 @@ impl Axis {
         [cubic, first, second]
     }
 
-    /// The coefficients of f(x) = x (Greville's abscissae).
+    /// Iterates over the coefficients of f(x) = x (Greville's abscissae).
     #[cfg(test)]
     pub fn greville(&self) -> impl Iterator<Item = f64> + '_ {
         (0..self.functions())
             .map(|i| self.knots[i + 1..=i + DEGREE].iter().sum::<f64>() / DEGREE as f64)
     }
 
-    /// The `N` + 1 functions of degree `N` on `span`, at the front.
+    /// Returns the `N` + 1 functions of degree `N` on `span`, at the front of the array.
     fn raise<const N: usize>(&self, span: usize, x: f64) -> [f64; SUPPORT] {
         let last = span + DEGREE;
         let mut values = [1.0, 0.0, 0.0, 0.0];
@@ -83,8 +83,8 @@ impl Axis {
         values
     }
 
-    /// From functions (or their derivatives) of one degree less to derivatives of those of
-    /// `degree`.
+    /// Returns derivatives of the functions of `degree` from functions (or their derivatives) of
+    /// one degree less.
     fn derivative(&self, span: usize, degree: usize, lower: &[f64; SUPPORT]) -> [f64; SUPPORT] {
         let first = span + DEGREE - degree;
         let mut values = [0.0; SUPPORT];
@@ -104,7 +104,7 @@ mod tests {
 
     const BREAKS: [f64; 6] = [-2.0, -1.5, 0.0, 0.25, 1.0, 3.0];
 
-    /// Coefficients that reproduce a cubic: its blossom at each function's three knots.
+    /// Returns coefficients that reproduce a cubic: its blossom at each function's three knots.
     fn cubic_coefficients(axis: &Axis) -> Vec<f64> {
         (0..axis.functions())
             .map(|i| {

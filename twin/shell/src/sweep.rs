@@ -1,5 +1,5 @@
-//! What the reduced film is made from: full solutions for loads of many sizes, tilts and places,
-//! with their derivatives.
+//! Full solutions for loads of many sizes, tilts and places, with their derivatives. The reduced
+//! film is made from them.
 
 use hivtac_twin::film::DiscMotion;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
@@ -9,38 +9,39 @@ use crate::path::Path;
 use crate::view::seen_motion;
 use crate::{Change, Contact, Equilibrium, Film, Response, ShellError};
 
-/// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, where
-/// nothing moves.
+/// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, at which the
+/// film does not move.
 const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
-/// Rings of tilts: radius in parts of the largest, and the turn of the first of their four, °.
+/// Rings of tilts: radius in parts of the largest, and the angle of the first of their four tilts,
+/// °.
 const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];
-/// Step by which motions are differentiated: the largest unknown changes by so many mm.
+/// Step of finite differences of motions: the change of the largest unknown, mm.
 const STEP_MM: f64 = 1e-4;
 
 /// Motions of tip and markers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moved {
-    /// The tip's way, mm.
+    /// The tip's displacement, mm.
     pub tip_mm: [f64; 3],
-    /// How the film moves around each marker.
+    /// The motion of the film around each marker.
     pub discs: [DiscMotion; 4],
 }
 
-/// A full solution as the reduced film needs it.
+/// A full solution in the form that the reduced film needs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solved {
     /// Its load.
     pub pose: Pose,
     /// Its motions.
     pub moved: Moved,
-    /// How the motions answer to each [`Change`].
+    /// The derivatives of the motions by each [`Change`].
     pub answers: Vec<Moved>,
 }
 
 /// Solves the film with the tip at one place, for all sizes and tilts.
 ///
 /// # Errors
-/// When no equilibrium is found.
+/// If no equilibrium is found.
 pub fn solve_place(
     film: &mut Film,
     camera: &Camera,
@@ -139,8 +140,8 @@ pub(crate) fn answered_by(
     }
 }
 
-/// Places of the tip that, mirrored, are everywhere on a grid: 0 ≤ y ≤ x of `knots_mm`, which begin
-/// at 0.
+/// Returns places of the tip, 0 ≤ y ≤ x of `knots_mm`, whose mirror images cover a whole grid.
+/// `knots_mm` begin at 0.
 pub fn octant(knots_mm: &[f64]) -> Vec<[f64; 2]> {
     let below = |(i, &x): (usize, &f64)| {
         let ys = knots_mm[..=i].iter();

@@ -1,4 +1,4 @@
-//! What the camera sees of the film.
+//! The camera's view of the film, for full solutions.
 
 use std::f64::consts::PI;
 
@@ -7,33 +7,33 @@ use hivtac_twin::{Camera, Disc, MARKERS, Preset};
 
 use crate::{Equilibrium, Film, ShellError};
 
-/// Rays of the points that a disc's motion is taken from.
+/// Number of rays of the points from which a disc's motion is computed.
 const RAYS: usize = 8;
-/// Their rings, in parts of the radius: Gauss's two points for sums over a disc, each half of its
-/// area.
+/// Radii of their rings in parts of the disc's: Gauss's two points for sums over a disc. Each ring
+/// stands for half of the area.
 const RINGS: [f64; 2] = [0.459_700_843_380_983_1, 0.888_073_833_977_115_3];
 
-/// What discs are moved by to find how much a pixel is, mm.
+/// Shift of discs in the finite difference that gives the size of a pixel, mm.
 const SHIFT_MM: f64 = 1e-3;
 
 /// A marker on a pressed film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Marker {
-    /// How it moved, mm, film frame: the mean over its disc.
+    /// Its displacement, mm, film frame: the mean over its disc.
     pub moved_mm: [f64; 3],
     /// The centroid of its image, px.
     pub seen_px: [f64; 2],
 }
 
-/// The camera in which the film's figures are stated: `paper` at 800×600.
+/// Returns the camera for which the film's figures are given: `paper` at 800×600.
 ///
 /// # Errors
-/// Never, while that preset exists.
+/// Never, as long as that preset exists.
 pub fn paper_camera() -> Result<Camera, ShellError> {
     Ok(Camera::new(Preset::Paper, 800, 600)?)
 }
 
-/// The four markers of a film in a state.
+/// Returns the four markers of a film in a state.
 pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4] {
     let moved = |rest| film.displacement(state, rest);
     MARKERS.map(|disc| Marker {
@@ -42,11 +42,11 @@ pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4]
     })
 }
 
-/// A film in a state as a scene shows it: how it moved at the first four of these discs, from where
-/// the mounted film is flat.
+/// Returns a film in a state in the form that a scene renders. It has the motion at the first four
+/// of these discs, relative to the flat mounted film.
 ///
 /// # Errors
-/// Never, while the camera's preset exists.
+/// Never, as long as the camera's preset exists.
 pub fn pressed(
     film: &Film,
     state: &Equilibrium,
@@ -63,8 +63,8 @@ pub fn pressed(
     Ok(pressed)
 }
 
-/// The affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² · mean(u ·
-/// (x, y)).
+/// Returns the affine map nearest to the displacement over a disc: the mean, and the slopes 4/R² ·
+/// mean(u · (x, y)).
 fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion {
     let mut motion = DiscMotion::default();
     let [cx, cy] = disc.centre_mm;
@@ -84,9 +84,9 @@ fn disc_motion(moved: impl Fn([f64; 2]) -> [f64; 3], disc: &Disc) -> DiscMotion 
     motion
 }
 
-/// The affine map nearest to the displacement over a disc, moved along the film so that the camera
-/// sees its disc's centroid where it sees that of the film's: where the film is curved within a
-/// disc, the centroid is some hundredths of a pixel off the nearest affine map's.
+/// Returns the affine map nearest to the displacement over a disc, shifted along the film to give
+/// the same centroid in the camera as the film. Without the shift, the centroid is some hundredths
+/// of a pixel off if the film is curved within the disc.
 pub(crate) fn seen_motion(
     film: impl Fn([f64; 2]) -> [f64; 3],
     disc: &Disc,
@@ -129,7 +129,7 @@ mod tests {
         Film::new(&design).unwrap()
     }
 
-    /// Mean distance from the optical axis, and mean shift, px.
+    /// Returns the mean distance from the optical axis, and the mean shift, px.
     fn radius_and_shift(markers: &[Marker; 4]) -> (f64, [f64; 2]) {
         let (mut radius, mut shift) = (0.0, [0.0; 2]);
         for marker in markers {
@@ -157,11 +157,11 @@ mod tests {
         );
         let [slight, full] =
             [(0.009, 0.011), (0.19, 0.21)].map(|(a, b)| (radius(b) - radius(a)) / (b - a));
-        // A membrane stiffens as it is pressed.
+        // A membrane gets stiffer as it is pressed.
         assert!(slight > 4.0 * full && full > 0.0, "{slight} {full}");
     }
 
-    /// Of a deep press in front of the post that the tip is pushed towards, where the film is most
+    /// A deep press in front of the post towards which the tip is pushed: there the film is most
     /// curved.
     #[test]
     fn affine_discs_are_seen_where_the_films_are() {

@@ -1,4 +1,4 @@
-//! What the film's own weight does to its markers, from full solutions with it and without.
+//! The effect of the film's own weight on its markers, from full solutions with and without it.
 
 use std::array::from_fn;
 
@@ -17,22 +17,23 @@ use crate::{Change, Contact, Design, Film, ShellError, paper_camera};
 const SIZES: [f64; 6] = [0.14, 0.25, 0.375, 0.5, 0.75, 1.0];
 /// Gravity towards the camera and away from it, in parts of g.
 const BOTH: [f64; 2] = [-1.0, 1.0];
-/// Gravity along z and x at which it is known how the film rests: along z, across it, and between.
+/// Number of directions of gravity in the plane of x and z for which the film's rest is solved:
+/// along z, across it, and between.
 const DIRECTIONS: usize = 24;
 
-/// A load, and what weight does to the markers' discs under it.
+/// A load, and the effect of weight on the markers' discs under it.
 struct Weighed {
     pose: Pose,
-    /// Of gravity of g along −z and z.
+    /// Effect of 1 g along −z and along z.
     along_z: [[DiscMotion; 4]; 2],
-    /// Per g along x and y.
+    /// Effect per g along x and y.
     sideways: [[DiscMotion; 4]; 2],
 }
 
-/// The table of what weight does on the nominal film.
+/// Returns the table of the effect of weight on the nominal film.
 ///
 /// # Errors
-/// When no equilibrium is found.
+/// If no equilibrium is found.
 pub fn weight(
     design: &Design,
     threads: usize,
@@ -70,7 +71,7 @@ pub fn weight(
     Ok(Weight::new(at_rest, &coefficients.collect::<Vec<_>>()))
 }
 
-/// What weight does with the tip at a place and all sizes of a tilt.
+/// Returns the effect of weight with the tip at a place, for all sizes of a tilt.
 fn solve(
     film: &mut Film,
     camera: &Camera,
@@ -115,7 +116,7 @@ fn solve(
     Ok(solved)
 }
 
-/// What each function of [`Pull::at_rest`] makes of marker 2's disc.
+/// Returns the part of marker 2's disc motion for each function of [`Pull::at_rest`].
 fn rest<const N: usize>(design: &Design, camera: &Camera) -> Result<[DiscMotion; N], ShellError> {
     let flat = Film::new(design)?;
     let without = discs(&flat, &flat.rest(), 0.0, camera);
@@ -147,7 +148,7 @@ fn rest<const N: usize>(design: &Design, camera: &Camera) -> Result<[DiscMotion;
     }))
 }
 
-/// Gravity all around, in the plane of x and z.
+/// Iterates over directions of gravity all around, in the plane of x and z.
 fn directions() -> impl Iterator<Item = [f64; 3]> {
     (0..DIRECTIONS).map(|k| {
         let angle = k as f64 * std::f64::consts::TAU / DIRECTIONS as f64;
@@ -155,8 +156,8 @@ fn directions() -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// What a load adds to marker 2's motion along x and z by each function of [`Pull::under_load`],
-/// with the tip at a place.
+/// Returns what a load adds to marker 2's motion along x and z per function of
+/// [`Pull::under_load`], with the tip at a place.
 fn known<const N: usize>(
     solved: &[Weighed],
     at_rest: &[DiscMotion; N],
@@ -194,7 +195,8 @@ fn added<const N: usize>(
         [0, 2].map(|c| mirror.disc(disc).moved_mm[c] - own.moved_mm[c])
     };
     let [toward, away] = [0, 1].map(|i| more(&weighed.along_z[i][k], [0.0, 0.0, BOTH[i]]));
-    // Two directions tell what goes with the load's growth, and with its square.
+    // Two directions of gravity separate the part in proportion to the load's growth from the part
+    // with its square.
     let [d, e] = BOTH.map(|z| Pull::new(size, [0.0, 0.0, z], &Unit::default()).under_load()[0]);
     let square: [f64; 2] = from_fn(|c| (toward[c] / d - away[c] / e) / (d - e));
     let first: [f64; 2] = from_fn(|c| toward[c] / d - square[c] * d);

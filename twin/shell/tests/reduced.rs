@@ -1,4 +1,4 @@
-//! The committed tables against the full solution, and what they say of the film.
+//! Tests of the committed tables against the full solution.
 
 use std::sync::LazyLock;
 
@@ -7,14 +7,14 @@ use hivtac_twin::film::Film as ReducedFilm;
 use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_twin::{Camera, Contact, Disc, Load, Preset};
 
-/// How far the reduced film's markers may be off, px at 320×240 `ov7725`.
+/// Largest error of the reduced film's markers, px at 320×240 `ov7725`.
 const MOST_PX: f64 = 0.1;
-/// And on a unit that differs from the nominal film as much as one that is built by hand.
+/// The same for a unit that differs from the nominal film as much as one built by hand.
 const MOST_PX_OF_A_UNIT: f64 = 0.3;
 
 static CAMERA: LazyLock<Camera> = LazyLock::new(|| Camera::new(Preset::Ov7725, 320, 240).unwrap());
 
-/// A force, N, where it presses, mm, and the tip's radius, mm.
+/// A force, N, its place, mm, and the tip's radius, mm.
 type Case = ([f64; 3], [f64; 2], f64);
 
 fn load((force_n, place_mm, radius_mm): Case) -> Load {
@@ -23,7 +23,7 @@ fn load((force_n, place_mm, radius_mm): Case) -> Load {
     load.with_tip_radius_mm(radius_mm).unwrap()
 }
 
-/// Holds the reduced film of a unit and its elements against each other.
+/// Compares the reduced film of a unit with its elements.
 fn agree(unit: &Unit, loads: &[Load], most_px: f64) {
     let reduced = ReducedFilm::of(*unit).unwrap();
     let mut film = Film::new(&Design::of(unit)).unwrap();
@@ -75,7 +75,7 @@ fn a_film_built_by_hand_is_its_full_solution() {
         ([0.01, -0.02, -0.1], [0.5, -0.3], 0.5),
         ([-0.03, 0.01, -0.15], [-2.5, 1.0], 0.5),
         ([0.0, 0.01, -0.03], [2.0, 3.0], 0.8),
-        // Beside glued markers.
+        // Next to markers that are glued off their places.
         ([0.01, 0.01, -0.1], [3.2, 3.0], 0.5),
         ([0.0, -0.02, -0.1], [-2.9, -2.6], 0.5),
         ([0.0, 0.0, -0.05], [-3.5, 2.9], 0.5),
@@ -83,7 +83,8 @@ fn a_film_built_by_hand_is_its_full_solution() {
     agree(&unit, &cases.map(load), MOST_PX_OF_A_UNIT);
 }
 
-/// How far the images of the reduced film with its weight are off, px, at rest and under loads.
+/// Returns the largest error, px, of the images of the reduced film with its weight, at rest and
+/// under loads.
 fn weight_off_px(down: [f64; 3], loads: &[Load]) -> f64 {
     let reduced = ReducedFilm::default().with_down(Some(down)).unwrap();
     let heavy = Design {
@@ -109,7 +110,7 @@ fn weight_off_px(down: [f64; 3], loads: &[Load]) -> f64 {
     worst
 }
 
-/// What weight adds, apart from what tables are off without it.
+/// The effect of weight, without the errors of the tables for a weightless film.
 #[test]
 fn weight_does_what_the_full_solution_says() {
     let cases = [
@@ -146,7 +147,8 @@ fn labels_of_a_stage_are_the_full_solution() {
     agree(&Unit::default(), &loads, MOST_PX);
 }
 
-/// Independent loads of the whole domain: the first of those of `reduce -- film/data --check`.
+/// Independent loads of the whole domain: the first of those that `reduce -- film/data --check`
+/// uses.
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn tables_are_the_full_solution_everywhere() {
@@ -182,7 +184,7 @@ fn a_sliding_tip_keeps_its_friction_ratio_and_direction() {
     assert!((tx + sx - tz * lx / lz).abs() < 1e-6);
 }
 
-/// Where a distracting thing may be: the film away from its markers is interpolated.
+/// The places where a distracting thing may be: the film away from its markers is interpolated.
 #[test]
 fn the_film_between_markers_is_roughly_the_full_solution() {
     let mut film = Film::new(&Design::default()).unwrap();

@@ -1,18 +1,18 @@
-//! Terms through samples, and splines through nodes.
+//! Fits terms to samples, and splines to nodes.
 
 use faer::prelude::*;
 use hivtac_twin::film::reduced::{Axis, Pose, Terms};
 
 use crate::ShellError;
 
-/// What differences of a value by size and by tilt count for beside the value itself.
+/// Weight of the derivatives by size and by tilt in the fit; the value itself has weight 1.
 const SLOPES_COUNT: f64 = 0.05;
 
-/// What is told least of the terms is at least this part of what is told most.
+/// Smallest ratio of the least determined term to the best determined one.
 const LEAST_TOLD: f64 = 1e-7;
 
-/// What is known of outputs at a load: their values and their derivatives by size and tilt, if they
-/// are known.
+/// The known outputs at a load: their values, and their derivatives by size and tilt if they are
+/// known.
 pub struct Known {
     /// The load.
     pub pose: Pose,
@@ -22,10 +22,11 @@ pub struct Known {
     pub slopes: Option<[Vec<f64>; 3]>,
 }
 
-/// The coefficients of terms for each output: those nearest to what is known, by output and term.
+/// Returns the coefficients of terms for each output that fit the known values best, by output and
+/// term.
 ///
 /// # Errors
-/// When too little is known.
+/// If too little is known.
 pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, ShellError> {
     let outputs = known.first().map_or(0, |one| one.values.len());
     let (mut rows, mut sides): (Vec<Vec<f64>>, Vec<Vec<f64>>) = Default::default();
@@ -65,8 +66,8 @@ pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, ShellError> {
 /// Rows of numbers at nodes along two axes.
 type Nodes = Vec<Vec<Vec<f64>>>;
 
-/// The coefficients of splines through rows of numbers at an axis' nodes along y and, within, along
-/// x.
+/// Returns the coefficients of splines through rows of numbers at an axis' nodes, along y and,
+/// within, along x.
 pub fn splines(axis: &Axis, rows: Nodes) -> Nodes {
     let count = axis.nodes().len();
     let mut matrix = Mat::<f64>::zeros(count, count);
@@ -82,7 +83,7 @@ pub fn splines(axis: &Axis, rows: Nodes) -> Nodes {
     turned(&inverse, &turned(&inverse, &rows))
 }
 
-/// Solves along the inner axis, and makes the outer one of it.
+/// Solves along the inner axis, and exchanges the axes.
 fn turned(inverse: &Mat<f64>, rows: &Nodes) -> Nodes {
     let mixed = |own: usize, line: &Vec<Vec<f64>>| {
         let mut sum = vec![0.0; line[0].len()];

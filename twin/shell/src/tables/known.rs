@@ -1,4 +1,4 @@
-//! What full solutions tell of each table's outputs, seen so that a marker is in the corner (+, +).
+//! Each table's outputs in full solutions, mirrored so that a marker is in the corner (+, +).
 
 use hivtac_twin::film::reduced::{
     Kind, LARGEST_RADIUS_MM, LARGEST_TILT, LINEAR_N, NOMINAL_RADIUS_MM, Pose, rho,
@@ -12,18 +12,18 @@ use crate::{Change, ShellError};
 
 /// Full solutions with tips of two radii.
 pub struct Sweeps<'a> {
-    /// The nominal one.
+    /// Solutions with the nominal radius.
     pub nominal: &'a [Solved],
-    /// The largest, at some of the places.
+    /// Solutions with the largest radius, at some of the places.
     pub largest: &'a [Solved],
 }
 
-/// Rows of one number for each of some outputs.
+/// A row with one number for each output.
 type Row = Vec<f64>;
 
 impl<'a> Sweeps<'a> {
-    /// What is known of a table's outputs with the tip at a place: by every mirror in which a place
-    /// that was solved lies there.
+    /// Returns the known outputs of a table with the tip at a place. It uses every mirror that puts
+    /// a solved place there.
     pub fn known(&self, kind: Kind, place_mm: [f64; 2]) -> Result<Vec<Known>, ShellError> {
         let mut all = Vec::new();
         for mirror in Mirror::all() {
@@ -70,8 +70,9 @@ impl<'a> Sweeps<'a> {
         Ok(())
     }
 
-    /// The coefficients of ρ, ρ² and ρ³ in what a larger tip adds: by the difference at ρ = 1 and
-    /// the slopes at both ends. Nothing at places that are not solved with the largest.
+    /// Returns the coefficients of ρ, ρ² and ρ³ in the effect of a larger tip, from the difference
+    /// at ρ = 1 and the slopes at both ends. Returns `None` at places that are not solved with the
+    /// largest radius.
     fn by_radius(&self, kind: Kind, mirror: &Mirror, index: usize) -> Option<Known> {
         let nominal = &self.nominal[index];
         let same_load = |solved: &&Solved| solved.pose == nominal.pose;
@@ -99,7 +100,7 @@ impl<'a> Sweeps<'a> {
     }
 }
 
-/// Whether two places are one.
+/// Returns whether two places are the same.
 pub fn same(a: [f64; 2], b: [f64; 2]) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() < SAME_PLACE_MM)
 }
@@ -112,7 +113,7 @@ fn value(pose: Pose, values: Row) -> Known {
     }
 }
 
-/// A film at rest begins to answer to a load of any tilt.
+/// A film at rest has derivatives for a load of any tilt.
 fn poses(pose: Pose) -> Vec<Pose> {
     if pose.size > 0.0 {
         return vec![pose];
@@ -130,7 +131,7 @@ fn answer(solved: &Solved, change: Change) -> Moved {
     place.map_or_else(Moved::default, |k| solved.answers[k])
 }
 
-/// The outputs of a table of motions.
+/// Returns the outputs of a table of motions.
 fn outputs(kind: Kind, mirror: &Mirror, moved: &Moved) -> Row {
     let disc = mirror.disc(&moved.discs[mirror.corner()]);
     match kind {
@@ -144,14 +145,14 @@ fn pick([x, _, z]: [f64; 3]) -> Row {
     vec![x, z]
 }
 
-/// How outputs answer to the force along x, y and z as they are seen.
+/// Returns the derivatives of mirrored outputs by the force along x, y and z.
 fn by_force(mirror: &Mirror, solved: &Solved, of: impl Fn(&Moved) -> Row) -> [Row; 3] {
     let by = |axis: usize| of(&answer(solved, Change::Force(axis)));
     let [x, y] = mirror.components([by(0), by(1)]);
     [x, y, by(2)]
 }
 
-/// Slopes by size and tilt from those by force.
+/// Returns slopes by size and tilt from slopes by force.
 fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
     let moved = |axis: usize, step: f64| {
         let mut there = *pose;
@@ -175,11 +176,12 @@ fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
     })
 }
 
-/// What a film's own differences add at a load that the nominal film would be pressed as far by.
+/// Returns the effects of a film's own differences at a load under which the nominal film has the
+/// same depth.
 fn by_unit(mirror: &Mirror, solved: &Solved, pose: &Pose) -> Row {
     let of = |moved: &Moved| outputs(Kind::Moved, mirror, moved);
     let [per_size, ..] = slopes(pose, &by_force(mirror, solved, of));
-    // At the force's own ln t the size falls by so much.
+    // The decrease of the size per ln of the thickness t at constant force.
     let s = pose.size;
     let size_per_thickness = match s {
         0.0 => 0.0,

@@ -13,14 +13,14 @@ use known::Sweeps;
 pub(crate) use known::same;
 pub(crate) use symmetry::Mirror;
 
-/// Two places are the same that are so near, mm.
+/// Places nearer to each other than this are the same, mm.
 const SAME_PLACE_MM: f64 = 1e-9;
 
-/// The tables of a film that is known at the places of two sweeps: with a tip of the nominal radius
-/// and the largest.
+/// Returns the tables of a film from two sweeps: with a tip of the nominal radius and of the
+/// largest.
 ///
 /// # Errors
-/// When a place is missing in a sweep, or too few loads were solved there.
+/// If a place is missing in a sweep, or too few loads were solved there.
 pub fn tables(nominal: &[Solved], largest: &[Solved]) -> Result<Tables, ShellError> {
     let sweeps = Sweeps { nominal, largest };
     let mut coefficients = Vec::new();
@@ -30,7 +30,7 @@ pub fn tables(nominal: &[Solved], largest: &[Solved]) -> Result<Tables, ShellErr
     Ok(Tables::new(|kind| coefficients[kind as usize].clone()))
 }
 
-/// A table's coefficients by node along y, node along x, output and term.
+/// Returns a table's coefficients by node along y, node along x, output and term.
 fn of_kind(sweeps: &Sweeps, kind: Kind) -> Result<Vec<f64>, ShellError> {
     let (axis, terms) = (kind.axis(), kind.terms());
     let mut rows = Vec::new();

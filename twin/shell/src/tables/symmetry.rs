@@ -1,4 +1,4 @@
-//! The eight ways in which a square film looks like itself.
+//! The eight mirrors and turns under which a square film looks the same.
 
 use hivtac_twin::MARKERS;
 use hivtac_twin::film::DiscMotion;
@@ -9,7 +9,7 @@ use hivtac_twin::film::reduced::Pose;
 pub struct Mirror([[f64; 2]; 2]);
 
 impl Mirror {
-    /// All eight.
+    /// Iterates over all eight.
     pub fn all() -> impl Iterator<Item = Mirror> {
         let signs = [[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]];
         signs
@@ -17,18 +17,18 @@ impl Mirror {
             .flat_map(|[x, y]| [Mirror([[x, 0.0], [0.0, y]]), Mirror([[0.0, x], [y, 0.0]])])
     }
 
-    /// A place, tilt or shift along the film as it is seen.
+    /// Returns a place, tilt or shift along the film, mirrored.
     pub fn along(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         self.0.map(|[a, b]| a * x + b * y)
     }
 
-    /// A vector.
+    /// Returns a vector mirrored.
     pub fn vector(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let [x, y] = self.along([x, y]);
         [x, y, z]
     }
 
-    /// A load.
+    /// Returns a load mirrored.
     pub fn pose(&self, pose: &Pose) -> Pose {
         Pose {
             size: pose.size,
@@ -37,12 +37,12 @@ impl Mirror {
         }
     }
 
-    /// The marker that is seen in the corner of marker 2.
+    /// Returns the marker that is mirrored to the corner of marker 2.
     pub fn corner(&self) -> usize {
         self.seen_as(MARKERS[2].centre_mm)
     }
 
-    /// The post or marker that is seen at a corner.
+    /// Returns the post or marker that is mirrored to a corner.
     pub fn seen_as(&self, [x, y]: [f64; 2]) -> usize {
         let is_it = |k: &usize| {
             let [sx, sy] = self.along(MARKERS[*k].centre_mm);
@@ -51,7 +51,7 @@ impl Mirror {
         (0..4).find(is_it).unwrap_or_default()
     }
 
-    /// A disc's motion.
+    /// Returns a disc's motion mirrored.
     pub fn disc(&self, disc: &DiscMotion) -> DiscMotion {
         let [[a, b], [c, d]] = self.0;
         let mix = |x: f64, y: f64| -> [f64; 3] {
@@ -65,7 +65,7 @@ impl Mirror {
         }
     }
 
-    /// Rows that were differentiated by the components of a vector along the film.
+    /// Mirrors rows that were differentiated by the components of a vector along the film.
     pub fn components(&self, [by_x, by_y]: [Vec<f64>; 2]) -> [Vec<f64>; 2] {
         self.0.map(|[a, b]| {
             let pairs = by_x.iter().zip(&by_y);

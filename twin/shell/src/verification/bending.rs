@@ -1,11 +1,11 @@
-//! Large rotations: the elastica.
+//! Verifies large rotations: the elastica.
 
 use super::*;
 
 /// A cantilever strip under a force at its end that keeps its direction.
 ///
-/// K. Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145, from elliptic integrals: for P L²/(E
-/// I) = 1, 5 and 10 the end goes down 0.30172, 0.71379, 0.81061 L and back 0.05643, 0.38763,
+/// K. Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145, from elliptic integrals: for P L²/(E I)
+/// = 1, 5 and 10 the end goes down by 0.30172, 0.71379, 0.81061 L and back by 0.05643, 0.38763,
 /// 0.55500 L.
 #[test]
 fn a_cantilever_bends_as_eulers_elastica() {
@@ -20,7 +20,7 @@ fn a_cantilever_bends_as_eulers_elastica() {
     for k in 0..shell.grid().unknowns() / 3 {
         let held: &[usize] = match k % columns {
             0 => &[0, 1, 2],
-            // No slope: the second column stays level with the first.
+            // No slope: the second column stays at the height of the first.
             1 => &[2],
             _ => &[],
         };

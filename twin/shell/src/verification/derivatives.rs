@@ -1,5 +1,5 @@
-//! Gradient against energy and stiffness against gradient, by differences, on a bent, stretched and
-//! held film.
+//! Verifies the derivatives by differences on a bent, stretched and held film: the gradient against
+//! the energy, and the stiffness against the gradient.
 
 use super::*;
 use crate::newton::inner;
@@ -24,7 +24,7 @@ fn moved(u: &[f64], way: &[f64], step: f64) -> Vec<f64> {
     u.iter().zip(way).map(|(u, d)| u + step * d).collect()
 }
 
-/// The lower triangle's product with a vector.
+/// Returns the product of a matrix, given by its lower triangle, with a vector.
 fn product(shell: &Shell, stiffness: &[f64], v: &[f64]) -> Vec<f64> {
     let mut sum = vec![0.0; v.len()];
     for (column, row, value) in shell.pattern().triplets(stiffness) {

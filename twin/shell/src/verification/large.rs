@@ -1,14 +1,16 @@
-//! The limit of large deflection: a membrane.
+//! Verifies the limit of large deflections: a membrane.
 
 use super::*;
 
 const HALF_MM: f64 = 5.0;
 const LOAD_N_PER_MM2: f64 = 0.02;
 
-/// A long strip between two held edges under a dead load is a string of St Venant–Kirchhoff's law:
-/// with H the constant horizontal force and q X the vertical one, A λ(λ²−1)/2 = √(H² + q² X²) gives
-/// the stretch λ at each X, and the strip must still span the gap: ∫ λ H/T dX = half of it. Returns
-/// the depth in the middle, ∫ λ q X/T dX.
+/// Returns the depth in the middle of a long strip between two held edges under a dead load, ∫ λ q
+/// X/T dX.
+///
+/// The strip is a string of St Venant–Kirchhoff's law with H the constant horizontal force and q X
+/// the vertical one. A λ(λ²−1)/2 = √(H² + q² X²) gives the stretch λ at each X. The strip must
+/// still span the gap: ∫ λ H/T dX = half of it.
 fn string_depth(stiffness: f64) -> f64 {
     let integrals = |h: f64| {
         let (mut across, mut down) = (0.0, 0.0);
@@ -34,7 +36,7 @@ fn string_depth(stiffness: f64) -> f64 {
     integrals(low).1
 }
 
-/// λ ≥ 1 with λ³ − λ = c.
+/// Returns λ ≥ 1 with λ³ − λ = c.
 fn stretch(c: f64) -> f64 {
     let mut x = 1.0 + c.cbrt();
     for _ in 0..60 {
@@ -45,7 +47,7 @@ fn stretch(c: f64) -> f64 {
 
 #[test]
 fn a_strip_under_load_is_a_string() {
-    // Thin, so that bending is 10⁻⁶ of it, and soft, so that it stretches by half.
+    // Thin, with bending at 10⁻⁶ of the energy, and soft, with a stretch by half.
     let strip = Material {
         youngs_mpa: 10.0,
         poisson: 0.49,
@@ -55,7 +57,7 @@ fn a_strip_under_load_is_a_string() {
     let columns = shell.grid().functions()[0];
     for k in 0..shell.grid().unknowns() / 3 {
         let edge = depth(&shell, k)[0] == 0;
-        // Plane strain: nothing moves along y, and nothing varies along it.
+        // Plane strain: no motion along y, and no variation along it.
         shell.pin(3 * k + 1, PIN_N_PER_MM);
         if edge {
             shell.pin(3 * k, PIN_N_PER_MM);

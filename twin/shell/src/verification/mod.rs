@@ -1,4 +1,4 @@
-//! The shell against what is known without it.
+//! Verification of the shell against results from elsewhere.
 
 mod bending;
 mod derivatives;
@@ -15,15 +15,15 @@ use crate::shell::Shell;
 use crate::sparse::Solver;
 use crate::spline::Axis;
 
-/// As stiff as pins need to be, and no stiffer than rounding allows, N/mm.
+/// Stiffness of pins: high enough to hold, low enough for rounding, N/mm.
 const PIN_N_PER_MM: f64 = 1e7;
 
-/// A rectangle [0, a] × [0, b] in equal cells.
+/// Returns a rectangle [0, a] × [0, b] of equal cells.
 fn rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], material: &Material) -> Shell {
     sheet_rectangle([a, b], [columns, rows], &Sheet::of(material))
 }
 
-/// The same of any sheet.
+/// As [`rectangle`], for any sheet.
 fn sheet_rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], sheet: &Sheet) -> Shell {
     let axis = |length: f64, cells: usize| {
         let breaks: Vec<f64> = (0..=cells)
@@ -36,14 +36,15 @@ fn sheet_rectangle([a, b]: [f64; 2], [columns, rows]: [usize; 2], sheet: &Sheet)
     Shell::new(Grid { axes, points }, sheet)
 }
 
-/// How far coefficient `k` is from the film's edges, in coefficients: along x and along y.
+/// Returns the distance of coefficient `k` from the film's edges, in coefficients: along x and
+/// along y.
 fn depth(shell: &Shell, k: usize) -> [usize; 2] {
     let [columns, rows] = shell.grid().functions();
     let (i, j) = (k % columns, k / columns);
     [i.min(columns - 1 - i), j.min(rows - 1 - j)]
 }
 
-/// Coefficients that move each point (x, y) by an affine function.
+/// Returns coefficients that move each point (x, y) by an affine function.
 fn coefficients(shell: &Shell, u: impl Fn(f64, f64) -> [f64; 3]) -> Vec<f64> {
     let [x, y] = &shell.grid().axes;
     let xs: Vec<f64> = x.greville().collect();
@@ -52,7 +53,7 @@ fn coefficients(shell: &Shell, u: impl Fn(f64, f64) -> [f64; 3]) -> Vec<f64> {
         .collect()
 }
 
-/// A force spread evenly over the film, N per mm² of it at rest, along component `c`.
+/// Returns a force spread evenly over the film, N per mm² of it at rest, along component `c`.
 fn pressure(shell: &Shell, size: f64, c: usize) -> Vec<f64> {
     let integrals = |axis: &Axis| -> Vec<f64> {
         let mut sums = vec![0.0; axis.functions()];
@@ -81,7 +82,7 @@ fn pressure(shell: &Shell, size: f64, c: usize) -> Vec<f64> {
     load
 }
 
-/// A force at a point, along component `c`.
+/// Returns a force at a point, along component `c`.
 fn point_force(shell: &Shell, at: [f64; 2], size: f64, c: usize) -> Vec<f64> {
     let mut load = vec![0.0; shell.grid().unknowns()];
     let place = shell.grid().place(at);
@@ -91,7 +92,7 @@ fn point_force(shell: &Shell, at: [f64; 2], size: f64, c: usize) -> Vec<f64> {
     load
 }
 
-/// The linear answer of the film at rest to a load.
+/// Returns the linear answer of the film at rest to a load.
 fn linear(shell: &Shell, mut load: Vec<f64>) -> Vec<f64> {
     let at_rest = shell.derivatives(&vec![0.0; load.len()]);
     let solver = Solver::new(shell.pattern()).unwrap();
@@ -100,7 +101,7 @@ fn linear(shell: &Shell, mut load: Vec<f64>) -> Vec<f64> {
     load
 }
 
-/// The nonlinear answer, with the load in `stages` equal steps.
+/// Returns the nonlinear answer, with the load in `stages` equal steps.
 fn ramped(shell: &Shell, load: &[f64], stages: usize) -> Vec<f64> {
     let solver = Solver::new(shell.pattern()).unwrap();
     let mut u = vec![0.0; load.len()];
@@ -120,7 +121,7 @@ fn displacement(shell: &Shell, u: &[f64], at: [f64; 2]) -> [f64; 3] {
     shell.grid().interpolate(u, &shell.grid().place(at))
 }
 
-/// Prints what a film's parts take, ms: the least of several tries.
+/// Prints the time of a film's steps, ms: the smallest of several tries.
 #[test]
 #[ignore = "a measurement"]
 fn speed() {

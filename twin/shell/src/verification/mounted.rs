@@ -1,4 +1,4 @@
-//! Mounted films: stretched, rubber, heavy, uneven.
+//! Verifies mounted films: stretched, of rubber, heavy, uneven.
 
 use super::*;
 use crate::point::{Law, WEIGHT_N_PER_MM3};
@@ -14,7 +14,7 @@ const SHEET: Material = Material {
     thickness_mm: 0.01,
 };
 
-/// A strip [0, a] × [0, 1] whose ends are held, and nothing of which moves along y.
+/// Returns a strip [0, a] × [0, 1] with held ends and no motion along y.
 fn strip(sheet: &Sheet, length: f64, cells: usize) -> Shell {
     let mut shell = sheet_rectangle([length, 1.0], [cells, 1], sheet);
     for k in 0..shell.grid().unknowns() / 3 {
@@ -27,7 +27,7 @@ fn strip(sheet: &Sheet, length: f64, cells: usize) -> Shell {
     shell
 }
 
-/// The tension N/mm of lines of rubber stretched by (λ, μ), across a line of the unstretched film.
+/// Returns the tension, N/mm, of rubber stretched by (λ, μ), across a line of the unstretched film.
 fn rubber_n_per_mm(law: Law, x: f64, y: f64) -> f64 {
     let i = x * x + y * y + (x * y).powi(-2) - 3.0;
     let c1 = SHEET.youngs_mpa / 6.0;
@@ -35,8 +35,8 @@ fn rubber_n_per_mm(law: Law, x: f64, y: f64) -> f64 {
     2.0 * SHEET.thickness_mm * slope * (x - x.powi(-3) * y.powi(-2))
 }
 
-/// Stretched by so much, a string swings back with T/L: pushed aside in the middle by a small line
-/// force F it gives by F L / (4 T).
+/// A stretched strip acts as a string with the stiffness T/L. Pushed aside in the middle by a small
+/// line force F, it yields by F L / (4 T).
 #[test]
 fn a_stretched_strip_is_a_string() {
     let length = 10.0;
@@ -49,7 +49,7 @@ fn a_stretched_strip_is_a_string() {
         };
         let shell = strip(&sheet, length, 40);
         let [x, y] = sheet.scales();
-        // Across a line of the mounted film, which was shorter.
+        // Across a line of the mounted film, which was shorter before.
         let tension = match law.neo_hooke {
             0.0 => {
                 let [e1, e2] = [x, y].map(|part| (part * part - 1.0) / 2.0);
@@ -63,14 +63,14 @@ fn a_stretched_strip_is_a_string() {
             load[k] = force * part / length;
         }
         let w = displacement(&shell, &linear(&shell, load), [length / 2.0, 0.5])[2];
-        // Spread evenly: w = F L / (8 T).
+        // The force is spread evenly: w = F L / (8 T).
         let exact = force * length / (8.0 * tension);
         println!("stretched strip: {w:.6e} mm, string {exact:.6e} mm");
         assert!((w / exact - 1.0).abs() < 2e-3, "{w} {exact}");
     }
 }
 
-/// Rubber's tension from the energy's slope: what holds the ends of a mounted strip.
+/// Rubber's tension from the energy's slope: the force that holds the ends of a mounted strip.
 #[test]
 fn a_mounted_strip_pulls_with_rubbers_tension() {
     let sheet = Sheet {
@@ -92,12 +92,12 @@ fn a_mounted_strip_pulls_with_rubbers_tension() {
     assert!((pull / exact - 1.0).abs() < 1e-12, "{pull} {exact}");
 }
 
-/// A strip of rubber under its own weight (much of it) between two held ends: a string that
-/// stretches, with the vertical force q X of the weight that it had when it was cut.
+/// A strip of rubber between two held ends under its own large weight. It is a string that
+/// stretches, with the vertical force q X of its weight before it was stretched.
 #[test]
 fn a_heavy_strip_is_a_catenary_that_stretches() {
     let (length, stretch) = (10.0, 1.01);
-    // Soft: as heavy as a hundred times rubber of that stiffness.
+    // Soft: its weight is that of rubber a hundred times as stiff.
     let soft = Material {
         youngs_mpa: 1e-3,
         ..SHEET
@@ -164,7 +164,7 @@ fn film(design: Design) -> (Film, Equilibrium) {
     (film, rest)
 }
 
-/// Everything at once, as coarse as it gets.
+/// All properties at once, on the coarsest mesh.
 fn mounted() -> Design {
     Design {
         fineness: 0.25,
@@ -192,7 +192,7 @@ fn posts_carry_the_weight() {
     };
     let (film, rest) = film(design.clone());
     let area = 32.0f64.powi(2) / (1.012 * 0.998);
-    // Slopes are odd and weigh nothing.
+    // Slopes are odd functions and add no weight.
     let weight = WEIGHT_N_PER_MM3 * 0.5 * area;
     for c in 0..3 {
         let lifted = rest.reaction_n[c] + weight * design.down[c];
@@ -225,7 +225,8 @@ fn everything_at_once_rests_at_every_fineness() {
     }
 }
 
-/// The edges of a stretched film go in, as on the paper's photographs; held at its posts.
+/// The edges of a stretched film that is held at its posts curve inwards, as on the paper's
+/// photographs.
 #[test]
 fn a_stretched_film_draws_its_edges_in() {
     let design = Design {
@@ -260,7 +261,7 @@ fn slack_films_bulge_where_they_are_drawn() {
                     "slack {part}, down {down}: {z:.4} mm in {} steps",
                     rest.steps
                 );
-                // A tenth of a percent is less than what a film of no weight buckles at.
+                // A tenth of a percent is below the buckling strain of a weightless film.
                 let flat = down == 0.0 && part > -0.002;
                 assert!(flat || z * way > 0.05, "{fineness} {part} {down}: {z}");
                 assert!(film.linearize(&rest, &[]).is_ok(), "a stable branch");
@@ -283,7 +284,8 @@ fn points_of_the_film_are_found_again() {
     }
 }
 
-/// Fewer points are no worse: nearer to the solution of a finer mesh, as the mesh itself is.
+/// Two points are as good as three: as near to the solution of a finer mesh as the mesh itself
+/// allows.
 #[test]
 fn two_points_are_as_near_as_three() {
     let depth = |fineness, gauss_points| {
@@ -305,7 +307,7 @@ fn two_points_are_as_near_as_three() {
     }
 }
 
-/// Dots stiffen by what their area is of the film, wherever cells are.
+/// The stiffening by dots follows their share of the film's area, wherever the cells are.
 #[test]
 fn dots_stiffen_by_their_area() {
     let sheet = |dots_mm: Vec<[f64; 2]>| Sheet {
@@ -323,7 +325,7 @@ fn dots_stiffen_by_their_area() {
     assert!((dotted / plain - 1.0 - part).abs() < 1e-12);
 }
 
-/// A wedge bends as its mean thickness cubed.
+/// A wedge bends with the cube of its mean thickness.
 #[test]
 fn uneven_films_have_their_membrane_and_bending() {
     let terms = [0.1, -0.2, 0.15, 0.1, -0.1];
@@ -356,7 +358,7 @@ fn uneven_films_have_their_membrane_and_bending() {
     assert!((shell.energy(&twisted) / exact - 1.0).abs() < 1e-4);
 }
 
-/// A state is a start for a film beside it, and threads share one.
+/// A state is a valid start for a similar film, and threads can share one film.
 #[test]
 fn films_of_as_many_cells_share_their_states() {
     fn shared<T: Send + Sync>(_: &T) {}

@@ -1,4 +1,4 @@
-//! Constant strain and constant curvature are held exactly.
+//! Verifies that constant strain and constant curvature are exact.
 
 use super::*;
 use crate::spline::SUPPORT;
@@ -9,7 +9,7 @@ const FILM: Material = Material {
     thickness_mm: 0.5,
 };
 
-/// Unequal cells.
+/// Returns a film of unequal cells.
 fn uneven() -> Shell {
     let axes = [
         Axis::new(&[0.0, 0.7, 1.0, 2.2, 3.0, 5.0]),
@@ -18,7 +18,7 @@ fn uneven() -> Shell {
     Shell::new(Grid { axes, points: 3 }, &Sheet::of(&FILM))
 }
 
-/// The largest force on a function that vanishes with its slope on the edges: none in a state of
+/// Returns the largest force on a function that vanishes with its slope on the edges. It is zero in
 /// equilibrium.
 fn inner_force(shell: &Shell, u: &[f64], components: &[usize]) -> f64 {
     let gradient = shell.derivatives(u).gradient;
@@ -34,7 +34,7 @@ fn inner_force(shell: &Shell, u: &[f64], components: &[usize]) -> f64 {
 #[test]
 fn a_constant_large_strain_is_exact() {
     let shell = uneven();
-    // Stretched, sheared and turned out of the plane.
+    // The film is stretched, sheared and turned out of the plane.
     let u = coefficients(&shell, |x, y| {
         [0.2 * x + 0.1 * y, -0.15 * x + 0.3 * y, 0.4 * x - 0.2 * y]
     });
@@ -65,7 +65,7 @@ fn rigid_motion_is_free() {
     assert!(gradient.iter().all(|part| part.abs() < 1e-13));
 }
 
-/// Coefficients of w = (p x² + q y² + 2 r x y)/2.
+/// Returns the coefficients of w = (p x² + q y² + 2 r x y)/2.
 fn bent(shell: &Shell, [p, q, r]: [f64; 3]) -> Vec<f64> {
     let [x, y] = &shell.grid().axes;
     let (x2, y2) = (squares(x), squares(y));
@@ -79,7 +79,7 @@ fn bent(shell: &Shell, [p, q, r]: [f64; 3]) -> Vec<f64> {
     u
 }
 
-/// Coefficients of x², by interpolation on each span.
+/// Returns the coefficients of x², by interpolation on each span.
 fn squares(axis: &Axis) -> Vec<f64> {
     let mut coefficients = vec![0.0; axis.functions()];
     for span in 0..axis.spans() {
@@ -101,7 +101,7 @@ fn squares(axis: &Axis) -> Vec<f64> {
 #[test]
 fn a_constant_small_curvature_is_exact() {
     let shell = uneven();
-    // So small that membrane strain, of second order, costs less than 10⁻⁷ of bending.
+    // Small enough that membrane strain, of second order, has less than 10⁻⁷ of the bending energy.
     let size = 1e-6;
     let [p, q, r] = [1.0, -0.6, 0.4];
     let u = bent(&shell, [size * p, size * q, size * r]);

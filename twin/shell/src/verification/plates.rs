@@ -1,7 +1,7 @@
-//! The linear limit against plate theory: deflections of square plates of side a.
+//! Verifies the linear limit against plate theory: deflections of square plates of side a.
 //!
-//! Timoshenko & Woinowsky-Krieger, "Theory of Plates and Shells", 2nd ed., Tables 8 and 35 and
-//! Sections 30, 34 and 44; the clamped plate's digits are those of Taylor & Govindjee, Commun.
+//! Sources: Timoshenko & Woinowsky-Krieger, "Theory of Plates and Shells", 2nd ed., Tables 8 and 35
+//! and Sections 30, 34 and 44. The clamped plate's digits are those of Taylor & Govindjee, Commun.
 //! Numer. Meth. Engng 20 (2004) 757.
 
 use super::*;
@@ -13,7 +13,7 @@ const PLATE: Material = Material {
     thickness_mm: 0.1,
 };
 
-/// A square plate whose edges do not move along z, nor turn when `clamped`.
+/// Returns a square plate whose edges do not move along z, and do not turn if `clamped`.
 fn plate(cells: usize, clamped: bool) -> Shell {
     let mut shell = rectangle([SIDE_MM; 2], [cells; 2], &PLATE);
     let held = if clamped { 2 } else { 1 };
@@ -34,7 +34,7 @@ fn centre_deflection(shell: &Shell, load: Vec<f64>) -> f64 {
     displacement(shell, &linear(shell, load), [SIDE_MM / 2.0; 2])[2]
 }
 
-/// w D / (q a⁴) in the centre under pressure q.
+/// Returns w D / (q a⁴) in the centre under pressure q.
 fn under_pressure(cells: usize, clamped: bool) -> f64 {
     let shell = plate(cells, clamped);
     let q = 1e-6;
@@ -42,7 +42,7 @@ fn under_pressure(cells: usize, clamped: bool) -> f64 {
     w * PLATE.bending_n_mm() / (q * SIDE_MM.powi(4))
 }
 
-/// w D / (P a²) in the centre under a force P there.
+/// Returns w D / (P a²) in the centre under a force P there.
 fn under_force(cells: usize, clamped: bool) -> f64 {
     let shell = plate(cells, clamped);
     let force = 1e-6;
@@ -50,7 +50,7 @@ fn under_force(cells: usize, clamped: bool) -> f64 {
     w * PLATE.bending_n_mm() / (force * SIDE_MM.powi(2))
 }
 
-/// Navier's series for the simply supported plate, all modes to the 999th.
+/// Sums Navier's series for the simply supported plate, all modes to the 999th.
 fn navier(term: impl Fn(f64, f64) -> f64) -> f64 {
     let odd = || (0..500).map(|k| f64::from(2 * k + 1));
     odd()
@@ -99,8 +99,8 @@ fn plates_under_a_force_converge_with_order_two() {
     }
 }
 
-/// Pure twist, which tests the free edges: held at three corners, pulled at the fourth, w = P x y /
-/// (2 D (1−ν)).
+/// Pure twist, which tests the free edges. The plate is held at three corners and pulled at the
+/// fourth: w = P x y / (2 D (1−ν)).
 #[test]
 fn a_plate_twisted_at_its_corners_is_exact() {
     let mut shell = rectangle([SIDE_MM; 2], [5, 4], &PLATE);
@@ -109,7 +109,7 @@ fn a_plate_twisted_at_its_corners_is_exact() {
     for k in corners {
         shell.pin(3 * k + 2, PIN_N_PER_MM);
     }
-    // In its plane the plate only needs to stay where it is.
+    // In its plane the plate only needs to be kept in place.
     for unknown in [0, 1, 3 * (columns - 1) + 1] {
         shell.pin(unknown, PIN_N_PER_MM);
     }
