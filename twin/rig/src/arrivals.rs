@@ -1,5 +1,5 @@
-//! When each sample's last byte had left the device: one JSON object per sample, for whoever
-//! measures latency.
+//! The log of arrivals, for measuring latency: one JSON object per sample with the time at which
+//! its last byte had left the device.
 
 use std::fmt;
 use std::fs::File;
@@ -12,7 +12,7 @@ use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
 use hivtac_wire::message::DeviceMessage;
 use serde_json::json;
 
-/// Where the log goes.
+/// The log of arrivals, and its file if it has one.
 #[derive(Default)]
 pub struct Arrivals {
     file: Option<File>,
@@ -21,10 +21,10 @@ pub struct Arrivals {
 }
 
 impl Arrivals {
-    /// A log in a file, which is emptied first.
+    /// Returns a log in a file, which is emptied first.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn create(path: &Path) -> anyhow::Result<Self> {
         let file = File::create(path).with_context(|| format!("arrivals {}", path.display()))?;
         Ok(Self {
@@ -33,7 +33,7 @@ impl Arrivals {
         })
     }
 
-    /// A packet was on the bus until `at_ns`.
+    /// Logs the samples that end in a packet; the packet was on the bus until `at_ns`.
     pub fn packet(&mut self, mut bytes: &[u8], at_ns: u64) {
         let Some(file) = &mut self.file else { return };
         while let Some(received) = self.decoder.feed(&mut bytes) {
@@ -47,7 +47,7 @@ impl Arrivals {
         }
     }
 
-    /// Why the log is not whole.
+    /// Returns the reason why the log is incomplete; `None` if it is complete.
     pub fn failure(&self) -> Option<&str> {
         self.failed.as_deref()
     }

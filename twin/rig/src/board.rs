@@ -1,4 +1,4 @@
-//! The board's wiring: which pins carry the camera's power, clock and signals, and what USB needs.
+//! The board's wiring: the pins that carry the camera's power, clock and signals, and USB's needs.
 //!
 //! On both boards: the camera's control bus on PB8 and PB9, D0–D4 on PC6 PC7 PE0 PE1 PE4, D6 and D7
 //! on PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB on PA11 and PA12.
@@ -25,7 +25,7 @@ use crate::camera::{Supply, part};
 use crate::peripherals::crs;
 use crate::peripherals::dcmi::Pins;
 
-/// Port numbers as the part counts them.
+/// Port numbers in the order of the part.
 const A: usize = 0;
 const B: usize = 1;
 const C: usize = 2;
@@ -41,10 +41,10 @@ const AF_I2C1: u8 = 4;
 const AF_USB: u8 = 10;
 const AF_DCMI: u8 = 13;
 
-/// A port and the number of a pin.
+/// A port and a pin's number.
 type At = (usize, u8);
 
-/// The boards that there are.
+/// The boards that the rig can simulate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// WeAct MiniSTM32H743 with its camera connector.
@@ -55,7 +55,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Weact => "weact-h743",
@@ -63,7 +63,7 @@ impl Kind {
         }
     }
 
-    /// The camera that it usually has.
+    /// Returns its default camera.
     pub fn usual_camera(self) -> part::Kind {
         match self {
             Kind::Weact => part::Kind::Ov7725,
@@ -71,7 +71,7 @@ impl Kind {
         }
     }
 
-    /// The crystal on OSC_IN, Hz.
+    /// Returns the frequency of the crystal on OSC_IN, Hz.
     pub fn crystal_hz(self) -> u64 {
         match self {
             Kind::Weact => 25_000_000,
@@ -79,7 +79,7 @@ impl Kind {
         }
     }
 
-    /// D0 to D7.
+    /// Returns the pins of D0 to D7.
     fn data(self) -> [At; 8] {
         let fifth = match self {
             Kind::Weact => (D, 3),
@@ -97,7 +97,7 @@ impl Kind {
         ]
     }
 
-    /// The camera's power-down, low is on.
+    /// Returns the pin of the camera's power-down; low is on.
     fn power_down(self) -> At {
         match self {
             Kind::Weact => (A, 7),
@@ -105,7 +105,8 @@ impl Kind {
         }
     }
 
-    /// The camera's reset, active low, where the microcontroller has it.
+    /// Returns the pin of the camera's reset, active low; `None` if the microcontroller has no such
+    /// pin.
     fn camera_reset(self) -> Option<At> {
         match self {
             Kind::Weact => None,
@@ -113,7 +114,7 @@ impl Kind {
         }
     }
 
-    /// The LED, and its level while it is on.
+    /// Returns the LED's pin, and its level while the LED is on.
     fn led(self) -> (At, Level) {
         match self {
             Kind::Weact => ((E, 3), Level::High),
@@ -122,12 +123,12 @@ impl Kind {
     }
 }
 
-/// The pin of VSYNC, PB7.
+/// Returns the pin of VSYNC, PB7.
 pub fn vsync_pin() -> Pin {
     pin(7)
 }
 
-/// What the microcontroller's pins and clocks give the camera and USB.
+/// The supplies and signals that the microcontroller's pins and clocks give to camera and USB.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Wiring {
     /// The camera's power, clock and control lines.
@@ -138,31 +139,31 @@ pub struct Wiring {
     pub hclk_hz: u64,
     /// The USB transceiver has its 3.3 V and the pins.
     pub usb: bool,
-    /// USB's clock, Hz, with the error of what makes it; 0 without one.
+    /// USB's clock, Hz, with the error of its source; 0 without a clock.
     pub usb_hz: u64,
     /// The LED is on.
     pub led: bool,
 }
 
-/// Where the part keeps the registers that decide the wiring.
+/// Slots of the registers that decide the wiring.
 #[derive(Clone, Copy, Debug)]
 pub struct Slots {
     board: Kind,
     ports: [usize; 5],
     rcc: usize,
-    /// Of the timer that may be the camera's clock.
+    /// Slot of TIM1, which may be the camera's clock.
     pub tim1: usize,
     pwr: usize,
     crs: usize,
-    /// Of the identity.
+    /// Slot of the part's identity.
     pub dbgmcu: usize,
 }
 
 impl Slots {
-    /// Finds them.
+    /// Finds the slots.
     ///
     /// # Errors
-    /// When the part is not laid out as expected.
+    /// If the part is not laid out as expected.
     pub fn of(bus: &Bus, board: Kind) -> Result<Self, Error> {
         let mut ports = [0; 5];
         for (slot, name) in ports.iter_mut().zip(PORTS) {
@@ -179,12 +180,12 @@ impl Slots {
         })
     }
 
-    /// The port of VSYNC.
+    /// Returns the slot of VSYNC's port.
     pub fn vsync_port(&self) -> usize {
         self.ports[VSYNC_PORT]
     }
 
-    /// How the firmware has set the part up now.
+    /// Returns the wiring by the part's present registers.
     pub fn wiring(&self, part: &Stm32h743) -> Wiring {
         let carries = |port: usize, number: u8, function: u8| {
             Gpio::function(pin(number), self.port(part, port)) == Some(function)
@@ -219,8 +220,8 @@ impl Slots {
         }
     }
 
-    /// The level that a pin is driven to, if it is. What the board pulls the camera's lines to
-    /// counts for nothing: firmware has to drive them.
+    /// Returns the level to which a pin is driven; `None` if it is not driven. The board's pull-ups
+    /// on the camera's lines do not count: firmware has to drive them.
     fn driven(&self, part: &Stm32h743, (port, number): At) -> Option<Level> {
         const OUTPUT: u64 = 1;
         let registers = self.port(part, port);
@@ -232,13 +233,13 @@ impl Slots {
         registers(part, self.ports[port])
     }
 
-    /// PWR_CR3: USB33DEN, which the firmware sets once the 3.3 V are there.
+    /// Returns PWR_CR3.USB33DEN, which the firmware sets once the 3.3 V are there.
     fn usb_supplied(&self, part: &Stm32h743) -> bool {
         registers(part, self.pwr).get(pwr::Register::Cr3) >> 24 & 1 == 1
     }
 
-    /// RM0433 RCC_D2CCIP2R bits 21:20: nothing, PLL1, PLL3, or the internal oscillator, which is
-    /// off by its error until it is trimmed.
+    /// Returns USB's clock, Hz, by RM0433 RCC_D2CCIP2R bits 21:20: none, PLL1, PLL3, or the
+    /// internal oscillator. The oscillator has its error until it is trimmed.
     fn usb_hz(&self, part: &Stm32h743) -> u64 {
         let registers = registers(part, self.rcc);
         let pll = |pll| part.rcc.pll_output(registers, pll, Tap::Q);
@@ -252,7 +253,8 @@ impl Slots {
         }
     }
 
-    /// MCO1, RM0433 RCC_CFGR bits 24:22 (source) and 21:18 (divider, 0 is off).
+    /// Returns MCO1's frequency, Hz: RM0433 RCC_CFGR bits 24:22 (source) and 21:18 (divider, 0 is
+    /// off).
     fn mco1_hz(&self, part: &Stm32h743) -> u64 {
         let registers = registers(part, self.rcc);
         let cfgr = registers.get(rcc::Register::Cfgr);
@@ -268,8 +270,8 @@ impl Slots {
         source.checked_div(cfgr >> 18 & 15).unwrap_or(0)
     }
 
-    /// TIM1's channel 1 as a clock (RM0433, chapter 38): PWM mode 1 or 2, its output and the main
-    /// one enabled, and high for a part of the period.
+    /// Returns the frequency of TIM1's channel 1 as a clock, Hz (RM0433, chapter 38). It needs PWM
+    /// mode 1 or 2, its output and the main one enabled, and a high level in a part of the period.
     fn tim1_hz(&self, part: &Stm32h743) -> u64 {
         use tim1::Register as Timer;
         let timer = registers(part, self.tim1);

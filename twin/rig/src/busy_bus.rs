@@ -1,30 +1,29 @@
-//! What a busy bus does under [`Kind::BusBusy`]: transfers wait, and an interrupt line falls late
-//! after the write that clears it.
+//! The effects of a busy bus under [`Kind::BusBusy`]: transfers wait, and an interrupt line falls
+//! late after the write that clears it.
 //!
-//! The bus takes a write and delivers it later; a handler that has returned by then finds its line
-//! still up and is entered again, with nothing to do. A read of the same device waits for the
-//! write, so that the line has fallen behind it.
+//! The bus accepts a write and delivers it later. A handler that has returned by then finds its
+//! line still up, and is entered again without a cause. A read of the same device waits for the
+//! write; the line has fallen when the read returns.
 
 use rigless::device::{DeviceContext, Level};
 use rigless::time::{EventId, VirtualNanos};
 
 use crate::faults::{Faults, Kind};
 
-/// A write is on its way for at most so long, ns: longer than a handler takes from there to its
-/// end.
+/// The longest delay of a write, ns: longer than a handler takes from the write to its end.
 pub const LONGEST_WRITE_NS: u64 = 2_000;
 
-/// Numbers that a seed decides.
+/// Random numbers that a seed decides.
 #[derive(Clone, Debug)]
 pub struct Chance(u64);
 
 impl Chance {
-    /// Those of a seed.
+    /// Returns the numbers of a seed.
     pub fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next one, below `bound`.
+    /// Returns the next number, below `bound`.
     pub fn below(&mut self, bound: u64) -> u64 {
         self.0 = self
             .0
@@ -44,7 +43,7 @@ pub struct InterruptLine {
 }
 
 impl InterruptLine {
-    /// A low line.
+    /// Returns a line at low level.
     pub fn new(faults: Faults, seed: u64) -> Self {
         Self {
             faults,
@@ -54,7 +53,7 @@ impl InterruptLine {
         }
     }
 
-    /// Has the level that the device's registers ask for; low only later on a busy bus.
+    /// Sets the level that the device's registers ask for. On a busy bus, low is set later.
     pub fn drive(&mut self, wanted: Level, context: &mut DeviceContext<'_>) {
         let now = context.now().0;
         if wanted == Level::High {
@@ -70,14 +69,14 @@ impl InterruptLine {
         }
     }
 
-    /// The core has read something of the device: writes before that have arrived.
+    /// Lets the line fall: the core has read from the device, and earlier writes have arrived.
     pub fn read_back(&mut self, context: &mut DeviceContext<'_>) {
         if self.falls.take().is_some() {
             self.put(Level::Low, context);
         }
     }
 
-    /// Whether an event was that it falls, which it does.
+    /// Returns whether an event was the line's fall, and lets the line fall if it was.
     pub fn falls_at(&mut self, event: EventId, context: &mut DeviceContext<'_>) -> bool {
         let falls = self.falls.take_if(|falls| *falls == event).is_some();
         if falls {
@@ -86,7 +85,7 @@ impl InterruptLine {
         falls
     }
 
-    /// The part was reset, which drops events and lines.
+    /// Resets the line with the part, which drops events and lines.
     pub fn reset(&mut self) {
         (self.level, self.falls) = (Level::Low, None);
     }

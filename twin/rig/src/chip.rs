@@ -1,9 +1,9 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
-//! core that it lacks.
+//! core that the emulator lacks.
 //!
-//! Nothing of the emulator is patched. [`Chip`] wraps the part and answers for seven slots itself:
-//! DCMI, MDMA, CRS, the flash, and the three blocks of OTG2; everything else goes to the part's own
-//! models.
+//! The emulator itself is not patched. [`Chip`] wraps the part and handles seven slots itself:
+//! DCMI, MDMA, CRS, the flash, and the three blocks of OTG2. All other accesses go to the part's
+//! own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::{Access, Memory};
@@ -43,7 +43,7 @@ pub enum Revision {
 }
 
 impl Revision {
-    /// DBGMCU_IDC.
+    /// Returns DBGMCU_IDC.
     fn identity(self) -> u64 {
         match self {
             Revision::Y => 0x1003_6450,
@@ -51,7 +51,7 @@ impl Revision {
         }
     }
 
-    /// Fastest bus clock, Hz: half the core's (DS12110).
+    /// Returns the fastest bus clock, Hz: half the core's (DS12110).
     fn fastest_bus_hz(self) -> u64 {
         match self {
             Revision::Y => 200_000_000,
@@ -60,16 +60,16 @@ impl Revision {
     }
 }
 
-/// The part with what the rig adds to it.
+/// The part with the rig's additions.
 #[derive(Debug)]
 pub struct Chip {
     /// The emulator's part.
     pub part: Stm32h743,
     /// The camera interface.
     pub dcmi: Dcmi,
-    /// The controller that reaches DTCM.
+    /// The DMA controller that reaches DTCM.
     pub mdma: Mdma,
-    /// The registers of an MPU that enforces nothing.
+    /// The registers of an MPU that is not enforced.
     pub mpu: Option<Mpu>,
     crs: Crs,
     flash: Flash,
@@ -95,10 +95,10 @@ pub struct Chip {
 }
 
 impl Chip {
-    /// A part out of reset, with the camera on its pins and the host on its cable.
+    /// Returns a part out of reset, with the camera on its pins and the host on its cable.
     ///
     /// # Errors
-    /// When the emulator's part is not laid out as expected.
+    /// If the emulator's part is not laid out as expected.
     #[expect(clippy::too_many_arguments, reason = "all that a chip is connected to")]
     pub fn new(
         camera: SharedCamera,
@@ -166,24 +166,24 @@ impl Chip {
         Ok(chip)
     }
 
-    /// Writes the revision where the program reads it.
+    /// Writes the revision to the register from which the program reads it.
     fn identify(&mut self) {
         let slot = self.slots.dbgmcu;
         let registers = self.part.bus_mut().slot_mut(slot).registers_mut();
         registers.set(dbgmcu::Register::Idc, self.revision.identity());
     }
 
-    /// The board that it is on.
+    /// Returns the part's board.
     pub fn board(&self) -> board::Kind {
         self.board
     }
 
-    /// When the LED went on and off, in turn, ns.
+    /// Returns the times of the LED's switches, on and off in turn, ns.
     pub fn led_edges_ns(&self) -> &[u64] {
         &self.led_edges_ns
     }
 
-    /// The LED is on or off; it begins off.
+    /// Switches the LED on or off; it begins off.
     fn drive_led(&mut self, is_on: bool, at: VirtualNanos) {
         let was_on = !self.led_edges_ns.len().is_multiple_of(2);
         if is_on != was_on {
@@ -191,12 +191,12 @@ impl Chip {
         }
     }
 
-    /// Words that the firmware wrote into full USB FIFOs.
+    /// Returns the count of words that the firmware wrote into full USB FIFOs.
     pub fn lost_usb_words(&self) -> u64 {
         self.core.lock().lost_words
     }
 
-    /// Looks at the pins and clocks again, and passes on what changed.
+    /// Reads the pins and clocks again, and passes on the changes.
     pub fn rewire(&mut self, at: VirtualNanos) {
         let wiring = self.slots.wiring(&self.part);
         self.drive_led(wiring.led, at);
@@ -223,8 +223,8 @@ impl Chip {
         }
     }
 
-    /// Looks at what an access may have changed on the camera's control bus, at lines that are late
-    /// to fall, and at blocks of the MDMA that ended.
+    /// Handles the effects of an access: on the camera's control bus, on lines that fall late, and
+    /// on blocks of the MDMA that ended.
     pub fn settle(&mut self, at: VirtualNanos, memory: &mut dyn Memory) {
         self.mdma.settle(memory);
         self.control_bus.settle(&mut self.part, at);
@@ -232,13 +232,13 @@ impl Chip {
         self.late_flags.settle(&mut self.part, at);
     }
 
-    /// The core has read or written something.
+    /// Handles an access by the core: a read or a write.
     pub fn accessed(&mut self, access: &Access, value: u64) {
         self.late.accessed(access, value);
         self.late_flags.accessed(&mut self.part, access, value);
     }
 
-    /// Puts the VSYNC line's level on its pin.
+    /// Sets the pin of VSYNC to the line's level.
     fn drive_vsync(&mut self, at: VirtualNanos) {
         if self.dcmi.vsync() != self.vsync {
             self.vsync = self.dcmi.vsync();
@@ -285,13 +285,13 @@ impl Mcu for Chip {
         self.rewire(at);
     }
 
-    /// Nothing outside is waiting for a look: the camera and the host live on events.
+    /// Does nothing: the camera and the host live on events.
     fn poll(&mut self, _now: VirtualNanos) {}
 
     fn split(&mut self, slot: usize) -> (&mut Bus, Option<&mut dyn ErasedDevice>) {
         if slot == self.slots.tim1 {
-            // It may be the camera's clock, as its registers say (`board`). Its model would count
-            // every edge.
+            // Its registers decide whether it is the camera's clock (`board`). Its model would
+            // count every edge.
             return (self.part.bus_mut(), None);
         }
         if slot == self.dcmi_slot {

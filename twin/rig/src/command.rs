@@ -1,4 +1,4 @@
-//! The command: its arguments, the run that they ask for, and the files that it leaves.
+//! The command `hivtac-rig`: its arguments, the run that they describe, and its output files.
 
 use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
@@ -42,10 +42,10 @@ pub struct Arguments {
     /// The board.
     #[arg(long, value_enum, default_value_t)]
     board: board::Kind,
-    /// The camera on it; the board's usual one unless told.
+    /// The camera on it; the board's usual one by default.
     #[arg(long, value_enum)]
     camera: Option<part::Kind>,
-    /// Geometry of the simulated sensor: ov7725, mt9v034 or paper; the camera's own unless told.
+    /// Geometry of the simulated sensor: ov7725, mt9v034 or paper; the camera's own by default.
     #[arg(long)]
     preset: Option<String>,
     /// Offer the serial port at this TCP port of 127.0.0.1; 0 takes a free one.
@@ -71,10 +71,10 @@ pub struct Arguments {
     /// byte had left.
     #[arg(long, value_name = "FILE")]
     arrivals: Option<PathBuf>,
-    /// End after so many captured frames.
+    /// End after this number of captured frames.
     #[arg(long, value_name = "N")]
     frames: Option<u64>,
-    /// End after so much virtual time, ms.
+    /// End after this virtual time, ms.
     #[arg(long, value_name = "N")]
     virtual_ms: Option<u64>,
     /// A scripted host instead of a client: the same bytes every time. Lines of `MS ACTION`.
@@ -109,21 +109,21 @@ pub struct Arguments {
     stats_json: Option<PathBuf>,
 }
 
-/// The serial port of a run that has a client.
+/// The serial port of a run with a client.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Port {
-    /// On 127.0.0.1.
+    /// Port on 127.0.0.1.
     pub tcp: Option<u16>,
-    /// Of the pseudo-terminal.
+    /// Path of the pseudo-terminal.
     pub pty: Option<PathBuf>,
 }
 
 impl Arguments {
-    /// The run that they ask for, and its port, which is open; none where a script is the host.
-    /// `interrupt` ends the run when it is set.
+    /// Returns the run that the arguments describe, and its open port; no port if a script is the
+    /// host. `interrupt` ends the run when it is set.
     ///
     /// # Errors
-    /// When a file cannot be read or created, a port not be opened, or a script has no end.
+    /// If a file cannot be read or created, a port cannot be opened, or a script has no end.
     pub fn prepare(&self, interrupt: Arc<AtomicBool>) -> anyhow::Result<(Options, Option<Port>)> {
         let truth = (self.truth.as_deref())
             .map(TruthLog::create)
@@ -166,10 +166,10 @@ impl Arguments {
         Ok((options, port))
     }
 
-    /// Writes the files that they ask for of a run.
+    /// Writes the files of a run for which the arguments ask.
     ///
     /// # Errors
-    /// When one cannot be written, or what was written during the run is not whole.
+    /// If one cannot be written, or a log that was written during the run is incomplete.
     pub fn leave(&self, outcome: &Outcome) -> anyhow::Result<()> {
         let write = |path: &PathBuf, bytes: &[u8]| {
             std::fs::write(path, bytes).with_context(|| path.display().to_string())
@@ -225,7 +225,7 @@ impl Arguments {
         Ok((program, Some(port)))
     }
 
-    /// Opens the endpoints. Without any wish it is a TCP port.
+    /// Opens the endpoints; by default a TCP port.
     fn open_link(&self) -> anyhow::Result<(Link, Port)> {
         let mut endpoints: Vec<Box<dyn Endpoint>> = Vec::new();
         let mut port = Port::default();
@@ -244,7 +244,7 @@ impl Arguments {
 }
 
 impl Port {
-    /// The line that says that a client may come: `ready tcp=ADDRESS pty=PATH`.
+    /// Returns the line that announces that a client may connect: `ready tcp=ADDRESS pty=PATH`.
     pub fn ready_line(&self) -> String {
         let tcp = self.tcp.map(|port| format!(" tcp=127.0.0.1:{port}"));
         let pty = (self.pty.as_ref()).map(|path| format!(" pty={}", path.display()));

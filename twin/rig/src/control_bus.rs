@@ -1,9 +1,8 @@
-//! What goes wrong on the camera's control bus: a device that holds a line, and a bus error that
-//! there was not.
+//! Faults of the camera's control bus: a device that holds a line, and a false bus error.
 //!
-//! While a line is held, I²C1 sees a busy bus and nothing moves: [`HeldBus`] answers in its place,
-//! and the pins are low. A camera that was left amid a byte lets go of SDA after nine clocks, which
-//! only the pins as outputs can give.
+//! While a line is held, I²C1 sees a busy bus and no transfer moves: [`HeldBus`] answers in its
+//! place, and the pins are low. A camera that was interrupted amid a byte releases SDA after nine
+//! clocks, which only the pins as outputs can give.
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile};
 use rigless::mcu::Mcu;
@@ -19,7 +18,7 @@ use crate::faults::{Faults, Kind};
 const TRANSMIT_EMPTY: u64 = 1;
 const BUS_ERROR: u64 = 1 << 8;
 const BUSY: u64 = 1 << 15;
-/// Clocks after which a device has sent the byte that it was left in.
+/// Clocks after which a device has sent the rest of an interrupted byte.
 const CLOCKS: u32 = 9;
 /// PB8 and PB9.
 const PORT: usize = 1;
@@ -43,7 +42,7 @@ impl Device for HeldBus {
     }
 }
 
-/// The bus's lines, and what was done about them.
+/// The bus's lines, and the clocks that they got.
 #[derive(Debug)]
 pub struct ControlBus {
     faults: Faults,
@@ -57,7 +56,7 @@ pub struct ControlBus {
 }
 
 impl ControlBus {
-    /// A bus with these faults, of the port and the interface in these slots.
+    /// Returns a bus with these faults, for the port and the interface in these slots.
     pub fn new(faults: Faults, port: usize, i2c: usize) -> Self {
         let kinds = [Kind::SdaStuck, Kind::SclStretch, Kind::BerrOnce];
         Self {
@@ -72,12 +71,12 @@ impl ControlBus {
         }
     }
 
-    /// Whether a slot is the interface's, and cannot reach the bus.
+    /// Returns whether a slot is the interface's and a held line cuts it off from the bus.
     pub fn holds(&self, slot: usize) -> bool {
         slot == self.i2c && self.held.contains(&true)
     }
 
-    /// Looks at the lines, after every access.
+    /// Updates the lines, after every access.
     pub fn settle(&mut self, part: &mut Stm32h743, at: VirtualNanos) {
         if !self.wanted {
             return;
@@ -110,7 +109,7 @@ impl ControlBus {
         self.clock = level;
     }
 
-    /// Errata ES0396: a bus error is reported during a transfer, which goes on.
+    /// Raises the bus error of errata ES0396: it is reported during a transfer, which goes on.
     fn err(&mut self, part: &mut Stm32h743) {
         let registers = part.bus_mut().slot_mut(self.i2c).registers_mut();
         let status = registers.get(Register::Isr);

@@ -1,9 +1,8 @@
-//! DMA buffers must lie where the chip's DMA controllers can reach.
+//! The rule that DMA buffers must lie within the reach of the chip's DMA controllers.
 //!
 //! RM0433 table 3: DMA1 and DMA2 reach the peripherals, AXI SRAM, SRAM1 to SRAM4, backup SRAM and
-//! flash, but neither ITCM nor DTCM. Silicon ends such a transfer with a transfer error; here it
-//! ends the run with a message that names the stream and the address, whether or not a byte was to
-//! move.
+//! flash, but neither ITCM nor DTCM. Silicon ends such a transfer with a transfer error. Here it
+//! ends the run with a message that names the stream and the address, even if no byte would move.
 
 use rigless::device::RegisterFile;
 
@@ -24,13 +23,13 @@ const DOUBLE_BUFFER: u64 = 1 << 18;
 /// The registers of one stream, in rows of the vendor's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stream {
-    /// The controller.
+    /// The controller's name.
     pub controller: &'static str,
-    /// The stream.
+    /// The stream's number.
     pub number: u64,
 }
 
-/// The stream whose control register a write enables, if it is one.
+/// Returns the stream that a write to its control register enables; `None` for any other write.
 pub fn enabled_stream(address: u64, value: u64) -> Option<Stream> {
     let (controller, base) = *CONTROLLERS
         .iter()
@@ -43,8 +42,8 @@ pub fn enabled_stream(address: u64, value: u64) -> Option<Stream> {
     })
 }
 
-/// Notes a breach when a stream's memory addresses are out of reach. `registers` are those of its
-/// controller; `control` is what was written to its control register.
+/// Notes a breach if a stream's memory addresses are out of reach. `registers` are those of its
+/// controller; `control` is the value written to its control register.
 pub fn check(stream: Stream, control: u64, registers: &[(u64, u64)], rules: &Rules) {
     let at = |offset: u64| {
         let offset = FIRST_STREAM + stream.number * STREAM + offset;
@@ -72,7 +71,7 @@ pub fn check(stream: Stream, control: u64, registers: &[(u64, u64)], rules: &Rul
     }
 }
 
-/// Offsets and values of every register of a controller.
+/// Returns offsets and values of every register of a controller.
 pub fn values(registers: &RegisterFile) -> Vec<(u64, u64)> {
     use rigless::soc::Layout;
     use rigless::soc::stm32h743::generated::dma1::Register;

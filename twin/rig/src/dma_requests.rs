@@ -1,11 +1,11 @@
-//! DMA1 and DMA2 with DMAMUX1's channels as plain wires, without acknowledgements.
+//! Connects DMA1 and DMA2 to DMAMUX1's channels by plain wires, without acknowledgements.
 //!
-//! The emulator's controllers acknowledge each word that they move, and each acknowledgement is
-//! told to some forty peripherals: with them, a frame takes a third longer. Only what is released
-//! or counted by one needs it: requests of timers and of DMAMUX1's generators, synchronized
-//! channels and those that generate events (RM0433, chapter 17). A stream that is enabled on such a
-//! channel ends the run with a message; for any other one, DCMI's among them, an acknowledgement
-//! changes nothing.
+//! The emulator's controllers acknowledge each word that they move, and each acknowledgement goes
+//! to about forty peripherals. With them, a frame takes a third longer. Only functions that an
+//! acknowledgement releases or counts need it: requests of timers and of DMAMUX1's generators,
+//! synchronized channels and those that generate events (RM0433, chapter 17). A stream that is
+//! enabled on such a channel ends the run with a message. For all other channels, DCMI's among
+//! them, an acknowledgement changes nothing.
 
 use std::ops::RangeInclusive;
 
@@ -22,19 +22,18 @@ use crate::rules::Rules;
 const REQUEST: u64 = 0x7F;
 const EVENTS: u64 = 1 << 9;
 const SYNCHRONIZED: u64 = 1 << 16;
-/// Requests that are served when they are acknowledged: the generators', TIM1 to TIM4, TIM8 and
-/// TIM5, TIM6 and TIM7, TIM15 to TIM17 (RM0433, table 121).
+/// Requests that last until they are acknowledged: the generators', TIM1 to TIM4, TIM8 and TIM5,
+/// TIM6 and TIM7, TIM15 to TIM17 (RM0433, table 121).
 const ACKNOWLEDGED: [RangeInclusive<u64>; 5] = [1..=8, 11..=32, 47..=60, 69..=70, 105..=112];
 
-/// Reserved bits of a stream's control register, in place of the channel that other parts select
-/// there.
+/// Reserved bits of a stream's control register. Other parts select the channel there.
 const NO_SELECTION: FieldSpec = FieldSpec::new("reserved", 25, 3, Access::ReadOnly);
-/// The streams, each a list of its own.
+/// The streams, each in its own list.
 const EACH: [[usize; 1]; STREAMS] = [[0], [1], [2], [3], [4], [5], [6], [7]];
 const WIRES: [[Wire; STREAMS]; 2] = [wires(0), wires(STREAMS)];
 const OUT_OF_REACH: [Span; 2] = [span(0), span(1)];
 
-/// Of DMAMUX1's channels from `first` on, one to each stream.
+/// Returns the wires of DMAMUX1's channels from `first` on, one to each stream.
 const fn wires(first: usize) -> [Wire; STREAMS] {
     let mut wires = [Wire {
         instance: "DMAMUX1",
@@ -56,7 +55,7 @@ const fn span(number: usize) -> Span {
     Span { base, bytes }
 }
 
-/// DMA1 and DMA2, out of reset.
+/// Returns DMA1 and DMA2, out of reset.
 pub fn controllers() -> [Dma; 2] {
     WIRES.each_ref().map(|wiring| {
         let requests = Requests::Channels {
@@ -72,8 +71,8 @@ pub fn controllers() -> [Dma; 2] {
     })
 }
 
-/// Notes a breach when a stream that is enabled would need acknowledgements. `multiplexer` are
-/// DMAMUX1's registers.
+/// Notes a breach if an enabled stream would need acknowledgements. `multiplexer` are DMAMUX1's
+/// registers.
 pub fn check(stream: Stream, multiplexer: &RegisterFile, rules: &Rules) {
     let first = if stream.controller == "DMA1" {
         0
@@ -102,7 +101,7 @@ mod tests {
 
     const DCMI: u64 = 75;
 
-    /// What is noted when a stream is enabled while a channel is set up so.
+    /// Returns whether a breach is noted when a stream is enabled on a channel with these settings.
     fn breach(controller: &'static str, number: u64, channel: Register, control: u64) -> bool {
         let mut part = Stm32h743::new().unwrap();
         let slot = part.bus().slot("DMAMUX1").unwrap();

@@ -1,36 +1,37 @@
-//! Faults on request: what goes wrong, and when.
+//! Faults on request: their kinds, and the times at which they are on.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// What can go wrong. All of it happens outside the microcontroller, except the DMA stall.
+/// The kinds of fault. All are outside the microcontroller, except the DMA stall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// No camera on the connector: no acknowledge, no signals.
     CameraAbsent,
-    /// The camera answers with another product id.
+    /// The camera answers with a different product id.
     CameraWrongId,
-    /// The camera's registers hold what another program left in them.
+    /// The camera's registers have the values of another program.
     CameraUsed,
-    /// The camera was left amid a byte and holds SDA low until it has had its nine clocks.
+    /// The camera was interrupted amid a byte and holds SDA low until it has had its nine clocks.
     SdaStuck,
     /// The camera holds SCL low.
     SclStretch,
-    /// I²C1 reports a bus error in the first transfer from then on, which goes on normally.
+    /// I²C1 reports a bus error in the first transfer from that time on; the transfer goes on
+    /// normally.
     BerrOnce,
     /// The camera's clock tree stops: no VSYNC, no pixels; its registers still answer.
     CameraSilent,
-    /// The camera's clock loop multiplies half as much as it was told.
+    /// The camera's clock loop multiplies by half of the value in its register.
     CameraSlow,
-    /// A register of the camera goes back to what it holds after a reset, once.
+    /// A register of the camera goes back to its value after a reset, once.
     CameraForgets,
-    /// The camera sends half of its rows in frames that begin while this lasts.
+    /// The camera sends half of its rows in frames that begin while the fault is on.
     FrameShort,
-    /// The camera sends five rows more than it should in frames that begin while this lasts.
+    /// The camera sends five surplus rows in frames that begin while the fault is on.
     FrameLong,
-    /// The DMA gets no access to the bus, so that the camera interface overruns.
+    /// The DMA gets no access to the bus, and the camera interface overruns.
     DcmiOverrun,
-    /// Others hold the bus, by seed: blocks that the MDMA moves take up to 16 times as long, the
+    /// Others hold the bus, by seed. Blocks that the MDMA moves take up to 16 times as long, the
     /// DMA waits for words of the camera interface, and both their interrupt lines fall late.
     BusBusy,
     /// The host has the port open but does not ask for data.
@@ -60,21 +61,21 @@ const NAMES: [(&str, Kind); 15] = [
 /// Longest time, ms: a thousand days.
 const LONGEST_MS: u64 = 86_400_000_000;
 
-/// One fault with the virtual time it lasts, ns.
+/// A fault and the virtual time during which it is on, ns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What goes wrong.
+    /// The kind of fault.
     pub kind: Kind,
-    /// From this instant on.
+    /// The instant at which it begins.
     pub from_ns: u64,
-    /// Until this instant; `u64::MAX` for the rest of the run.
+    /// The instant at which it ends; `u64::MAX` for the rest of the run.
     pub until_ns: u64,
 }
 
 impl FromStr for Fault {
     type Err = String;
 
-    /// `KIND`, `KIND@MS` or `KIND@MS-MS`.
+    /// Reads `KIND`, `KIND@MS` or `KIND@MS-MS`.
     fn from_str(text: &str) -> Result<Self, String> {
         let (name, time) = text
             .split_once('@')
@@ -115,8 +116,8 @@ fn milliseconds(text: &str) -> Result<u64, String> {
     }
 }
 
-/// A DMA stall lasts a millisecond unless told otherwise, a held clock twenty, a wrong size a frame
-/// or two, and everything else for the rest of the run.
+/// Returns the end of a fault without a given end. A DMA stall lasts a millisecond, a held clock
+/// twenty, a wrong size a frame or two, and all others the rest of the run.
 fn default_end(kind: Kind, from_ns: u64) -> u64 {
     match kind {
         Kind::DcmiOverrun => from_ns + 1_000_000,
@@ -146,23 +147,24 @@ impl fmt::Display for Fault {
 pub struct Faults(Vec<Fault>);
 
 impl Faults {
-    /// The given faults.
+    /// Returns the given faults.
     pub fn new(faults: Vec<Fault>) -> Self {
         Self(faults)
     }
 
-    /// Whether there is a fault of this kind at all.
+    /// Returns whether the run has a fault of this kind.
     pub fn asked_for(&self, kind: Kind) -> bool {
         self.of(kind).next().is_some()
     }
 
-    /// Whether a fault of this kind is on at an instant.
+    /// Returns whether a fault of this kind is on at an instant.
     pub fn on(&self, kind: Kind, now_ns: u64) -> bool {
         self.of(kind)
             .any(|fault| (fault.from_ns..fault.until_ns).contains(&now_ns))
     }
 
-    /// The next instant after `now_ns` at which a fault of this kind begins or ends.
+    /// Returns the next instant after `now_ns` at which a fault of this kind begins or ends; `None`
+    /// if there is none.
     pub fn next_change(&self, kind: Kind, now_ns: u64) -> Option<u64> {
         let instants = self
             .of(kind)

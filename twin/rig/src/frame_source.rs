@@ -1,4 +1,4 @@
-//! Where the camera's pictures come from: a scene, or a test picture.
+//! Sources of the camera's pictures: a scene, or a test picture.
 
 use std::path::Path;
 
@@ -8,12 +8,13 @@ use anyhow::{Context, bail};
 use hivtac_twin::{Format, Options, Preset, PresetCamera, Scene, Shutter};
 use serde_json::{Value, json};
 
-/// How a picture's pixels are coded.
+/// The coding of a picture's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Coding {
     /// RGB565 in native order.
     Rgb565,
-    /// Luma in the low byte; in the high byte Cb in even columns, and Cr in odd ones, of the pair.
+    /// Luma in the low byte. The high byte has the pair's Cb in even columns and its Cr in odd
+    /// ones.
     Yuv422,
     /// Luma in the low byte.
     Mono,
@@ -26,23 +27,23 @@ pub struct Picture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// What the pixels are.
+    /// The pixels' coding.
     pub coding: Coding,
-    /// Row by row.
+    /// Pixels, row by row.
     pub pixels: Vec<u16>,
 }
 
-/// What stands before the camera.
+/// The camera's view.
 pub trait FrameSource: Send + std::fmt::Debug {
-    /// The picture of one exposure. `wanted` is what the sensor sends; a source that does not know
-    /// that gives what it knows.
+    /// Returns the picture of one exposure. `wanted` is the coding that the sensor sends; a source
+    /// without that coding returns its own.
     fn picture(&self, exposed: Exposed, wanted: Coding) -> Picture;
 
-    /// What is true in the middle of it, for the truth log.
+    /// Returns the ground truth at the middle of the exposure, for the truth log.
     fn truth(&self, exposed: Exposed) -> Value;
 }
 
-/// A moving white square over a gradient, every pixel known.
+/// A moving white square over a gradient, with every pixel known.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TestPicture;
 
@@ -74,15 +75,15 @@ impl FrameSource for TestPicture {
     }
 }
 
-/// A simulated sensor, under the eyes of a camera that codes its pixels in any way that it can.
+/// A simulated sensor whose camera can code its pixels in each of its codings.
 #[derive(Debug)]
 pub struct SceneSource {
-    /// In the first of its codings.
+    /// The scene in the first coding.
     usual: Scene,
-    /// And in the second, if it has one.
+    /// The scene in the second coding, if it has one.
     yuv422: Option<Scene>,
-    /// Where in the picture the first pixel is that the firmware asks for: what is true of markers
-    /// is told in its frames.
+    /// Place in the picture of the first pixel of the firmware's frames. The truth gives markers in
+    /// the coordinates of those frames.
     window: [f64; 2],
 }
 
@@ -101,7 +102,7 @@ impl Array {
                 size: (320, 240),
                 window: [0.0; 2],
             },
-            // Binned 2 × 2. The firmware asks for the 160 × 152 in its middle.
+            // Binned 2 × 2. The firmware asks for the middle 160 × 152.
             Kind::Mt9v034 => Self {
                 preset: Preset::Mt9v034,
                 size: (376, 240),
@@ -112,10 +113,10 @@ impl Array {
 }
 
 impl SceneSource {
-    /// The scene of a file (`docs/scene-file.md`), whose frames must be the camera's.
+    /// Loads the scene of a file (`docs/scene-file.md`), whose frames must be the camera's.
     ///
     /// # Errors
-    /// When it cannot be read, is no scene, or has frames of another size.
+    /// If it cannot be read, is not a scene, or has frames of another size.
     pub fn load(path: &Path, camera: Kind) -> anyhow::Result<Self> {
         let array = Array::of(camera);
         let context = || format!("--scene {}", path.display());
@@ -147,10 +148,10 @@ impl SceneSource {
         Self::of(scene, array.window).with_context(context)
     }
 
-    /// A scene by name, under a geometry preset, or the camera's own.
+    /// Returns a scene by name, under a geometry preset, or the camera's own.
     ///
     /// # Errors
-    /// When there is no such scene or preset.
+    /// If there is no such scene or preset.
     pub fn new(name: &str, preset: Option<&str>, seed: u64, camera: Kind) -> anyhow::Result<Self> {
         let array = Array::of(camera);
         let preset = match preset {
@@ -231,7 +232,7 @@ impl FrameSource for SceneSource {
 mod tests {
     use super::*;
 
-    /// What is true of a scene file at 0.2 s: |F| and the place.
+    /// Returns the truth of a scene file at 0.2 s: |F| and the place.
     fn truth(file: &str) -> [Value; 3] {
         let scene = Scene::from_toml(file).unwrap();
         let exposed = Exposed {

@@ -1,9 +1,9 @@
-//! Lines of the emulator's own DMA controllers and time base on a busy bus ([`Kind::BusBusy`]):
-//! each stays up for a while after the write that clears its flag, unless the core reads something
-//! of the peripheral, which waits for the write.
+//! Late interrupt lines of the emulator's own DMA controllers and time base on a busy bus
+//! ([`Kind::BusBusy`]). Each stays up for a while after the write that clears its flag. A read of
+//! the peripheral by the core ends this, because it waits for the write.
 //!
 //! A handler that returns meanwhile is entered again and finds no flag. Only a flag that the core
-//! has read as set keeps its line up: one that was cleared unseen may never have raised it.
+//! has read as set keeps its line up: a flag that was cleared unseen may never have raised it.
 
 use rigless::device::Level;
 use rigless::emulator::{Access, AccessKind};
@@ -18,11 +18,11 @@ use crate::faults::{Faults, Kind};
 struct Flags {
     peripheral: &'static str,
     base: u64,
-    /// Offset of the flags.
+    /// Offset of the flag register.
     status: u64,
-    /// Offset of what clears them.
+    /// Offset of the clearing register.
     clear: u64,
-    /// Clears the flags whose bits are zero, not those whose bits are one.
+    /// Whether zeros clear flags; otherwise ones do.
     by_zeros: bool,
     /// Flags that raise a line, and its position in the peripheral's table.
     lines: &'static [(u64, usize)],
@@ -64,25 +64,25 @@ const ALL: [Flags; 5] = [
 /// A line that is still up.
 #[derive(Debug)]
 struct Held {
-    /// Which of [`ALL`].
+    /// Index into [`ALL`].
     flags: usize,
     mask: u64,
     position: usize,
     falls_ns: u64,
 }
 
-/// Which lines are still up, and what the core has seen.
+/// The lines that are still up, and the flags that the core has seen.
 #[derive(Debug)]
 pub struct LateFlags {
     faults: Faults,
     chance: Chance,
-    /// Flags that the core has read as set, and not cleared since.
+    /// Flags that the core has read as set and has not cleared since.
     seen: [u64; ALL.len()],
     held: Vec<Held>,
 }
 
 impl LateFlags {
-    /// Nothing held; `seed` decides for how long lines are.
+    /// Returns a state without held lines; `seed` decides the time for which lines are held.
     pub fn new(faults: Faults, seed: u64) -> Self {
         Self {
             faults,
@@ -92,7 +92,7 @@ impl LateFlags {
         }
     }
 
-    /// The core has read or written something.
+    /// Handles an access by the core: a read or a write.
     pub fn accessed(&mut self, part: &mut Stm32h743, access: &Access, value: u64) {
         let offset = |flags: &Flags| {
             let within = flags.base..flags.base + BLOCK;
@@ -124,7 +124,7 @@ impl LateFlags {
         self.fall(part, at, |held| at.0 >= held.falls_ns);
     }
 
-    /// The part was reset, which drops all lines.
+    /// Resets the state with the part, which drops all lines.
     pub fn reset(&mut self) {
         self.held.clear();
         self.seen = [0; ALL.len()];
@@ -147,7 +147,7 @@ impl LateFlags {
         }
     }
 
-    /// Lets lines fall, unless a flag came meanwhile that keeps them up.
+    /// Lets lines fall, unless a new flag keeps them up.
     fn fall(&mut self, part: &mut Stm32h743, at: VirtualNanos, which: impl Fn(&Held) -> bool) {
         for held in self.held.extract_if(.., |held| which(held)) {
             let flags = &ALL[held.flags];
@@ -194,7 +194,7 @@ mod tests {
         Access::new(kind, address, Width::W32, 0).at(0, VirtualNanos(1_000))
     }
 
-    /// A part whose core has seen that stream 0 of DMA1 has finished, and clears that at 1 µs.
+    /// Returns a part whose core has seen the end of DMA1's stream 0, and clears that flag at 1 µs.
     fn cleared(faults: &[&str], seen: u64) -> (Stm32h743, LateFlags) {
         let mut part = Stm32h743::new().unwrap();
         let faults = Faults::new(faults.iter().map(|one| one.parse().unwrap()).collect());
@@ -208,7 +208,7 @@ mod tests {
         (part, late)
     }
 
-    /// Levels that the stream's line was put on.
+    /// Returns the levels of the stream's line, in order.
     fn levels(part: &mut Stm32h743) -> Vec<Level> {
         let changes = part.drain_interrupts().into_iter();
         let of_it = changes.filter(|InterruptChange { interrupt, .. }| *interrupt == 11);

@@ -1,13 +1,13 @@
-//! The rig: the very ELF that is flashed, on an emulated STM32H743, with a simulated camera and a
-//! USB host.
+//! The rig: runs the very ELF that is flashed, on an emulated STM32H743, with a simulated camera
+//! and a USB host.
 //!
 //! ```text
 //! scene → camera (OV7725) ─DCMI→ DMA → firmware → OTG FIFOs → USB host → pty, TCP, or a script
 //!            ↑ SCCB, XCLK, power ────────┘
 //! ```
 //!
-//! It reads no symbol of the ELF. Time is virtual: the same firmware, scene, seed and script give
-//! the same bytes. `docs/rig.md` says what is simulated and what is not.
+//! The rig reads no symbol of the ELF. Time is virtual: the same firmware, scene, seed and script
+//! give the same bytes. `docs/rig.md` lists what is simulated and what is not.
 //!
 //! | module | subject |
 //! |---|---|

@@ -1,4 +1,4 @@
-//! The board as the emulator runs it: one microcontroller, and what its core is made as.
+//! The board as the emulator runs it: one microcontroller and the settings of its core.
 
 use std::num::{NonZeroU32, NonZeroU64};
 
@@ -19,13 +19,13 @@ const CORE_HZ: u64 = 480_000_000;
 pub struct Sensor {
     /// The microcontroller.
     pub chip: Chip,
-    /// What the core is assumed to execute in a second of virtual time.
+    /// Instructions that the core is assumed to execute in a second of virtual time.
     pub instructions_per_second: NonZeroU64,
-    /// How the program is entered.
+    /// The way in which the program is entered.
     pub entry: Entry,
 }
 
-/// How a program is entered.
+/// The ways in which a program is entered.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Entry {
     /// By a reset, from flash.
@@ -35,7 +35,7 @@ pub enum Entry {
     Loader,
 }
 
-// Snapshots are not taken.
+// The rig takes no snapshots.
 impl Store for Sensor {}
 
 impl Board for Sensor {

@@ -1,9 +1,9 @@
-//! The memory protection unit (MPU), enforced or not.
+//! The memory protection unit (MPU), enforced or ignored.
 //!
-//! While the emulator's core enforces it, every access of the program is looked up in its regions,
-//! which takes most of a run's time. Where it is not enforced, its registers are here: they take
-//! what the program sets, and nothing is looked up. A program that keeps to its own regions does
-//! the same either way, bit for bit.
+//! While the emulator's core enforces it, every access of the program is checked against its
+//! regions, which takes most of a run's time. If it is ignored, this module has its registers: they
+//! store the program's values, and no access is checked. A program that stays within its own
+//! regions behaves the same in both cases, bit for bit.
 
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -13,15 +13,15 @@ use rigless::device::{DeviceContext, ErasedDevice, RegisterFile, RequestChange};
 use rigless::soc::{Bus, Error, RegisterSpec, Width, Window};
 use rigless::time::EventId;
 
-/// Where its registers are (ARMv7-M, B3.5.4).
+/// Base address of its registers (ARMv7-M, B3.5.4).
 const BASE: u64 = 0xE000_ED90;
 const BYTES: NonZeroU64 = NonZeroU64::new(0x2C).expect("some");
-/// MPU_TYPE, and what it reads as with 16 regions.
+/// MPU_TYPE, and its value with 16 regions.
 const TYPE: u64 = 0;
 const SIXTEEN_REGIONS: u64 = 16 << 8;
-/// MPU_CTRL, and its bit that switches the unit on.
+/// MPU_CTRL, which has the bit that switches the unit on.
 const CTRL: u64 = 4;
-/// MPU_CTRL's address, for who looks at the core's own.
+/// MPU_CTRL's address, for code that checks the core's own register.
 pub const CTRL_ADDRESS: u64 = BASE + CTRL;
 /// MPU_CTRL.ENABLE.
 pub const ENABLE: u64 = 1;
@@ -29,14 +29,14 @@ pub const ENABLE: u64 = 1;
 /// Whether the regions that a program sets are enforced.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Protection {
-    /// By the emulator's core.
+    /// The emulator's core enforces them.
     #[default]
     Enforced,
-    /// Not: several times as fast.
+    /// They are ignored: several times as fast.
     Ignored,
 }
 
-/// Registers of a unit that enforces nothing.
+/// Registers of a unit that is not enforced.
 #[derive(Debug)]
 pub struct Mpu {
     slot: usize,
@@ -45,10 +45,10 @@ pub struct Mpu {
 }
 
 impl Mpu {
-    /// Puts the registers in place of the core's own.
+    /// Replaces the core's own registers by these.
     ///
     /// # Errors
-    /// When something else is there.
+    /// If the addresses are already taken.
     pub fn fit(bus: &mut Bus) -> Result<Self, Error> {
         let slot = bus.add_window(Window::new("MPU", BASE, BYTES))?;
         Ok(Self {
@@ -58,12 +58,12 @@ impl Mpu {
         })
     }
 
-    /// Their place on the bus.
+    /// Returns their slot on the bus.
     pub fn slot(&self) -> usize {
         self.slot
     }
 
-    /// Whether the program has switched the unit on.
+    /// Returns a flag that is set once the program has switched the unit on.
     pub fn is_on(&self) -> Arc<AtomicBool> {
         self.is_on.clone()
     }
@@ -98,7 +98,7 @@ impl ErasedDevice for Mpu {
         self.is_on.store(false, Ordering::Relaxed);
     }
 
-    // It has a window and no register of the part's, and waits for nothing.
+    // It has a window, no register of the part's, and no events.
     fn read(
         &mut self,
         _row: usize,

@@ -1,4 +1,4 @@
-//! What a run did, for people and as JSON.
+//! The report of a run, for people and as JSON.
 
 use std::collections::BTreeSet;
 use std::time::Duration;
@@ -20,7 +20,7 @@ pub struct Report {
     pub virtual_ns: u64,
     /// Wall time.
     pub wall: Duration,
-    /// When the LED went on and off, in turn, ns.
+    /// Times of the LED's switches, on and off in turn, ns.
     pub led_edges_ns: Vec<u64>,
     /// Resets of the microcontroller.
     pub resets: usize,
@@ -28,38 +28,38 @@ pub struct Report {
     pub exposures: u64,
     /// Registers written over SCCB.
     pub sccb_writes: u64,
-    /// Why the sensor sent no rows.
+    /// The reason why the sensor sent no rows.
     pub camera_fault: Option<String>,
-    /// Why the truth log ended early.
+    /// The reason why the truth log ended early.
     pub truth_failure: Option<String>,
-    /// Why the log of arrivals is not whole.
+    /// The reason why the log of arrivals is incomplete.
     pub arrivals_failure: Option<String>,
-    /// The camera interface.
+    /// Counters of the camera interface.
     pub dcmi: dcmi::Counters,
     /// Operations of the flash's second bank.
     pub flash_operations: Vec<Operation>,
     /// Addresses of its words that were read or programmed.
     pub flash_words: BTreeSet<u32>,
-    /// Whether the power was cut in one of them.
+    /// Whether the power was cut during one of the operations.
     pub power_was_cut: bool,
     /// Bytes that the MDMA moved out of memories.
     pub mdma_bytes: u64,
-    /// The USB port at the end.
+    /// The state of the USB port at the end.
     pub port: Port,
-    /// The USB host.
+    /// Counters of the USB host.
     pub usb: usb_host::Counters,
-    /// What happened on the USB port.
+    /// Events on the USB port.
     pub usb_log: Vec<String>,
     /// Words that the firmware wrote into full USB FIFOs.
     pub lost_usb_words: u64,
-    /// Accesses to addresses where the part has nothing, or that a clock gate refused.
+    /// Accesses to addresses without a device, or refused by a clock gate.
     pub refused: Vec<String>,
-    /// What the emulator's models said about settings that the manual forbids.
+    /// Warnings of the emulator's models about settings that the manual forbids.
     pub warnings: Vec<String>,
 }
 
 impl Report {
-    /// Gathers the counters.
+    /// Collects the counters.
     pub(crate) fn new<D: Board>(
         session: &Session<D>,
         chip: &Chip,
@@ -105,12 +105,12 @@ impl Report {
         }
     }
 
-    /// Wall time per captured frame, s; `None` without frames.
+    /// Returns the wall time per captured frame, s; `None` without frames.
     pub fn wall_per_frame_s(&self) -> Option<f64> {
         (self.dcmi.frames > 0).then(|| self.wall.as_secs_f64() / self.dcmi.frames as f64)
     }
 
-    /// As JSON.
+    /// Returns the report as JSON.
     pub fn json(&self) -> Value {
         json!({
             "virtual_s": self.virtual_ns as f64 / 1e9,
@@ -150,7 +150,7 @@ impl Report {
         })
     }
 
-    /// One line for a person.
+    /// Returns one line for a person.
     pub fn line(&self) -> String {
         let per_frame = self
             .wall_per_frame_s()

@@ -1,9 +1,9 @@
-//! Rules of the chip that firmware must not break. The first breach ends the run.
+//! The chip's rules that firmware must not break. The first breach ends the run.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Where a breach is noted.
+/// The record of breaches.
 #[derive(Clone, Debug, Default)]
 pub struct Rules(Arc<Inner>);
 
@@ -21,12 +21,12 @@ impl Rules {
         }
     }
 
-    /// Whether a rule was broken.
+    /// Returns whether a rule was broken.
     pub fn are_broken(&self) -> bool {
         self.0.broken.load(Ordering::Relaxed)
     }
 
-    /// The first breach.
+    /// Returns the first breach; `None` if there was none.
     pub fn first(&self) -> Option<String> {
         self.0
             .what

@@ -31,45 +31,45 @@ use crate::script::Script;
 use crate::truth::TruthLog;
 use crate::usb_host::{Host, SharedHost};
 
-/// Instructions per second that a run assumes unless told otherwise: five in six cycles at 480 MHz.
+/// Default of the instructions per second that a run assumes: five in six cycles at 480 MHz.
 pub const INSTRUCTIONS_PER_SECOND: u64 = 400_000_000;
-/// How often the program on the host's port looks, ns.
+/// Period at which the program on the host's port is served, ns.
 const LOOK_NS: u64 = 1_000_000;
-/// How long a run goes on after its client left, before it waits for the next one, ns.
+/// Time for which a run goes on after its client left, before it waits for the next one, ns.
 const LINGER_NS: u64 = 100_000_000;
-/// How long after a change of clocks or pins they are watched, ns: oscillators and loops take up to
+/// Time for which clocks and pins are checked after a change, ns: oscillators and loops take up to
 /// 2.1 ms.
 const SETTLING_NS: u64 = 10_000_000;
-/// How often, ns: the program may ask for every change without a pause, and neither the camera nor
-/// the host cares for less.
+/// Period of these checks, ns. The program may poll for a change without a pause, but the camera
+/// and the host do not need a finer period.
 const SETTLING_STEP_NS: u64 = 10_000;
 
-/// Who uses the serial port.
+/// The user of the serial port.
 #[derive(Debug)]
 pub enum Program {
-    /// A script, in virtual time; what the device sends is kept.
+    /// A script, in virtual time; the device's bytes are kept.
     Script(Script),
     /// A program on this machine.
     Client {
         /// The port's other end.
         link: Link,
-        /// Start, and go on, only while a client holds the port.
+        /// Whether to start, and go on, only while a client holds the port.
         wait: bool,
-        /// End when the client leaves.
+        /// Whether to end when the client leaves.
         exit_on_hangup: bool,
     },
 }
 
-/// When a run ends by itself.
+/// The limits at which a run ends by itself.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits {
-    /// After so many captured frames.
+    /// Number of captured frames.
     pub frames: Option<u64>,
-    /// After so much virtual time, ns.
+    /// Virtual time, ns.
     pub virtual_ns: Option<u64>,
 }
 
-/// Everything a run needs.
+/// All settings of a run.
 #[derive(Debug)]
 pub struct Options {
     /// The firmware.
@@ -78,30 +78,30 @@ pub struct Options {
     pub board: board::Kind,
     /// The camera on it.
     pub camera: part::Kind,
-    /// What stands before the camera.
+    /// The camera's view.
     pub source: Box<dyn FrameSource>,
-    /// Where the truth goes.
+    /// The truth log.
     pub truth: TruthLog,
-    /// Where it goes when samples arrive.
+    /// The log of the samples' arrivals.
     pub arrivals: Arrivals,
-    /// What goes wrong.
+    /// The faults.
     pub faults: Faults,
-    /// The flash's second bank: its contents are read from this file, where there is one, and
+    /// File of the flash's second bank. Its contents are read from this file, if it exists, and
     /// written to it at the end.
     pub flash: Option<PathBuf>,
-    /// When the power is cut, which ends the run.
+    /// The cut of the power, which ends the run.
     pub cut: Option<Cut>,
-    /// Decides what a data sheet leaves open.
+    /// Decides the values that a data sheet leaves open.
     pub seed: u64,
-    /// Of the silicon.
+    /// Revision of the silicon.
     pub revision: Revision,
-    /// How the program is entered.
+    /// The way in which the program is entered.
     pub entry: Entry,
     /// Whether the program's own regions of memory are enforced.
     pub protection: Protection,
-    /// Who uses the port.
+    /// The user of the port.
     pub program: Program,
-    /// When to end.
+    /// The limits.
     pub limits: Limits,
     /// Instructions per second of virtual time.
     pub instructions_per_second: NonZeroU64,
@@ -109,19 +109,20 @@ pub struct Options {
     pub interrupt: Arc<AtomicBool>,
 }
 
-/// What a run leaves.
+/// The results of a run.
 #[derive(Debug)]
 pub struct Outcome {
-    /// What the device sent, when a script read it.
+    /// The device's bytes, if a script read them.
     pub bytes: Vec<u8>,
     /// Counters.
     pub report: Report,
 }
 
-/// Runs the firmware until a limit, the client's leaving, an interrupt, or a broken rule.
+/// Runs the firmware until a limit, the client's departure, an interrupt, or a broken rule.
 ///
 /// # Errors
-/// When the firmware cannot be loaded, a rule of the chip was broken, or the emulator gave up.
+/// If the firmware cannot be loaded, a rule of the chip was broken, or the emulator stopped with an
+/// error.
 pub fn run(options: Options) -> anyhow::Result<Outcome> {
     let contents = match &options.flash {
         Some(file) if file.exists() => Contents::load(file)?,
@@ -211,15 +212,15 @@ fn load(path: &Path) -> anyhow::Result<Image> {
 /// Whether a client holds the port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Client {
-    /// None has come yet.
+    /// No client has come yet.
     None,
-    /// One is there.
+    /// A client is there.
     Here,
-    /// It left at this virtual time.
+    /// The client left at this virtual time.
     Left(u64),
 }
 
-/// Watches the firmware's accesses, moves the port's bytes, and ends the run.
+/// Observes the firmware's accesses, moves the port's bytes, and ends the run.
 struct Conductor {
     host: SharedHost,
     camera: SharedCamera,
@@ -232,14 +233,15 @@ struct Conductor {
     interrupt: Arc<AtomicBool>,
     bytes: Vec<u8>,
     client: Client,
-    /// Until then clocks or pins may change by themselves, ns.
+    /// Time until which clocks or pins may change by themselves, ns.
     settling_until: u64,
-    /// When they are looked at next, ns.
+    /// Time of their next check, ns.
     next_look: u64,
     settled_at_ns: u64,
 }
 
-/// How long a write changes the board's wiring: not, now, or until clocks have settled.
+/// Returns the time for which a write changes the board's wiring: `None` for not at all, 0 for now,
+/// or the settling time of clocks.
 fn settles_in(address: u64) -> Option<u64> {
     match address {
         // GPIOA to GPIOE
@@ -331,7 +333,7 @@ impl Conductor {
         }
     }
 
-    /// The port's program has its turn. Answers whether the run goes on.
+    /// Serves the port's program. Returns whether the run goes on.
     fn serve(&mut self, now: u64) -> bool {
         match &mut self.program {
             Program::Script(script) => {
@@ -344,8 +346,8 @@ impl Conductor {
         }
     }
 
-    /// Gives the client its turn, and holds the run up as long as it has to wait. Answers whether
-    /// the run goes on.
+    /// Serves the client, and holds the run as long as it has to wait. Returns whether the run goes
+    /// on.
     fn serve_client(&mut self, now: u64) -> bool {
         while !self.interrupt.load(Ordering::Relaxed) {
             self.client = self.look_for_client(now);
@@ -401,7 +403,7 @@ impl Conductor {
     }
 }
 
-/// What follows from a client's turn.
+/// The result of serving a client.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Turn {
     /// The run goes on.

@@ -1,5 +1,5 @@
-//! A scripted host: what it does, and when, in virtual time. With it a run is the same bytes every
-//! time.
+//! A scripted host: its actions and their times, in virtual time. With a script, a run gives the
+//! same bytes every time.
 //!
 //! One action per line, `MS ACTION`, times in milliseconds (fractions allowed) in any order:
 //!
@@ -21,22 +21,22 @@ use anyhow::{Context, bail};
 
 use crate::usb_host::Host;
 
-/// What a scripted host can do.
+/// An action of a scripted host.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Action {
     /// Open the port.
     Open,
-    /// Close it.
+    /// Close the port.
     Close,
     /// Send bytes.
     Send(Vec<u8>),
-    /// Read what comes.
+    /// Read the device's bytes.
     Read,
-    /// Leave what comes where it is.
+    /// Do not read the device's bytes.
     StopReading,
     /// Plug the cable in.
     Plug,
-    /// Pull it.
+    /// Pull the cable.
     Unplug,
     /// A control transfer, by its SETUP packet.
     Request([u8; 8]),
@@ -47,7 +47,7 @@ pub enum Action {
 pub struct Script(Vec<(u64, Action)>);
 
 impl Script {
-    /// A script of (virtual time in ns, action).
+    /// Returns a script of (virtual time in ns, action).
     pub fn new(mut actions: Vec<(u64, Action)>) -> Self {
         actions.sort_by_key(|(at, _)| *at);
         Self(actions)
@@ -56,17 +56,17 @@ impl Script {
     /// Reads a script file.
     ///
     /// # Errors
-    /// When it cannot be read, or a line makes no sense.
+    /// If it cannot be read, or a line is invalid.
     pub fn load(path: &Path) -> anyhow::Result<Self> {
         let text =
             std::fs::read_to_string(path).with_context(|| format!("script {}", path.display()))?;
         Self::parse(&text).with_context(|| format!("script {}", path.display()))
     }
 
-    /// Reads a script.
+    /// Reads a script from its text.
     ///
     /// # Errors
-    /// When a line makes no sense.
+    /// If a line is invalid.
     pub fn parse(text: &str) -> anyhow::Result<Self> {
         let lines = text
             .lines()
@@ -78,12 +78,12 @@ impl Script {
         Ok(Self::new(actions.collect::<anyhow::Result<_>>()?))
     }
 
-    /// The time of the next action, ns.
+    /// Returns the time of the next action, ns; `None` if no action is left.
     pub fn next_at(&self) -> Option<u64> {
         self.0.first().map(|(at, _)| *at)
     }
 
-    /// Does what is due.
+    /// Carries out the actions that are due.
     pub fn run(&mut self, now_ns: u64, host: &mut Host) {
         let due = self.0.iter().take_while(|(at, _)| *at <= now_ns).count();
         for (_, action) in self.0.drain(..due) {

@@ -1,10 +1,10 @@
-//! What a run translated of its program, kept for the next run of that program in this process.
+//! Keeps a run's translation of its program for the next run of that program in this process.
 //!
-//! The emulator translates instructions as they are first run, which takes more than half of a
-//! short run's time. When a program has copied itself to where it runs and switches on the memory
-//! protection unit (MPU), soon after its start, a core that has run the same program before takes
-//! over, with the state of the one that it replaces. Translations change nothing but how long a run
-//! takes.
+//! The emulator translates instructions when they are first run, which takes more than half of a
+//! short run's time. Soon after its start, a program has copied itself to where it runs and
+//! switches on the memory protection unit (MPU). At that point a core that has run the same program
+//! before takes over, with the state of the core that it replaces. Translations change only the
+//! duration of a run.
 #![expect(
     unsafe_code,
     reason = "a core is handed the memory of a run by pointers"
@@ -21,18 +21,19 @@ use rigless::time::VirtualNanos;
 
 use crate::mpu;
 
-/// Where programs run: ITCM, the flash's first bank, the ROM. Translations of other addresses are
-/// not kept.
+/// Memory in which programs run: ITCM, the flash's first bank, the ROM. Translations of other
+/// addresses are not kept.
 const CODE: [Range<u64>; 3] = [
     0..0x1_0000,
     0x0800_0000..0x0810_0000,
     0x1FF0_0000..0x1FF2_0000,
 ];
-/// The most cores kept: some programs, by as many threads as a computer for tests has.
+/// The largest number of kept cores: several programs, on as many threads as a computer for tests
+/// has.
 const MOST_KEPT: usize = 6;
 
-/// Has the cores of a board keep what they translate. `is_on` tells whether a program has switched
-/// the MPU on where the core itself has none to look at.
+/// Makes the cores of a board keep their translations. `is_on` shows whether a program has switched
+/// the MPU on; it is needed if the core itself has no MPU to check.
 pub fn keep(spec: &mut CoreSpec, is_on: Option<Arc<AtomicBool>>) {
     let make = spec.processor.clone();
     spec.processor = Arc::new(move |endian| {
@@ -58,7 +59,7 @@ struct Mapped {
 unsafe impl Send for Mapped {}
 
 impl Mapped {
-    /// The bytes of it that lie in `range`.
+    /// Returns the part of its bytes that lies in `range`.
     fn bytes(&self, range: &Range<u64>) -> &[u8] {
         let start = range.start.max(self.start);
         let end = range.end.min(self.start + self.length);
@@ -76,18 +77,18 @@ impl Mapped {
     }
 }
 
-/// What translations hold for.
+/// The conditions for which translations are valid.
 #[derive(Debug, PartialEq, Eq)]
 struct Program {
-    /// Of its bytes.
+    /// Hash of the program's bytes.
     hash: u64,
-    /// Start, length and whether it is writable of all memory.
+    /// Start, length and whether it is writable, for all memory.
     memory: Vec<(u64, u64, bool)>,
     /// Whether the core enforces the MPU's regions.
     is_enforced: bool,
 }
 
-/// Cores that no run uses now, the one that was used last at the end.
+/// Cores that no run uses now; the one that was used last is at the end.
 type Kept = Vec<(Program, Box<dyn Processor>)>;
 
 static KEPT: Mutex<Kept> = Mutex::new(Vec::new());
@@ -98,11 +99,11 @@ fn kept() -> MutexGuard<'static, Kept> {
 
 #[derive(Debug)]
 struct Core {
-    /// There is one until this is dropped.
+    /// Always present until this is dropped.
     inner: Option<Box<dyn Processor>>,
     mapped: Vec<Mapped>,
     is_on: Option<Arc<AtomicBool>>,
-    /// The program when the MPU was switched on, from then on.
+    /// The program at the time when the MPU was switched on; present from then on.
     program: Option<Program>,
 }
 
@@ -138,7 +139,7 @@ impl Core {
         control.is_some_and(|control| control & mpu::ENABLE != 0)
     }
 
-    /// A kept core goes on in place of this one, if there is one for this program.
+    /// Replaces this core by a kept one, if there is one for this program.
     fn hand_over(&mut self) {
         let program = self.program_now();
         let found = {
@@ -182,7 +183,7 @@ impl Drop for Core {
     }
 }
 
-/// All that a run without a debugger asks of a core.
+/// All that a run without a debugger needs of a core.
 impl Processor for Core {
     fn run(&mut self, budget: u32, bus: &mut dyn CoreBus) -> (Exit, u64) {
         let ran = self.inner_mut().run(budget, bus);

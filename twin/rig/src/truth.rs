@@ -1,5 +1,4 @@
-//! The truth log: one JSON object per exposure, for whoever compares it with what the firmware
-//! says.
+//! The truth log: one JSON object per exposure, for comparison with the firmware's results.
 
 use std::fs::File;
 use std::io::Write;
@@ -9,7 +8,7 @@ use anyhow::Context;
 use hivtac_twin::Shutter;
 use serde_json::{Value, json};
 
-/// Where the truth goes. It never enters the firmware.
+/// The truth log and its file, if it has one. The truth never enters the firmware.
 #[derive(Debug, Default)]
 pub struct TruthLog {
     file: Option<File>,
@@ -20,28 +19,27 @@ pub struct TruthLog {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Exposed {
     /// Ends of VSYNC pulses since the camera's first register reset after the microcontroller's
-    /// reset; the first one is
-    /// 1. Zero before that.
+    /// reset, counted from 1. Zero before that.
     pub frame: u64,
-    /// Ends of VSYNC pulses since the run began: what the scene's noise depends on.
+    /// Ends of VSYNC pulses since the run began. The scene's noise depends on it.
     pub exposure: u64,
     /// Virtual time of the edge, ns.
     pub at_ns: u64,
     /// Virtual time of the middle of the exposure of the middle row, ns.
     pub middle_ns: u64,
-    /// How long each row is exposed, ns.
+    /// Exposure time of each row, ns.
     pub exposure_ns: u64,
-    /// From the exposure of the first row to that of one below the last, ns.
+    /// Time from the exposure of the first row to that of a row just below the last, ns.
     pub readout_ns: u64,
 }
 
 impl Exposed {
-    /// The time the scene was asked for, s.
+    /// Returns the time in the scene, s.
     pub fn time_s(&self) -> f64 {
         self.middle_ns as f64 / 1e9
     }
 
-    /// When which row was exposed.
+    /// Returns when each row was exposed.
     pub fn shutter(&self) -> Shutter {
         Shutter {
             exposure_s: self.exposure_ns as f64 / 1e9,
@@ -51,10 +49,10 @@ impl Exposed {
 }
 
 impl TruthLog {
-    /// A log in a file, which is emptied first.
+    /// Returns a log in a file, which is emptied first.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn create(path: &Path) -> anyhow::Result<Self> {
         let file = File::create(path).with_context(|| format!("truth log {}", path.display()))?;
         Ok(Self {
@@ -63,12 +61,12 @@ impl TruthLog {
         })
     }
 
-    /// Whether anybody reads it.
+    /// Returns whether the log has a file.
     pub fn wanted(&self) -> bool {
         self.file.is_some()
     }
 
-    /// Writes one exposure, at once, so that a reader that follows the file sees it.
+    /// Writes one exposure, at once: a reader that follows the file sees it.
     pub fn exposed(&mut self, exposed: Exposed, truth: Value) {
         let Some(file) = &mut self.file else { return };
         let mut line = json!({
@@ -82,14 +80,14 @@ impl TruthLog {
         if let (Some(line), Value::Object(truth)) = (line.as_object_mut(), truth) {
             line.extend(truth);
         }
-        // In one piece, for who reads meanwhile.
+        // In one piece, for readers that read meanwhile.
         if let Err(error) = file.write_all(format!("{line}\n").as_bytes()) {
             self.failed = Some(error.to_string());
             self.file = None;
         }
     }
 
-    /// Why the log ended early.
+    /// Returns the reason why the log ended early; `None` if it did not.
     pub fn failure(&self) -> Option<&str> {
         self.failed.as_deref()
     }
@@ -100,7 +98,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::{AtomicBool, Ordering};
 
-    /// But where it crosses a page of the file system's memory.
+    /// Except for a line that crosses a page of the file system's memory.
     #[test]
     fn who_reads_meanwhile_finds_whole_lines() {
         const LINES: u64 = 2_000;

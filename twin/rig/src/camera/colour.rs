@@ -1,10 +1,10 @@
-//! What the sensor's registers make of brightness and colours.
+//! The effect of the OV7725's registers on brightness and colours.
 //!
-//! The scene's pixels are what the sensor sends at the settings of OmniVision's application note:
+//! The scene's pixels are those of the sensor at the settings of OmniVision's application note:
 //! equal gains, its colour matrix, levels in proportion to light, well exposed. Other settings
-//! change them from there. Gains act before the matrix, which gives Cr and Cb from red, green and
-//! blue; luma is theirs by BT.601. Not simulated: the sensor's own filters and noise, automatic
-//! white balance, lens correction, edges, hue and special effects.
+//! change the pixels relative to these. Gains act before the matrix, which gives Cr and Cb from
+//! red, green and blue; luma follows from them by BT.601. Not simulated: the sensor's own filters
+//! and noise, automatic white balance, lens correction, edges, hue and special effects.
 
 use super::registers::{self as reg, Registers};
 use crate::frame_source::{Coding, Picture};
@@ -33,7 +33,7 @@ const SATURATION: u8 = 0x02;
 const GAINS_APPLIED: u8 = 0x80;
 const UNITY_IS_0X40: u8 = 0x02;
 
-/// From the scene's colours to those that are sent.
+/// The map from the scene's colours to those that are sent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Colour {
     /// Red, green, blue to red, green, blue.
@@ -45,7 +45,8 @@ pub struct Colour {
 }
 
 impl Colour {
-    /// What the registers say, for a picture that is `exposed` as well as it should be, times.
+    /// Returns the map for the registers. `exposed` is the light of the picture over the light that
+    /// exposes it well.
     pub fn of(registers: &Registers, exposed: f64) -> Self {
         let control = registers.get(reg::DSP_CTRL1);
         let gains = gains(registers);
@@ -74,7 +75,7 @@ impl Colour {
         }
     }
 
-    /// Whether it leaves every picture as it is.
+    /// Returns whether it leaves every picture unchanged.
     pub fn is_plain(&self) -> bool {
         let unit = |(i, row): (usize, &[f64; 3])| {
             let terms = row.iter().enumerate();
@@ -83,11 +84,11 @@ impl Colour {
                 .fold(0.0, f64::max)
         };
         let off = self.linear.iter().enumerate().map(unit);
-        // The coefficients are whole numbers and their inverse is not.
+        // The coefficients are whole numbers; those of their inverse are not.
         off.fold(0.0, f64::max) < 1e-6 && self.brightness == 0.0 && self.curve.is_none()
     }
 
-    /// The picture that is sent.
+    /// Returns the picture that is sent.
     pub fn apply(&self, mut picture: Picture) -> Picture {
         if self.is_plain() {
             return picture;
@@ -98,7 +99,7 @@ impl Colour {
                     *pixel = rgb565(self.seen(rgb(*pixel)));
                 }
             }
-            // Only of a camera that sees no colours.
+            // Only cameras without colours have this coding.
             Coding::Mono => {}
             Coding::Yuv422 => {
                 for pair in picture.pixels.chunks_exact_mut(2) {
@@ -109,7 +110,7 @@ impl Colour {
         picture
     }
 
-    /// Two pixels of YUV422: luma in the low bytes, Cb and Cr in the high ones.
+    /// Changes two pixels of YUV422: luma in the low bytes, Cb and Cr in the high ones.
     fn apply_to_pair(&self, pair: &mut [u16]) {
         let bytes = [pair[0].to_le_bytes(), pair[1].to_le_bytes()];
         let chroma = [bytes[0][1], bytes[1][1]].map(|c| f64::from(c) - 128.0);
@@ -137,7 +138,7 @@ impl Colour {
     }
 }
 
-/// Of red, green and blue.
+/// Returns the gains of red, green and blue.
 fn gains(registers: &Registers) -> [f64; 3] {
     if registers.get(reg::AWB_CTRL0) & GAINS_APPLIED == 0 {
         return [1.0; 3];
@@ -149,7 +150,7 @@ fn gains(registers: &Registers) -> [f64; 3] {
     [reg::RED, reg::GREEN, reg::BLUE].map(|gain| f64::from(registers.get(gain)) / unity)
 }
 
-/// Coefficients 1 to 6 of the colour matrix with their signs, which every source has alike.
+/// Returns coefficients 1 to 6 of the colour matrix with their signs, on which all sources agree.
 fn coefficients(registers: &Registers) -> [f64; 6] {
     let doubled = registers.get(reg::MTX_CTRL) & DOUBLED != 0;
     let strength = if doubled { 2.0 } else { 1.0 };
@@ -160,13 +161,14 @@ fn coefficients(registers: &Registers) -> [f64; 6] {
     })
 }
 
-/// Luma, Cb and Cr of the sensor's own red, green, blue, by coefficients in 256ths.
+/// Returns the matrix from the sensor's own red, green, blue to luma, Cb and Cr, by coefficients in
+/// 256ths.
 fn from_raw(coefficients: &[f64; 6]) -> Matrix {
     let [r1, g1, b1, r2, g2, b2] = coefficients.map(|coefficient| coefficient / 256.0);
     [BT601[0], [r2, g2, b2], [r1, g1, b1]]
 }
 
-/// Factor of luma, and what is added to it.
+/// Returns the factor of luma, and the value added to it.
 fn contrast(registers: &Registers, control: u8) -> (f64, f64) {
     let effects = registers.get(reg::SDE);
     if control & SPECIAL_EFFECTS == 0 || effects & CONTRAST_AND_BRIGHTNESS == 0 {
@@ -176,7 +178,7 @@ fn contrast(registers: &Registers, control: u8) -> (f64, f64) {
     (contrast, f64::from(registers.get(reg::BRIGHT)))
 }
 
-/// Factors of Cb and Cr.
+/// Returns the factors of Cb and Cr.
 fn saturation(registers: &Registers, control: u8) -> [f64; 2] {
     let effects = registers.get(reg::SDE);
     if control & SPECIAL_EFFECTS == 0 || effects & SATURATION == 0 {
@@ -185,7 +187,7 @@ fn saturation(registers: &Registers, control: u8) -> [f64; 2] {
     [reg::USAT, reg::VSAT].map(|address| f64::from(registers.get(address)) / 64.0)
 }
 
-/// Output of each level, by fifteen points in between.
+/// Returns the output of each level, by fifteen points in between.
 fn curve(registers: &Registers) -> Vec<u8> {
     const INPUTS: [u16; 15] = [4, 8, 16, 32, 40, 48, 56, 64, 72, 80, 96, 112, 144, 176, 208];
     let outputs = (reg::GAM1..).map(|address| u16::from(registers.get(address)));
@@ -229,7 +231,7 @@ fn product(a: &Matrix, b: &Matrix) -> Matrix {
     std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]))
 }
 
-/// By cofactors; `m` is not singular.
+/// Returns the inverse by cofactors; `m` must not be singular.
 fn inverse(m: &Matrix) -> Matrix {
     let minor = |i: usize, j: usize| {
         let [r0, r1] = [(i + 1) % 3, (i + 2) % 3];
@@ -244,7 +246,7 @@ fn inverse(m: &Matrix) -> Matrix {
 mod tests {
     use super::*;
 
-    /// Gains of one, the application note's matrix, no gamma, no effects.
+    /// Returns registers with gains of one, the application note's matrix, no gamma, no effects.
     fn application_note() -> Registers {
         let mut registers = Registers::default();
         let matrix = [0xB0, 0x9D, 0x13, 0x16, 0x7B, 0x91, 0x1E];

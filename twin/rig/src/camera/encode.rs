@@ -1,4 +1,4 @@
-//! Pixels as bytes on the sensor's data lines.
+//! Encodes pixels as bytes on the OV7725's data lines.
 
 use super::output::{Format, Output};
 use crate::frame_source::{Coding, Picture};
@@ -7,8 +7,8 @@ use crate::frame_source::{Coding, Picture};
 const FLIP: u8 = 0x80;
 const MIRROR: u8 = 0x40;
 const SWAP_RED_BLUE: u8 = 0x20;
-/// Luma before chroma. The data sheet calls it "swap Y/UV" and leaves open from what; common
-/// drivers of the sensor set it for Y Cb Y Cr, and it is set after power-up.
+/// Luma before chroma. The data sheet calls it "swap Y/UV" without the order that it starts from.
+/// Common drivers of the sensor set it for Y Cb Y Cr, and it is set after power-up.
 const LUMA_FIRST: u8 = 0x10;
 const REVERSE_BITS: u8 = 0x08;
 const COLOUR_BARS: u8 = 0x01;
@@ -25,7 +25,7 @@ const BARS: [[u8; 3]; 8] = [
     [0, 0, 0],
 ];
 
-/// The bytes of one row, as `output` says, of a picture of the whole pixel array.
+/// Returns the bytes of one row, as `output` defines them, of a picture of the whole pixel array.
 pub fn row(output: &Output, picture: &Picture, row: u32) -> Vec<u8> {
     let columns = 0..output.window.output[0];
     let bars = output.com3 & COLOUR_BARS != 0;
@@ -52,7 +52,7 @@ pub fn row(output: &Output, picture: &Picture, row: u32) -> Vec<u8> {
     bytes
 }
 
-/// Red, green, blue of one output pixel. Outside the array it is black.
+/// Returns red, green, blue of one output pixel; black outside the array.
 fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
     if output.com3 & COLOUR_BARS != 0 {
         return BARS[(column * 8 / output.window.output[0]) as usize];
@@ -64,8 +64,8 @@ fn pixel(output: &Output, picture: &Picture, column: u32, row: u32) -> [u8; 3] {
     }
 }
 
-/// Luma of one output pixel, and Cb and Cr of its pair, of a picture that has them. Outside the
-/// array it is black.
+/// Returns the luma of one output pixel, and Cb and Cr of its pair, of a picture in YUV422. The
+/// result is black outside the array.
 fn luma_and_chroma(output: &Output, picture: &Picture, column: u32, row: u32) -> (u8, [u8; 2]) {
     let Some(place) = place(output, picture, column, row) else {
         return (0, [128; 2]);
@@ -75,7 +75,7 @@ fn luma_and_chroma(output: &Output, picture: &Picture, column: u32, row: u32) ->
     (bytes(place)[0], chroma)
 }
 
-/// Which pixel of the picture is sent; `None` outside the array.
+/// Returns the index of the picture's pixel that is sent; `None` outside the array.
 fn place(output: &Output, picture: &Picture, column: u32, row: u32) -> Option<usize> {
     let window = &output.window;
     let [columns, rows] = window.output;
@@ -85,7 +85,7 @@ fn place(output: &Output, picture: &Picture, column: u32, row: u32) -> Option<us
         column
     };
     let row = if output.com3 & FLIP != 0 {
-        // A faulty sensor sends rows beyond the last one; they are black.
+        // A faulty sensor sends black rows after the last one.
         (rows - 1).checked_sub(row).unwrap_or(rows)
     } else {
         row
@@ -142,8 +142,8 @@ fn encode(output: &Output, pixels: &[[u8; 3]], row: u32) -> Vec<u8> {
     }
 }
 
-/// Pixels as they travel, from the luma of each and Cb and Cr; those of the first pixel of a pair
-/// are sent.
+/// Returns pixels in the order of the lines, from each one's luma, Cb and Cr. Of a pair, Cb and Cr
+/// of the first pixel are sent.
 fn yuv(output: &Output, pixels: impl Iterator<Item = (u8, [u8; 2])>) -> Vec<u8> {
     let mut bytes = Vec::new();
     let mut chroma = [128; 2];
@@ -163,7 +163,7 @@ fn yuv(output: &Output, pixels: impl Iterator<Item = (u8, [u8; 2])>) -> Vec<u8> 
     bytes
 }
 
-/// Luma, and Cb and Cr: ITU-R BT.601, full range.
+/// Returns luma, and Cb and Cr: ITU-R BT.601, full range.
 fn ycbcr(pixel: [u8; 3]) -> (u8, [u8; 2]) {
     let [r, g, b] = pixel.map(i32::from);
     let y = (19_595 * r + 38_470 * g + 7_471 * b + 32_768) >> 16;

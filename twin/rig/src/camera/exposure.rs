@@ -1,15 +1,15 @@
-//! The sensor's automatic exposure and gain, frame by frame.
+//! The OV7725's automatic exposure and gain, frame by frame.
 //!
-//! The loop moves half of the way each frame, as a ratio, and stands still where the picture is
-//! well exposed. Exposure comes before gain. Not simulated: the stable region's width, banding,
-//! what of the picture is evaluated.
+//! In each frame the loop moves half of the way, as a ratio, and stops at a well exposed picture.
+//! It changes exposure before gain. Not simulated: the width of the stable region, banding, and the
+//! selection of pixels for the control.
 
 use super::output::Output;
 use super::registers::{self as reg, Registers};
 
-/// The simulated light exposes the film well in this time at a gain of one, ns.
+/// Exposure time, ns, at which the simulated light exposes the film well with a gain of one.
 const WELL_EXPOSED_NS: f64 = 4_000_000.0;
-/// Within this of well exposed, the loop stops there.
+/// Relative distance from well exposed at which the loop stops.
 const CLOSE: f64 = 0.03;
 
 /// COM8 bits.
@@ -19,14 +19,14 @@ const AUTOMATIC_EXPOSURE: u8 = 0x01;
 /// The exposure and gain in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposure {
-    /// Lines.
+    /// Exposure in lines.
     lines: f64,
-    /// Times.
+    /// Gain as a factor.
     gain: f64,
 }
 
 impl Exposure {
-    /// What the registers say, as after a reset.
+    /// Returns the exposure and gain in the registers, as after a reset.
     pub fn of(registers: &Registers) -> Self {
         let lines = u16::from_be_bytes([registers.get(reg::AECH), registers.get(reg::AEC)]);
         Self {
@@ -35,13 +35,13 @@ impl Exposure {
         }
     }
 
-    /// How long each row is exposed, lines.
+    /// Returns the exposure of each row, in lines.
     pub fn lines(&self) -> u64 {
         self.lines as u64
     }
 
-    /// Light of the next frame over what exposes it well; what is automatic has moved, and the
-    /// registers tell it.
+    /// Lets automatic exposure and gain move and updates their registers. Returns the light of the
+    /// next frame over the light that exposes it well.
     pub fn next(&mut self, registers: &mut Registers, output: &Output) -> f64 {
         let control = registers.get(reg::COM8);
         let line_ns = output.clocks_ns(u64::from(output.line_clocks)) as f64;
@@ -60,7 +60,7 @@ impl Exposure {
         }
         if control & AUTOMATIC_GAIN != 0 {
             let ceiling = f64::from(2u32 << (registers.get(reg::COM9) >> 4 & 7));
-            // Exposure comes before gain, where it is automatic.
+            // If exposure is automatic, it changes before gain.
             let lines = match control & AUTOMATIC_EXPOSURE {
                 0 => self.lines.max(1.0),
                 _ => f64::from(output.lines),
@@ -91,7 +91,7 @@ fn approach(value: f64, wanted: f64, most: f64) -> f64 {
     moved.min(most)
 }
 
-/// GAIN: four bits that each double, and sixteenths.
+/// Returns the gain of a register value: four bits that each double it, and sixteenths.
 fn gain_of(code: u8) -> f64 {
     let doublings = (code >> 4).count_ones();
     f64::from(1u32 << doublings) * (1.0 + f64::from(code & 15) / 16.0)

@@ -1,16 +1,16 @@
 //! The camera, an OV7725 or an MT9V034: registers on its control bus, a clock from the
 //! microcontroller, and pixels that its registers describe.
 //!
-//! The sensor runs by itself. It never waits for the firmware, and what it sends follows from its
-//! registers, power-up values included. Geometry, format and clock are taken over at the start of a
-//! frame; a register reset, a change of the input clock and power-up start the frame timing afresh,
-//! and the first VSYNC edge comes one frame later.
+//! The sensor runs by itself. It never waits for the firmware, and its registers, power-up values
+//! included, decide what it sends. Geometry, format and clock take effect at the start of a frame.
+//! A register reset, a change of the input clock and power-up restart the frame timing; the first
+//! VSYNC edge comes one frame later.
 //!
-//! OV7725: exposure, gain and colours follow the registers (`exposure`, `colour`). Registers that
-//! sources disagree about hold other values for each seed after a reset; capturing a frame that
-//! depends on one that was never written breaks a rule. Not simulated: the zoom registers (the
-//! window is scaled to the output size by taking the nearest pixel), automatic frame rate,
-//! automatic white balance. MT9V034: `mt9v034`.
+//! OV7725: exposure, gain and colours follow the registers (`exposure`, `colour`). A register whose
+//! reset value differs between sources gets another value for each seed. It breaks a rule to
+//! capture a frame that depends on such a register before it was written. Not simulated: the zoom
+//! registers (the window is scaled to the output size by taking the nearest pixel), automatic frame
+//! rate, automatic white balance. MT9V034: `mt9v034`.
 
 pub mod colour;
 pub mod encode;
@@ -37,11 +37,11 @@ use part::Part;
 pub use sccb::Sccb;
 pub use two_wire::TwoWire;
 
-/// Rows that a frame has too many under [`Kind::FrameLong`]; there is room for eight before the
-/// next VSYNC.
+/// Surplus rows of a frame under [`Kind::FrameLong`]; there is room for eight before the next
+/// VSYNC.
 const SURPLUS_ROWS: u32 = 5;
 
-/// What the board gives the sensor.
+/// The supplies and signals that the board gives to the sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Supply {
     /// The camera's power switch is on.
@@ -74,7 +74,7 @@ pub struct Camera {
     forgot: bool,
 }
 
-/// The sensor as its pins' owners share it.
+/// The sensor, shared by the owners of its pins.
 #[derive(Clone, Debug)]
 pub struct SharedCamera(Arc<Mutex<Camera>>);
 
@@ -84,14 +84,15 @@ impl SharedCamera {
         Self(Arc::new(Mutex::new(camera)))
     }
 
-    /// The sensor. One thread runs the whole rig, so nobody waits here.
+    /// Locks the sensor. One thread runs the whole rig, therefore the lock never waits.
     pub fn lock(&self) -> MutexGuard<'_, Camera> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Camera {
-    /// A sensor in power-down, looking at `source`. `seed` decides what no source agrees about.
+    /// Returns a sensor in power-down that looks at `source`. `seed` decides the values on which
+    /// sources disagree.
     pub fn new(
         kind: part::Kind,
         source: Box<dyn FrameSource>,
@@ -123,12 +124,12 @@ impl Camera {
         }
     }
 
-    /// Which one it is.
+    /// Returns the kind of camera.
     pub fn kind(&self) -> part::Kind {
         self.kind
     }
 
-    /// Takes over what the board gives the sensor. In power-down it stands by: its registers stay.
+    /// Applies the board's supply. In power-down the sensor stands by and keeps its registers.
     pub fn supply(&mut self, supply: Supply) {
         if supply == self.supply {
             return;
@@ -141,7 +142,7 @@ impl Camera {
         self.restarted |= timed(before) != timed(supply);
     }
 
-    /// The frame timing starts afresh now.
+    /// Restarts the frame timing now.
     pub fn restart(&mut self) {
         self.restarted = false;
         if std::mem::take(&mut self.count_begins) {
@@ -149,22 +150,22 @@ impl Camera {
         }
     }
 
-    /// The microcontroller was reset: frames count from the next register reset on.
+    /// Resets the count of frames with the microcontroller: it starts at the next register reset.
     pub fn host_reset(&mut self) {
         self.counting = false;
     }
 
-    /// Whether the frame timing has to start afresh.
+    /// Returns whether the frame timing has to restart.
     pub fn restarts(&self) -> bool {
         self.restarted
     }
 
-    /// Whether a fault keeps the sensor from sending anything.
+    /// Returns whether a fault keeps the sensor silent.
     pub fn silenced(&self, now_ns: u64) -> bool {
         self.faults.on(Kind::CameraAbsent, now_ns) || self.faults.on(Kind::CameraSilent, now_ns)
     }
 
-    /// What the sensor sends from `now_ns` on; `None` while it sends nothing.
+    /// Returns the sensor's output from `now_ns` on; `None` while it sends nothing.
     pub fn output(&self, now_ns: u64) -> Option<Output> {
         if self.silenced(now_ns) || !self.supply.powered || self.supply.reset {
             return None;
@@ -182,7 +183,7 @@ impl Camera {
         Some(output)
     }
 
-    /// The next instant at which a fault starts or stops the sensor.
+    /// Returns the next instant at which a fault starts or stops the sensor.
     pub fn next_fault(&self, now_ns: u64) -> Option<u64> {
         let change = |kind| self.faults.next_change(kind, now_ns);
         [change(Kind::CameraAbsent), change(Kind::CameraSilent)]
@@ -191,7 +192,7 @@ impl Camera {
             .min()
     }
 
-    /// The edge of VSYNC that ends its pulse, which numbers the frame that follows.
+    /// Counts the edge of VSYNC that ends its pulse. The edge numbers the frame that follows.
     pub fn count_edge(&mut self, now_ns: u64) -> Exposed {
         if self.faults.on(Kind::CameraForgets, now_ns) && !self.forgot {
             self.forgot = true;
@@ -217,7 +218,7 @@ impl Camera {
         }
     }
 
-    /// Logs what is true of an exposure.
+    /// Logs the ground truth of an exposure.
     pub fn log_truth(&mut self, exposed: Exposed) {
         if self.truth.wanted() {
             let truth = self.source.truth(exposed);
@@ -225,32 +226,33 @@ impl Camera {
         }
     }
 
-    /// The picture of an exposure.
+    /// Returns the picture of an exposure.
     pub fn picture(&self, exposed: Exposed) -> Picture {
         self.part.picture(&*self.source, exposed, &self.rules)
     }
 
-    /// VSYNC edges since the run began.
+    /// Returns the count of VSYNC edges since the run began.
     pub fn exposures(&self) -> u64 {
         self.exposure
     }
 
-    /// Registers written since the run began.
+    /// Returns the count of registers written since the run began.
     pub fn sccb_writes(&self) -> u64 {
         self.sccb_writes
     }
 
-    /// Why the sensor sent no rows, the last time it did not.
+    /// Returns the reason for the last time that the sensor sent no rows; `None` if there was no
+    /// such time.
     pub fn faulty_output(&self) -> Option<&str> {
         self.faulty_output.as_deref()
     }
 
-    /// Why the truth log ended early.
+    /// Returns the reason why the truth log ended early; `None` if it did not.
     pub fn truth_failure(&self) -> Option<&str> {
         self.truth.failure()
     }
 
-    /// Says once why no rows come.
+    /// Notes once why no rows come.
     pub fn complain(&mut self, output: &Output) {
         if let Some(fault) = &output.fault
             && self.faulty_output.as_ref() != Some(fault)

@@ -1,10 +1,10 @@
-//! The MT9V034: what its registers make of a scene. Mono, with a global shutter.
+//! The MT9V034, mono with a global shutter: turns a scene into its output by its registers.
 //!
-//! Source: onsemi's MT9V034 data sheet, beside the drivers of Linux (`mt9v032.c`) and OpenMV
-//! (`mt9v0xx.c`). The picture is that of the array of binned pixels, 376 × 240, of which the window
-//! is cut; without binning each of its pixels is sent four times. Not simulated: context B, high
-//! dynamic range, companding, triggered frames, test patterns, LVDS, noise of its rows; what of the
-//! picture the automatic control counts.
+//! Source: onsemi's MT9V034 data sheet, and the drivers of Linux (`mt9v032.c`) and OpenMV
+//! (`mt9v0xx.c`). The picture is that of the array of binned pixels, 376 × 240, from which the
+//! window is cut. Without binning each of its pixels is sent four times. Not simulated: context B,
+//! high dynamic range, companding, triggered frames, test patterns, LVDS, noise of its rows, and
+//! the selection of pixels for the automatic control.
 
 use super::mt9v034_registers::{self as reg, Registers};
 use super::output::{Format, Output, Window};
@@ -15,34 +15,35 @@ use crate::truth::Exposed;
 
 /// Range of the input clock, Hz.
 const INPUT_CLOCK_HZ: std::ops::RangeInclusive<u64> = 13_000_000..=27_000_000;
-/// The array's columns and rows, and the numbers of the first ones.
+/// The array's columns and rows, and the numbers of its first column and row.
 const ARRAY: [u32; 2] = [752, 480];
 const FIRST: [u32; 2] = [1, 4];
-/// Fewest clocks of a row: the converters, one for each column, take so long.
+/// Fewest clocks of a row: the conversion time of the converters, one for each column.
 const LEAST_ROW_CLOCKS: u32 = 690;
 /// Fewest blank rows of a frame.
 const LEAST_BLANK_ROWS: u32 = 4;
-/// The simulated light exposes the film well in this time at a gain of one, ns.
+/// Exposure time, ns, at which the simulated light exposes the film well with a gain of one.
 const WELL_EXPOSED_NS: f64 = 2_000_000.0;
 /// Brightness of a well exposed picture, in 64ths of white: the film's 141 of 255.
 const WELL_EXPOSED: f64 = 141.0 / 255.0 * 64.0;
-/// Within this of what it looks for, the automatic control stops.
+/// Relative distance from its target at which the automatic control stops.
 const CLOSE: f64 = 0.03;
-/// It moves every third frame (R0xA6 and R0xA9 after a reset).
+/// The automatic control moves every third frame (R0xA6 and R0xA9 after a reset).
 const FRAMES_PER_MOVE: u32 = 3;
 
-/// The sensor's inside.
+/// The sensor's state.
 #[derive(Debug, Default)]
 pub struct Mt9v034 {
     registers: Registers,
-    /// Light of the frame under way, over what exposes it well.
+    /// Light of the current frame over the light that exposes it well.
     light: f64,
     /// Frames since the automatic control moved.
     waited: u32,
 }
 
 impl Mt9v034 {
-    /// `used` has its registers begin with what another program left in them.
+    /// Returns a sensor out of reset. With `used`, its registers have the values of another
+    /// program.
     pub fn new(used: bool) -> Self {
         Self {
             registers: match used {
@@ -53,20 +54,20 @@ impl Mt9v034 {
         }
     }
 
-    /// Columns and rows that are binned into one.
+    /// Returns how many columns and rows are binned into one.
     fn binning(&self) -> [u32; 2] {
         let mode = self.registers.get(reg::READ_MODE);
         // 2 and 3 are both four.
         [mode >> 2 & 3, mode & 3].map(|field| 1 << field.min(2))
     }
 
-    /// Clocks of a row, before columns are binned.
+    /// Returns the clocks of a row, before columns are binned.
     fn row_clocks(&self) -> u32 {
         let wide = |address| u32::from(self.registers.get(address));
         wide(reg::WINDOW_WIDTH) + wide(reg::HORIZONTAL_BLANKING)
     }
 
-    /// Where the exposure in force is.
+    /// Returns the address of the register with the present exposure.
     fn exposure_register(&self) -> u8 {
         match self.registers.get(reg::AEC_AGC_ENABLE) & 1 {
             0 => reg::SHUTTER_WIDTH,
@@ -89,7 +90,7 @@ impl Mt9v034 {
         }
     }
 
-    /// What the registers ask for that the sensor cannot do.
+    /// Describes a setting of the registers that the sensor cannot do; `None` if all are possible.
     fn impossible(&self) -> Option<String> {
         let wide = |address| u32::from(self.registers.get(address));
         let [columns, _] = self.binning();
@@ -122,7 +123,7 @@ impl Mt9v034 {
         outside.then(|| "the window (R0x01 to R0x04) is not within the array".into())
     }
 
-    /// Exposure in rows, and gain: what is automatic has moved.
+    /// Lets the automatic control move. Returns exposure in rows, and gain.
     fn controlled(&mut self, row_ns: f64) -> [f64; 2] {
         let automatic = self.registers.get(reg::AEC_AGC_ENABLE);
         let (aec, agc) = (automatic & 1 != 0, automatic & 2 != 0);
@@ -141,7 +142,7 @@ impl Mt9v034 {
         [f64::from(rows), f64::from(gain) / 16.0]
     }
 
-    /// Half of the way to the brightness that is looked for, as a ratio; exposure before gain.
+    /// Moves half of the way to the target brightness, as a ratio; exposure before gain.
     fn control(&mut self, row_ns: f64, aec: bool, agc: bool) {
         let registers = &self.registers;
         let wide = |address| f64::from(registers.get(address));
@@ -183,7 +184,7 @@ impl Part for Mt9v034 {
         let (window, [columns, _]) = (self.window(), self.binning());
         let blank_rows = u32::from(self.registers.get(reg::VERTICAL_BLANKING));
         let [width, rows] = window.output;
-        // A longer exposure than a frame lengthens the frame.
+        // An exposure longer than a frame lengthens the frame.
         let exposure = u32::from(self.registers.get(self.exposure_register())) + 2;
         let polarity = self.registers.get(reg::PIXEL_CLOCK);
         let flips = self.registers.get(reg::READ_MODE) >> 4 & 3;
@@ -198,10 +199,10 @@ impl Part for Mt9v034 {
             row_bytes: width,
             format: Format::Mono,
             window,
-            // Flip and mirror, as the OV7725's COM3 has them.
+            // Flip and mirror, in the bits of the OV7725's COM3.
             com3: ((flips & 1) << 7 | (flips >> 1) << 6) as u8,
             cr_first: false,
-            // FRAME_VALID, high with the rows; blank is its other level.
+            // FRAME_VALID is high with the rows; blanking is its other level.
             vsync_active_high: polarity & reg::INVERT_FRAME != 0,
             href_active_high: polarity & reg::INVERT_LINE == 0,
             stable_at_rising: polarity & reg::INVERT_CLOCK == 0,
@@ -222,7 +223,7 @@ impl Part for Mt9v034 {
         };
         Timing {
             exposure_ns: (rows * row_ns) as u64,
-            // All rows at once, before the first one is read.
+            // All rows are exposed at once, before the first one is read.
             readout_ns: 0,
             ends_ns: 0,
         }
@@ -273,7 +274,8 @@ mod tests {
 
     const CLOCK_HZ: u64 = 26_666_666;
 
-    /// What the firmware writes: 160 × 152 pixels of 2 × 2, 158 rows of 690 clocks.
+    /// Returns a sensor with the firmware's settings: 160 × 152 pixels of 2 × 2, 158 rows of 690
+    /// clocks.
     fn binned() -> Mt9v034 {
         let mut part = Mt9v034::new(false);
         for (address, value) in [

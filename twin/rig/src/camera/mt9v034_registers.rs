@@ -1,4 +1,4 @@
-//! The MT9V034's register file: addresses, values after a reset, and which registers only the
+//! The MT9V034's register file: addresses, values after a reset, and the registers that only the
 //! sensor writes.
 
 /// Chip version; read-only.
@@ -15,11 +15,11 @@ pub const WINDOW_WIDTH: u8 = 0x04;
 pub const HORIZONTAL_BLANKING: u8 = 0x05;
 /// Rows of a frame without data.
 pub const VERTICAL_BLANKING: u8 = 0x06;
-/// What the sensor does.
+/// Operating mode.
 pub const CHIP_CONTROL: u8 = 0x07;
 /// Exposure in rows.
 pub const SHUTTER_WIDTH: u8 = 0x0B;
-/// How levels become numbers.
+/// Conversion of levels to numbers.
 pub const ADC: u8 = 0x1C;
 /// Bit 0: every register goes back to its power-up value.
 pub const RESET: u8 = 0x0C;
@@ -29,17 +29,17 @@ pub const READ_MODE: u8 = 0x0D;
 pub const ANALOG_GAIN: u8 = 0x35;
 /// Polarities.
 pub const PIXEL_CLOCK: u8 = 0x72;
-/// Brightness that the automatic control looks for, in 64ths of white.
+/// Target brightness of the automatic control, in 64ths of white.
 pub const DESIRED_BIN: u8 = 0xA5;
 /// Largest automatic gain, sixteenths.
 pub const MAX_GAIN: u8 = 0xAB;
 /// Longest automatic exposure, rows.
 pub const MAX_EXPOSURE: u8 = 0xAD;
-/// What is automatic: exposure (bit 0), gain (1).
+/// Automatic functions: exposure (bit 0), gain (1).
 pub const AEC_AGC_ENABLE: u8 = 0xAF;
-/// Gain in force, sixteenths; read-only.
+/// Present gain, sixteenths; read-only.
 pub const AGC_GAIN: u8 = 0xBA;
-/// Exposure in force, rows; read-only.
+/// Present exposure, rows; read-only.
 pub const AEC_EXPOSURE: u8 = 0xBB;
 
 /// [`CHIP_CONTROL`]: frames without end.
@@ -94,7 +94,7 @@ impl Default for Registers {
 }
 
 impl Registers {
-    /// As another program left them.
+    /// Returns registers with the values of another program.
     pub fn used() -> Self {
         let mut registers = Self::default();
         for (address, value) in [
@@ -110,12 +110,12 @@ impl Registers {
         registers
     }
 
-    /// What a register holds.
+    /// Returns the value of a register.
     pub fn get(&self, address: u8) -> u16 {
         self.0[usize::from(address)]
     }
 
-    /// Writes a register; whether that was a reset of all of them.
+    /// Writes a register. Returns whether the write was a reset of all registers.
     pub fn write(&mut self, address: u8, value: u16) -> bool {
         match address {
             CHIP_VERSION | AGC_GAIN | AEC_EXPOSURE => {}
@@ -123,14 +123,14 @@ impl Registers {
                 *self = Self::default();
                 return true;
             }
-            // The bit clears itself.
+            // The reset bit clears itself.
             RESET => {}
             address => self.0[usize::from(address)] = value,
         }
         false
     }
 
-    /// What the sensor itself writes.
+    /// Sets a register that the sensor itself writes.
     pub fn measured(&mut self, address: u8, value: u16) {
         self.0[usize::from(address)] = value;
     }

@@ -1,5 +1,4 @@
-//! What the OV7725's registers make it send: size, format, clock, polarities and the timing of a
-//! frame.
+//! The OV7725's output by its registers: size, format, clock, polarities and the timing of a frame.
 //!
 //! Frame timing (datasheet, "Timing specifications"): VGA 784 × 510 pixel periods with 640 × 480
 //! active, QVGA 576 × 278 with 320 × 240 active, VSYNC for the first four lines, then 18 or 22
@@ -8,15 +7,15 @@
 
 use super::registers::{self as reg, Registers};
 
-/// Lines that the OV7725's VSYNC lasts.
+/// Duration of the OV7725's VSYNC, lines.
 const VSYNC_LINES: u32 = 4;
-/// Fastest pixel clock of the sensor, Hz. Its data sheet says 48 MHz; drivers run it up to 187
+/// Fastest pixel clock of the sensor, Hz. Its data sheet gives 48 MHz; drivers run it up to 187
 /// frames per second of QVGA (Linux, gspca's `ov534.c`), which is 60 MHz.
 const FASTEST_PIXEL_CLOCK_HZ: u64 = 60_000_000;
 /// Range of the input clock, Hz.
 const INPUT_CLOCK_HZ: std::ops::RangeInclusive<u64> = 10_000_000..=48_000_000;
 
-/// How a pixel travels.
+/// How a pixel is coded on the lines.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Y and alternating Cb, Cr; two bytes per pixel.
@@ -35,7 +34,7 @@ pub enum Format {
     Mono,
 }
 
-/// The area of the pixel array that is read and how large it is sent.
+/// The area of the pixel array that is read, and the size in which it is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// Columns and rows of the pixel array: 640 × 480, or 320 × 240 in QVGA mode.
@@ -48,7 +47,7 @@ pub struct Window {
     pub output: [u32; 2],
 }
 
-/// Everything that one frame's signals follow from.
+/// All parameters of one frame's signals.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Output {
     /// Pixel clock, Hz.
@@ -57,11 +56,11 @@ pub struct Output {
     pub line_clocks: u32,
     /// Lines per frame, blank ones included.
     pub lines: u32,
-    /// Lines that VSYNC lasts, from the first one on.
+    /// Duration of VSYNC in lines, from the first one on.
     pub vsync_lines: u32,
     /// The line of the first row.
     pub first_row: u32,
-    /// Rows sent; none when the registers ask for what the sensor cannot do.
+    /// Rows sent; 0 if the registers ask for something that the sensor cannot do.
     pub rows: u32,
     /// Bytes per row.
     pub row_bytes: u32,
@@ -83,13 +82,13 @@ pub struct Output {
     pub clock_between_rows: bool,
     /// The data lines are inverted.
     pub inverted: bool,
-    /// Why no rows are sent.
+    /// The reason why no rows are sent.
     pub fault: Option<String>,
 }
 
 impl Output {
-    /// What the registers say, at an input clock (XCLK) in Hz. `None` when the sensor sleeps or has
-    /// no usable clock.
+    /// Returns the output by the registers at an input clock (XCLK) in Hz. Returns `None` if the
+    /// sensor sleeps or has no usable clock.
     pub fn new(registers: &Registers, input_clock_hz: u64) -> Option<Output> {
         if !INPUT_CLOCK_HZ.contains(&input_clock_hz) || registers.get(reg::COM2) & 0x10 != 0 {
             return None;
@@ -136,7 +135,7 @@ impl Output {
         }
     }
 
-    /// What the registers ask for that the sensor cannot do.
+    /// Describes a setting of the registers that the sensor cannot do; `None` if all are possible.
     fn impossible(&self, registers: &Registers) -> Option<String> {
         let Window {
             array,
@@ -166,12 +165,12 @@ impl Output {
             .then(|| "HSYNC instead of HREF (COM10 bit 6) is not simulated".into())
     }
 
-    /// Pixel clocks of one frame.
+    /// Returns the pixel clocks of one frame.
     pub fn frame_clocks(&self) -> u64 {
         u64::from(self.line_clocks) * u64::from(self.lines)
     }
 
-    /// Time of a number of pixel clocks, ns, rounded down.
+    /// Returns the time of a number of pixel clocks, ns, rounded down.
     pub fn clocks_ns(&self, clocks: u64) -> u64 {
         let ns = u128::from(clocks) * 1_000_000_000 / u128::from(self.pixel_clock_hz);
         u64::try_from(ns).unwrap_or(u64::MAX)
@@ -189,7 +188,7 @@ fn pixel_clock_hz(registers: &Registers, input_clock_hz: u64) -> u64 {
     input_clock_hz * multiplier / divider
 }
 
-/// How pixels travel, by COM7.
+/// Returns the coding of pixels by COM7.
 pub(super) fn format(com7: u8) -> Format {
     match (com7 & 3, com7 >> 2 & 3) {
         (0, _) => Format::Yuv,
@@ -201,7 +200,7 @@ pub(super) fn format(com7: u8) -> Format {
     }
 }
 
-/// Window and output size; the nominal start is (140, 14) in VGA and (252, 6) in QVGA mode.
+/// Returns window and output size. The nominal start is (140, 14) in VGA and (252, 6) in QVGA mode.
 fn window(registers: &Registers, qvga: bool) -> Window {
     let href = u32::from(registers.get(reg::HREF));
     let low = u32::from(registers.get(reg::EXHCH));

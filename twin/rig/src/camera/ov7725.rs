@@ -1,4 +1,4 @@
-//! The OV7725: what its registers make of a scene.
+//! The OV7725: turns a scene into its output by its registers.
 
 use super::colour::Colour;
 use super::exposure::Exposure;
@@ -9,19 +9,19 @@ use crate::frame_source::{Coding, FrameSource, Picture};
 use crate::rules::Rules;
 use crate::truth::Exposed;
 
-/// The sensor's inside.
+/// The sensor's state.
 #[derive(Debug)]
 pub struct Ov7725 {
     registers: Registers,
     exposing: Exposure,
-    /// Light of the frame under way, over what exposes it well.
+    /// Light of the current frame over the light that exposes it well.
     light: f64,
     seed: u64,
 }
 
 impl Ov7725 {
-    /// `seed` decides what no source agrees about; `used` has its registers begin with what another
-    /// program left in them.
+    /// Returns a sensor out of reset. `seed` decides the values on which sources disagree. With
+    /// `used`, the registers have the values of another program.
     pub fn new(seed: u64, used: bool) -> Self {
         let registers = match used {
             true => Registers::used(seed),
@@ -44,7 +44,7 @@ impl Part for Ov7725 {
     fn expose(&mut self, output: &Output) -> Timing {
         self.light = self.exposing.next(&mut self.registers, output);
         let lines_ns = |lines: u64| output.clocks_ns(lines * u64::from(output.line_clocks));
-        // A row's exposure ends when it is read, which is when it is sent.
+        // A row's exposure ends when the row is read, and it is sent at that time.
         let middle_row = output.first_row - output.vsync_lines + output.rows / 2;
         Timing {
             exposure_ns: lines_ns(self.exposing.lines()),

@@ -1,4 +1,4 @@
-//! What differs between one camera and another.
+//! The interface of one kind of camera: everything in which cameras differ.
 
 use std::fmt::Debug;
 
@@ -7,47 +7,48 @@ use crate::frame_source::{FrameSource, Picture};
 use crate::rules::Rules;
 use crate::truth::Exposed;
 
-/// A camera's registers, and what follows from them.
+/// A camera's registers and their effects.
 pub trait Part: Debug + Send {
-    /// What the registers make it send, at an input clock in Hz. `None` while it sends nothing.
+    /// Returns the output by the registers at an input clock in Hz. Returns `None` while the camera
+    /// sends nothing.
     fn output(&self, clock_hz: u64) -> Option<Output>;
 
-    /// A frame begins: what is automatic has moved, and this is how it is exposed.
+    /// Begins a frame: automatic control moves. Returns the timing of its exposure.
     fn expose(&mut self, output: &Output) -> Timing;
 
-    /// The picture of an exposure, as the registers have it.
+    /// Returns the picture of an exposure, by the registers.
     fn picture(&self, source: &dyn FrameSource, exposed: Exposed, rules: &Rules) -> Picture;
 
-    /// What a register holds.
+    /// Returns the value of a register.
     fn read(&self, address: u8) -> u16;
 
-    /// What it answers in the place of a register when it is another part of its maker's.
+    /// Returns the answer to a register's read of a different part from the same maker.
     fn read_as_another(&self, address: u8) -> u16;
 
-    /// Writes a register; whether that was a reset of all of them.
+    /// Writes a register. Returns whether the write was a reset of all registers.
     fn write(&mut self, address: u8, value: u16) -> bool;
 
-    /// One of its registers goes back to what it holds after a reset: one that colours or levels
-    /// depend on, and no timing.
+    /// Sets one register back to its value after a reset. It affects colours or levels, but no
+    /// timing.
     fn forget(&mut self);
 
-    /// Its reset line was low.
+    /// Handles a low level of the reset line.
     fn reset(&mut self);
 }
 
-/// When a frame's rows are exposed.
+/// Times of the exposure of a frame's rows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
-    /// How long each row is exposed, ns.
+    /// Exposure time of each row, ns.
     pub exposure_ns: u64,
-    /// From the exposure of the first row to that of one below the last, ns; 0 with a global
-    /// shutter.
+    /// Time from the exposure of the first row to that of a row just below the last, ns; 0 with a
+    /// global shutter.
     pub readout_ns: u64,
-    /// From the edge that begins the frame to the end of the middle row's exposure, ns.
+    /// Time from the edge that begins the frame to the end of the middle row's exposure, ns.
     pub ends_ns: u64,
 }
 
-/// The cameras that there are.
+/// The kinds of camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Kind {
     /// OmniVision OV7725.
@@ -58,7 +59,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Its name.
+    /// Returns its name.
     pub fn name(self) -> &'static str {
         match self {
             Kind::Ov7725 => "ov7725",

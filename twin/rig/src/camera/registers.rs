@@ -1,10 +1,10 @@
-//! The OV7725's register file: addresses, values after a reset, and which registers only the sensor
-//! writes.
+//! The OV7725's register file: addresses, values after a reset, and the registers that only the
+//! sensor writes.
 //!
-//! Source: OmniVision OV7725 datasheet 1.31, "Register set", beside datasheet 1.1 and the drivers
-//! of Linux and OpenMV. Where these disagree about the value after a reset, it is as good as
-//! unknown: [`Registers::of_seed`] has another one for each seed, and [`Registers::unwritten`]
-//! names such a register that the picture depends on.
+//! Source: OmniVision OV7725 datasheet 1.31, "Register set", with datasheet 1.1 and the drivers of
+//! Linux and OpenMV. If these disagree about the value after a reset, the value counts as unknown.
+//! [`Registers::of_seed`] has a different value for each seed, and [`Registers::unwritten`] names
+//! such a register that the picture depends on.
 
 /// Gain.
 pub const GAIN: u8 = 0x00;
@@ -18,7 +18,7 @@ pub const GREEN: u8 = 0x03;
 pub const AECH: u8 = 0x08;
 /// Exposure in lines, low byte.
 pub const AEC: u8 = 0x10;
-/// What is automatic: exposure (bit 0), white balance (1), gain (2).
+/// Automatic functions: exposure (bit 0), white balance (1), gain (2).
 pub const COM8: u8 = 0x13;
 /// Largest automatic gain, bits 6:4.
 pub const COM9: u8 = 0x14;
@@ -28,19 +28,19 @@ pub const LC_CTR: u8 = 0x46;
 pub const AWB_CTRL0: u8 = 0x63;
 /// FIFO, special effects, colour matrix, gamma.
 pub const DSP_CTRL1: u8 = 0x64;
-/// White balance: what a gain's unit is.
+/// White balance: the unit of a gain.
 pub const AWB_CTRL1: u8 = 0x69;
 /// Gamma curve, fifteen points.
 pub const GAM1: u8 = 0x7E;
 /// Colour matrix, six coefficients.
 pub const MTX1: u8 = 0x94;
-/// Their signs, and whether they count twice.
+/// Signs of the colour matrix's coefficients, and whether they count twice.
 pub const MTX_CTRL: u8 = 0x9A;
 /// Brightness.
 pub const BRIGHT: u8 = 0x9B;
 /// Contrast.
 pub const CNST: u8 = 0x9C;
-/// Which special effects are on.
+/// Switches of the special effects.
 pub const SDE: u8 = 0xA6;
 /// Saturation of Cb.
 pub const USAT: u8 = 0xA7;
@@ -150,8 +150,8 @@ const POWER_UP: [(u8, u8); 56] = [
     (0xAC, 0xFF),
 ];
 
-/// Registers that sources give different values after a reset, or none, first and last of each
-/// range.
+/// Registers whose value after a reset differs between sources or is missing: first and last of
+/// each range.
 const DISPUTED: [(u8, u8); 13] = [
     (0x0F, 0x0F),
     (0x24, 0x26),
@@ -167,7 +167,7 @@ const DISPUTED: [(u8, u8); 13] = [
     (SDE, SDE),
     (0xAC, 0xAC),
 ];
-/// Of these, what a picture depends on only where a bit of another register is set: range, that
+/// Disputed registers that affect a picture only if a bit of another register is set: range, that
 /// register, the bit.
 const CONDITIONAL: [(u8, u8, u8, u8); 4] = [
     (GAM1, 0x8D, DSP_CTRL1, 0x04),
@@ -179,7 +179,7 @@ const CONDITIONAL: [(u8, u8, u8, u8); 4] = [
 /// Registers that a write does not change: ids and measured averages.
 const READ_ONLY: [u8; 8] = [0x05, 0x06, 0x07, PID, VER, 0x1C, 0x1D, 0x2F];
 
-/// The register file as the sensor's outputs follow it.
+/// The register file that decides the sensor's output.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Registers {
     values: [u8; 256],
@@ -188,7 +188,7 @@ pub struct Registers {
 }
 
 impl Default for Registers {
-    /// Values of datasheet 1.31.
+    /// Returns the values of datasheet 1.31.
     fn default() -> Self {
         let mut values = [0; 256];
         for (address, value) in POWER_UP {
@@ -203,7 +203,7 @@ impl Default for Registers {
 }
 
 impl Registers {
-    /// After a reset, with another value for each seed where sources disagree.
+    /// Returns the values after a reset. Those on which sources disagree depend on the seed.
     pub fn of_seed(seed: u64) -> Self {
         let mut registers = Self::default();
         for address in DISPUTED.into_iter().flat_map(|(first, last)| first..=last) {
@@ -213,8 +213,8 @@ impl Registers {
         registers
     }
 
-    /// As a program before this one has left them: any value in any register, another one for each
-    /// seed.
+    /// Returns the registers as another program may have left them: any value in any register,
+    /// different for each seed.
     pub fn used(seed: u64) -> Self {
         let mut registers = Self::of_seed(seed);
         for address in (0..=0xAC).filter(|address| !READ_ONLY.contains(address)) {
@@ -223,13 +223,13 @@ impl Registers {
         registers
     }
 
-    /// The value of a register.
+    /// Returns the value of a register.
     pub fn get(&self, address: u8) -> u8 {
         self.values[usize::from(address)]
     }
 
-    /// Writes a register. Answers whether it was the register reset, after which every register
-    /// holds its value after a reset.
+    /// Writes a register. Returns whether the write was the register reset, which sets every
+    /// register to its value after a reset.
     pub fn write(&mut self, address: u8, value: u8) -> bool {
         if address == COM7 && value & COM7_RESET != 0 {
             (self.values, self.written) = (self.after_reset, [false; 256]);
@@ -242,13 +242,13 @@ impl Registers {
         false
     }
 
-    /// The sensor itself sets a register.
+    /// Sets a register that the sensor itself writes.
     pub(super) fn measured(&mut self, address: u8, value: u8) {
         self.values[usize::from(address)] = value;
     }
 
-    /// A register that the picture depends on, that nobody wrote since the reset, and that has no
-    /// agreed value after one.
+    /// Returns a register that the picture depends on, was not written since the reset, and has no
+    /// agreed value after one. Returns `None` if there is no such register.
     pub fn unwritten(&self) -> Option<u8> {
         let mut disputed = DISPUTED.into_iter().flat_map(|(first, last)| first..=last);
         disputed.find(|&address| !self.written[usize::from(address)] && self.matters(address))
@@ -260,13 +260,14 @@ impl Registers {
         condition.is_none_or(|(.., control, bit)| self.get(control) & bit != 0)
     }
 
-    /// A value of `HIGH:low bits`: the register at `high` shifted up, joined with bits of another.
+    /// Returns a value of `HIGH:low bits`: the register at `high` shifted up, joined with bits of
+    /// another.
     pub(super) fn wide(&self, high: u8, shift: u32, low: u32) -> u32 {
         u32::from(self.get(high)) << shift | low
     }
 }
 
-/// A value of a register that depends on the seed alone.
+/// Returns a value that depends only on the seed and the register's address.
 fn random(seed: u64, address: u8) -> u8 {
     let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(address) << 32;
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);

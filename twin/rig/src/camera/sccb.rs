@@ -1,4 +1,4 @@
-//! The sensor's side of SCCB, which is I2C without the acknowledge's meaning: address 0x21, one
+//! The sensor's side of SCCB: I2C in which the acknowledge has no meaning. Address 0x21, one
 //! register per transaction, no automatic increment.
 
 use rigless::chip::Timeline;
@@ -10,7 +10,7 @@ use super::SharedCamera;
 /// The sensor's 7-bit address.
 const ADDRESS: u8 = 0x21;
 
-/// What the next byte of a transaction is.
+/// The meaning of the next byte of a transaction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Expects {
     Register,
@@ -27,7 +27,7 @@ pub struct Sccb {
 }
 
 impl Sccb {
-    /// The bus side of a sensor.
+    /// Returns the bus side of a sensor.
     pub fn new(camera: SharedCamera) -> Self {
         Self {
             camera,
@@ -37,7 +37,7 @@ impl Sccb {
     }
 }
 
-// Snapshots are not taken.
+// The rig takes no snapshots.
 impl Store for Sccb {}
 
 impl Peer for Sccb {

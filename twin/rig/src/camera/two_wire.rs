@@ -1,5 +1,5 @@
-//! The MT9V034's side of its control bus: address 0x5C, registers of two bytes, the high one first,
-//! and the next register after each.
+//! The MT9V034's side of its control bus: address 0x5C, registers of two bytes, high byte first,
+//! with automatic increment.
 
 use rigless::chip::Timeline;
 use rigless::chip::i2c::Peer;
@@ -10,7 +10,7 @@ use super::SharedCamera;
 /// The sensor's 7-bit address, with both of its address pins high.
 const ADDRESS: u8 = 0x5C;
 
-/// What the next byte of a transaction is.
+/// The meaning of the next byte of a transaction.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Expects {
     Register,
@@ -27,7 +27,7 @@ pub struct TwoWire {
 }
 
 impl TwoWire {
-    /// The bus side of a sensor.
+    /// Returns the bus side of a sensor.
     pub fn new(camera: SharedCamera) -> Self {
         Self {
             camera,
@@ -37,7 +37,7 @@ impl TwoWire {
     }
 }
 
-// Snapshots are not taken.
+// The rig takes no snapshots.
 impl Store for TwoWire {}
 
 impl Peer for TwoWire {

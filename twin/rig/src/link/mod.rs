@@ -1,5 +1,5 @@
-//! The serial port as programs on this machine see it: a TCP port, a pseudo-terminal, or both; one
-//! client at a time.
+//! The serial port for programs on this machine: a TCP port, a pseudo-terminal, or both; one client
+//! at a time.
 
 mod pty;
 mod tcp;
@@ -14,24 +14,24 @@ use std::os::fd::{AsFd, BorrowedFd};
 pub use pty::Pty;
 pub use tcp::Tcp;
 
-/// How long one look for a client may take.
+/// The longest duration of one check for a client, ms.
 const LOOK: u8 = 20;
 
-/// A byte stream that a client may or may not hold.
+/// A byte stream with or without a client at its other end.
 pub trait Endpoint: Send + std::fmt::Debug {
-    /// Whether the client still holds the other end.
+    /// Returns whether the client still holds the other end.
     fn held(&mut self) -> bool;
 
-    /// Whether a client has come to the other end.
+    /// Returns whether a client has come to the other end.
     fn offered(&mut self) -> bool;
 
-    /// Takes what the client sent into `to`. Nothing when there is nothing.
+    /// Appends the client's bytes to `to`, if there are any.
     fn read(&mut self, to: &mut VecDeque<u8>);
 
-    /// Writes what the client takes of `from`, without waiting.
+    /// Writes as many bytes of `from` as the client takes, without waiting.
     fn write(&mut self, from: &mut VecDeque<u8>);
 
-    /// What becomes ready when the client can take more.
+    /// Returns the descriptor that becomes ready when the client can take more.
     fn writable(&self) -> Option<BorrowedFd<'_>>;
 }
 
@@ -39,12 +39,12 @@ pub trait Endpoint: Send + std::fmt::Debug {
 #[derive(Debug, Default)]
 pub struct Link {
     endpoints: Vec<Box<dyn Endpoint>>,
-    /// The one that holds the port.
+    /// The endpoint that holds the port.
     holder: Option<usize>,
 }
 
 impl Link {
-    /// A link over the given endpoints.
+    /// Returns a link over the given endpoints.
     pub fn new(endpoints: Vec<Box<dyn Endpoint>>) -> Self {
         Self {
             endpoints,
@@ -52,8 +52,8 @@ impl Link {
         }
     }
 
-    /// Whether a client holds the port; looks for a new one when none did. A client that leaves is
-    /// seen to leave before the next one is seen to come.
+    /// Returns whether a client holds the port; looks for a new one if not. The departure of a
+    /// client is reported before the arrival of the next one.
     pub fn connected(&mut self) -> bool {
         match self.holder {
             Some(holder) => {
@@ -71,7 +71,7 @@ impl Link {
         self.holder.is_some()
     }
 
-    /// Moves bytes both ways, without waiting.
+    /// Moves bytes in both directions, without waiting.
     pub fn exchange(&mut self, from_device: &mut VecDeque<u8>, to_device: &mut VecDeque<u8>) {
         if let Some(holder) = self.holder {
             self.endpoints[holder].write(from_device);
@@ -79,7 +79,7 @@ impl Link {
         }
     }
 
-    /// Waits a little for the client to take more, or for one to come.
+    /// Waits a short time for the client to take more, or for a client to come.
     pub fn wait(&self) {
         match self
             .holder
@@ -87,7 +87,7 @@ impl Link {
         {
             Some(descriptor) => {
                 let mut descriptors = [PollFd::new(descriptor, PollFlags::POLLOUT)];
-                // An error or an interruption only means to look again.
+                // After an error or an interruption the caller checks again.
                 let _ = poll(&mut descriptors, PollTimeout::from(LOOK));
             }
             None => std::thread::sleep(Duration::from_millis(LOOK.into())),
@@ -95,14 +95,14 @@ impl Link {
     }
 }
 
-/// Makes a descriptor return instead of wait.
+/// Makes reads and writes of a descriptor return instead of wait.
 fn nonblocking(descriptor: impl AsFd) -> anyhow::Result<()> {
     use nix::fcntl::{FcntlArg, OFlag, fcntl};
     fcntl(descriptor, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).context("O_NONBLOCK")?;
     Ok(())
 }
 
-/// Reads until nothing is left. Answers false when the other end is gone.
+/// Reads all available bytes. Returns false if the other end is gone.
 fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
     use nix::errno::Errno;
     let mut buffer = [0; 4096];
@@ -117,7 +117,7 @@ fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
     }
 }
 
-/// Writes until the other end takes no more. Answers false when it is gone.
+/// Writes until the other end takes no more. Returns false if it is gone.
 fn write_all(descriptor: impl AsFd, from: &mut VecDeque<u8>) -> bool {
     use nix::errno::Errno;
     while !from.is_empty() {

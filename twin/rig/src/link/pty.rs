@@ -1,8 +1,8 @@
-//! The port as a pseudo-terminal.
+//! The serial port as a pseudo-terminal.
 //!
-//! The rig keeps the terminal side open itself, so that it stays raw: the system resets a terminal
-//! that nobody holds. So a hang-up on the other side does not tell that a client left; inotify
-//! does.
+//! The rig itself keeps the terminal side open to keep it raw: the system resets a terminal that no
+//! program holds. For this reason a hang-up on the other side does not show that a client left;
+//! inotify does.
 
 use std::collections::VecDeque;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
@@ -29,12 +29,13 @@ pub struct Pty {
 }
 
 impl Pty {
-    /// A raw terminal, with a symbolic link to it if wanted. An older link is replaced.
+    /// Opens a raw terminal, with a symbolic link to it if `link` is given. An older link is
+    /// replaced.
     ///
     /// # Errors
-    /// When the system gives none, or the link cannot be made.
+    /// If the system has no terminal left, or the link cannot be made.
     pub fn open(link: Option<&Path>) -> anyhow::Result<Self> {
-        // Programs that are started meanwhile must not hold it.
+        // Programs that are started meanwhile must not inherit it.
         let flags = OFlag::O_RDWR | OFlag::O_NOCTTY | OFlag::O_CLOEXEC;
         let master = posix_openpt(flags).context("pseudo-terminal")?;
         grantpt(&master)?;
@@ -60,7 +61,7 @@ impl Pty {
         })
     }
 
-    /// The terminal's path.
+    /// Returns the terminal's path.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -91,7 +92,7 @@ impl Endpoint for Pty {
     }
 
     fn read(&mut self, to: &mut VecDeque<u8>) {
-        // While the terminal is held here, the other side is never gone.
+        // While the rig holds the terminal, the other side is never gone.
         read_all(&self.master, to);
     }
 
@@ -106,7 +107,7 @@ impl Endpoint for Pty {
 
 impl Drop for Pty {
     fn drop(&mut self) {
-        // Bytes that nobody fetched go with the terminal.
+        // Bytes that were not read go away with the terminal.
         let _ = nix::sys::termios::tcflush(&self.terminal, nix::sys::termios::FlushArg::TCIOFLUSH);
         if let Some(link) = &self.link {
             let _ = std::fs::remove_file(link);

@@ -1,4 +1,4 @@
-//! The port as a TCP port on this machine.
+//! The serial port as a TCP port on this machine.
 
 use std::collections::VecDeque;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
@@ -8,7 +8,7 @@ use anyhow::Context;
 
 use super::{Endpoint, read_all, write_all};
 
-/// A listener and the client it took.
+/// A listener and its present client.
 #[derive(Debug)]
 pub struct Tcp {
     listener: TcpListener,
@@ -19,7 +19,7 @@ impl Tcp {
     /// Listens on 127.0.0.1; port 0 takes a free one.
     ///
     /// # Errors
-    /// When the port is taken.
+    /// If the port is taken.
     pub fn listen(port: u16) -> anyhow::Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
             .with_context(|| format!("--tcp {port}"))?;
@@ -30,16 +30,16 @@ impl Tcp {
         })
     }
 
-    /// The port.
+    /// Returns the port's number.
     ///
     /// # Errors
-    /// When the system does not tell.
+    /// If the system does not report it.
     pub fn port(&self) -> anyhow::Result<u16> {
         Ok(self.listener.local_addr()?.port())
     }
 
     fn accept(&mut self) {
-        // A client that is gone again, or cannot be set up, is no client.
+        // A client that has left again, or cannot be set up, does not count.
         if let Ok((client, _)) = self.listener.accept()
             && client.set_nonblocking(true).is_ok()
         {

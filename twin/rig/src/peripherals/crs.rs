@@ -1,4 +1,4 @@
-//! The clock recovery system, and what it leaves of the internal 48 MHz oscillator's error.
+//! The clock recovery system (CRS), and its trimming of the internal 48 MHz oscillator.
 //!
 //! RM0433 chapter 9: the configuration register is write-protected while the frequency error
 //! counter is enabled. Simulated: that protection, and the oscillator's frequency. Not simulated:
@@ -7,15 +7,14 @@
 use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::soc::stm32h743::generated::crs::Register;
 
-/// HSI48 untrimmed, Hz: 0.6 % fast, the limit of DS12110 table 46 at 30 °C. USB full speed allows
-/// 0.25 %.
+/// HSI48 without trimming, Hz: 0.6 % fast, the limit of DS12110 table 46 at 30 °C. USB full speed
+/// allows 0.25 %.
 pub const HSI48_UNTRIMMED_HZ: u64 = 48_288_000;
 
 /// CR: frequency error counter enabled; automatic trimming enabled.
 const COUNTER: u64 = 1 << 5;
 const TRIMS: u64 = 1 << 6;
-/// CFGR: synchronization source, bits 29:28. OTG_FS is 3 and OTG_HS 2, which is selected after a
-/// reset.
+/// CFGR: synchronization source, bits 29:28. OTG_FS is 3; OTG_HS is 2, the value after a reset.
 const SOURCE_BIT: u32 = 28;
 const OTG_FS: u64 = 3;
 const CONFIGURATION_AFTER_RESET: u64 = 0x2022_BB7F;
@@ -34,7 +33,8 @@ impl Default for Crs {
     }
 }
 
-/// Whether registers so set trim the oscillator to the packets of the host on OTG_FS.
+/// Returns whether registers with these values trim the oscillator to the packets of the host on
+/// OTG_FS.
 pub fn trims(registers: &RegisterFile) -> bool {
     let source = registers.get(Register::Cfgr) >> SOURCE_BIT & 3;
     let wanted = COUNTER | TRIMS;

@@ -4,16 +4,16 @@ use crate::peripherals::otg::{Answer, Core, Packet};
 
 /// The address the host gives the device.
 pub const ADDRESS: u8 = 7;
-/// Name of the transfer that sets it.
+/// Name of the transfer that sets the address.
 pub const SET_ADDRESS: &str = "SET_ADDRESS";
 /// Name of the transfer that reads the whole configuration.
 pub const CONFIGURATION: &str = "GET_DESCRIPTOR configuration";
-/// Name of a request that a script made up.
+/// Name of a script's own request.
 pub const ANY: &str = "control";
 /// Largest packet of endpoint 0.
 const PACKET: usize = 64;
 
-/// What comes next.
+/// The next stage of a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     Setup,
@@ -23,32 +23,32 @@ enum Stage {
     StatusOut,
 }
 
-/// How a transfer stands after a transaction.
+/// The state of a transfer after a transaction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Progress {
-    /// Not done.
+    /// The transfer goes on.
     Going,
-    /// Done, with what was read.
+    /// The transfer is complete, with the bytes that were read.
     Done(Vec<u8>),
-    /// Over without success.
+    /// The transfer failed.
     Failed(&'static str),
 }
 
-/// Endpoints whose next packet is DATA0 after a transfer.
+/// The endpoints whose next packet is DATA0 after a transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Begins {
     /// No endpoint.
     None,
-    /// The one of this address.
+    /// The endpoint with this address.
     Endpoint(u8),
-    /// All.
+    /// All endpoints.
     All,
 }
 
 /// A control transfer.
 #[derive(Clone, Debug)]
 pub struct Transfer {
-    /// For the log.
+    /// Name for the log.
     pub name: &'static str,
     setup: [u8; 8],
     data: Vec<u8>,
@@ -74,7 +74,7 @@ impl Transfer {
         }
     }
 
-    /// Any request, with zeros for its data.
+    /// Returns any request, with zeros for its data.
     pub fn any(setup: [u8; 8]) -> Self {
         let transfer = Self::read(ANY, setup);
         match transfer.is_read() {
@@ -86,7 +86,7 @@ impl Transfer {
         }
     }
 
-    /// For the log: its name, or its bytes.
+    /// Returns the transfer's title for the log: its name, or its bytes.
     pub fn title(&self) -> String {
         match self.name {
             ANY => {
@@ -97,8 +97,8 @@ impl Transfer {
         }
     }
 
-    /// Of which endpoint it clears the halt, which has its toggle begin anew on both sides; any
-    /// configuration that is set does so for all.
+    /// Returns the endpoint whose halt it clears: the endpoint's toggle restarts on both sides. A
+    /// transfer that sets a configuration restarts all endpoints.
     pub fn begins_anew(&self) -> Begins {
         match self.setup {
             [2, 1, 0, 0, endpoint, ..] => Begins::Endpoint(endpoint),
@@ -107,7 +107,7 @@ impl Transfer {
         }
     }
 
-    /// Starts; fails at the deadline.
+    /// Starts the transfer; it fails at the deadline.
     pub fn begin(&mut self, deadline: u64) {
         self.deadline = deadline;
     }
@@ -120,7 +120,7 @@ impl Transfer {
         self.setup[0] & 0x80 != 0
     }
 
-    /// One transaction.
+    /// Carries out one transaction.
     pub fn step(&mut self, now: u64, address: u8, device: &mut Core) -> Progress {
         if now >= self.deadline {
             return Progress::Failed("timed out");
@@ -172,7 +172,7 @@ impl Transfer {
     }
 }
 
-/// The core sees to the toggles of endpoint 0.
+/// The core manages the toggles of endpoint 0.
 fn packet(bytes: &[u8]) -> Packet {
     Packet {
         bytes: bytes.to_vec(),
@@ -188,7 +188,7 @@ fn waiting<T>(answer: Answer<T>) -> Progress {
     }
 }
 
-/// What a host asks a new device.
+/// Returns the host's requests to a new device.
 pub fn enumeration() -> Vec<Transfer> {
     vec![
         Transfer::read(
@@ -211,7 +211,7 @@ pub fn enumeration() -> Vec<Transfer> {
     ]
 }
 
-/// What a host says when a program opens (115200 8N1, DTR and RTS) or closes the port.
+/// Returns the host's requests when a program opens (115200 8N1, DTR and RTS) or closes the port.
 pub fn line(interface: u8, open: bool) -> Vec<Transfer> {
     let state = Transfer::write(
         "SET_CONTROL_LINE_STATE",

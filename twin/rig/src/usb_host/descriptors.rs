@@ -1,6 +1,6 @@
 //! Finds the serial port in a configuration descriptor (USB 2.0 chapter 9, CDC 1.2).
 
-/// What the host needs to know of a CDC-ACM function.
+/// The properties of a CDC-ACM function that the host needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Function {
     /// Number of the communications interface.
@@ -19,10 +19,10 @@ const COMMUNICATIONS: [u8; 2] = [2, 2];
 const DATA: u8 = 10;
 
 impl Function {
-    /// Reads a configuration descriptor with everything that follows it.
+    /// Reads a configuration descriptor and the descriptors that follow it.
     ///
     /// # Errors
-    /// What is missing or malformed.
+    /// Describes what is missing or malformed.
     pub fn parse(configuration: &[u8]) -> Result<Self, &'static str> {
         let mut function = Self::default();
         let (mut has_control, mut in_data) = (false, false);

@@ -1,6 +1,6 @@
 //! A USB host with one full-speed port: enumerates a CDC-ACM device and moves its bytes.
 //!
-//! One transaction every 1/19 ms, which is what a full-speed bus carries of 64-byte bulk packets.
+//! It makes one transaction every 1/19 ms, the rate of 64-byte bulk packets on a full-speed bus.
 //! Times are those of USB 2.0 chapters 7 and 9: 100 ms debounce, 10 ms reset, 10 ms recovery,
 //! suspend after 3 ms without activity.
 
@@ -16,39 +16,39 @@ use crate::peripherals::otg::{Answer, Core, Packet};
 use control::{Begins, Progress, Transfer};
 use descriptors::Function;
 
-/// One transaction, ns.
+/// Duration of one transaction, ns.
 const TRANSACTION_NS: u64 = 1_000_000 / 19;
-/// How often an empty port is looked at, ns.
+/// Period at which an empty port is checked, ns.
 const IDLE_NS: u64 = 500_000;
 const DEBOUNCE_NS: u64 = 100_000_000;
 const RESET_NS: u64 = 10_000_000;
 const RECOVERY_NS: u64 = 10_000_000;
 const SUSPEND_NS: u64 = 3_000_000;
-/// How long a control transfer may take.
+/// Longest duration of a control transfer.
 const CONTROL_TIMEOUT_NS: u64 = 500_000_000;
-/// Port resets before the host gives a device up.
+/// Number of port resets after which the host gives up a device.
 const ATTEMPTS: u32 = 3;
 /// Largest bulk packet.
 const PACKET: usize = 64;
-/// Bytes that wait for a client before the host stops asking for more.
+/// Bytes that wait for a client above which the host stops asking for more.
 const BACKLOG: usize = 1 << 16;
 
-/// Where the port stands.
+/// The state of the port.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Port {
-    /// Nothing pulls D+ up.
+    /// No device pulls D+ up.
     Empty,
-    /// A device appeared; wait until its plug sits.
+    /// A device appeared; the host waits until its plug sits.
     Debounce(u64),
     /// The bus is in reset.
     Reset(u64),
-    /// The device may recover.
+    /// The device has time to recover.
     Recovery(u64),
     /// Control transfers run.
     Enumerating,
     /// The serial port exists.
     Configured,
-    /// The host gave the device up.
+    /// The host gave up the device.
     Failed,
 }
 
@@ -65,8 +65,8 @@ pub struct Counters {
     pub enumerations: u64,
     /// Control transfers that timed out or stalled.
     pub failed_transfers: u64,
-    /// Bulk packets from the device that were thrown away for their toggle: taken for one that the
-    /// host has.
+    /// Bulk packets from the device that were dropped for their toggle: it marks them as packets
+    /// that the host already has.
     pub repeated_packets: u64,
 }
 
@@ -84,7 +84,7 @@ pub struct Host {
     function: Option<Function>,
     /// Whether a program has the serial port open.
     open: bool,
-    /// Whether the device was told so.
+    /// Whether the device knows that it is open.
     told_open: bool,
     /// Whether the program reads.
     reading: bool,
@@ -101,7 +101,7 @@ pub struct Host {
     log: Vec<String>,
 }
 
-/// The host as the bus and the run share it.
+/// The host, shared by the bus and the run.
 #[derive(Clone, Debug)]
 pub struct SharedHost(Arc<Mutex<Host>>);
 
@@ -111,14 +111,14 @@ impl SharedHost {
         Self(Arc::new(Mutex::new(host)))
     }
 
-    /// The host. One thread runs the whole rig, so nobody waits here.
+    /// Locks the host. One thread runs the whole rig, therefore the lock never waits.
     pub fn lock(&self) -> MutexGuard<'_, Host> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Host {
-    /// A host with the cable plugged in and no program on the port.
+    /// Returns a host with the cable plugged in and no program on the port.
     pub fn new(faults: Faults, arrivals: Arrivals) -> Self {
         Self {
             port: Port::Empty,
@@ -144,27 +144,27 @@ impl Host {
         }
     }
 
-    /// Where the port stands.
+    /// Returns the state of the port.
     pub fn port(&self) -> Port {
         self.port
     }
 
-    /// Counters so far.
+    /// Returns the present counters.
     pub fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// Why the log of arrivals is not whole.
+    /// Returns the reason why the log of arrivals is incomplete; `None` if it is complete.
     pub fn arrivals_failure(&self) -> Option<&str> {
         self.arrivals.failure()
     }
 
-    /// What happened on the port, a line each.
+    /// Returns the events on the port, a line each.
     pub fn log(&self) -> &[String] {
         &self.log
     }
 
-    /// A program opens or closes the serial port: sets or clears DTR and RTS.
+    /// Opens or closes the serial port for a program: sets or clears DTR and RTS.
     pub fn set_open(&mut self, open: bool) {
         self.open = open;
         if !open {
@@ -173,22 +173,23 @@ impl Host {
         }
     }
 
-    /// The program reads, or does not.
+    /// Sets whether the program reads.
     pub fn set_reading(&mut self, reading: bool) {
         self.reading = reading;
     }
 
-    /// A control transfer, once the device is configured.
+    /// Queues a control transfer; it runs once the device is configured.
     pub fn request(&mut self, setup: [u8; 8]) {
         self.queue.push_back(Transfer::any(setup));
     }
 
-    /// The cable is plugged in, or not.
+    /// Plugs the cable in, or pulls it.
     pub fn set_cable(&mut self, plugged: bool) {
         self.cable = plugged;
     }
 
-    /// The next transaction, or whatever the port is waiting for. Answers when to come again, ns.
+    /// Carries out the next transaction, or the port's next state change. Returns the time of the
+    /// next call, ns.
     pub fn tick(&mut self, now: u64, device: &mut Core) -> u64 {
         let plugged = self.cable && !self.faults.on(Kind::CablePulled, now);
         if !plugged || !device.attached() {
@@ -220,7 +221,7 @@ impl Host {
         self.port = port;
     }
 
-    /// No device, or no cable. A device on a cut cable sees the bus go idle.
+    /// Handles a missing device or cable. A device on a cut cable sees the bus go idle.
     fn disconnected(&mut self, now: u64, device: &mut Core) -> u64 {
         if self.port != Port::Empty {
             self.note(now, "device gone");
@@ -270,7 +271,7 @@ impl Host {
         });
     }
 
-    /// One transaction of the control transfer at hand.
+    /// Carries out one transaction of the present control transfer.
     fn control(&mut self, now: u64, device: &mut Core) {
         let Some(transfer) = &mut self.transfer else {
             return;
@@ -334,7 +335,7 @@ impl Host {
         self.port = Port::Failed;
     }
 
-    /// A configured device: control transfers first, then bulk data, in turn.
+    /// Serves a configured device: control transfers first, then bulk data in turn.
     fn work(&mut self, now: u64, device: &mut Core) {
         if self.transfer.is_none() && self.open != self.told_open {
             self.tell_open(now);

@@ -1,17 +1,20 @@
-//! How the bytes of a line reach the FIFO: in groups of one FIFO's worth, each at the instant at
+//! The way of a line's bytes into the FIFO: in groups of one FIFO's worth, each at the instant at
 //! which its last byte is on the lines.
 //!
-//! Every event stops the core. So where the DMA took each word of a line's first group at once,
-//! what follows its second one is one event, at the line's end, and the groups follow each other as
-//! the FIFO is emptied. All that happens at a line's beginning or end is where it would be:
-//! interrupts of the interface, and of a DMA whose blocks are whole lines; and a counter that has
-//! moved since the last block tells so. Whoever writes to the interface amid the line finds what
-//! has come by then, and the rest comes in groups. Different from the chip: memory that is read
-//! amid a line has less of it; where the DMA is stopped amid a line, the overrun comes when the
-//! line ends; and where the sensor starts over amid a line, the rest that was on it is lost.
+//! Every event stops the core. To save events, the rest of a line after its second group is one
+//! event, at the line's end. This needs a DMA that took each word of the line's first group at
+//! once. The groups then follow each other as the FIFO is emptied. All effects at a line's
+//! beginning or end keep their times: interrupts of the interface, and of a DMA whose blocks are
+//! whole lines. So does the answer to whether a counter has moved since the last block. A write to
+//! the interface amid the line finds the bytes that have come by then, and the rest comes in
+//! groups.
 //!
-//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups, and a busy
-//! bus all lines of a run in which it is ever busy.
+//! Differences from the chip: memory that is read amid a line has less of it. If the DMA is stopped
+//! amid a line, the overrun comes at the line's end. If the sensor starts over amid a line, the
+//! rest of that line is lost.
+//!
+//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups. A busy bus
+//! does the same to all lines of a run in which it is ever busy.
 
 use rigless::device::DeviceContext;
 
@@ -41,7 +44,7 @@ impl Dcmi {
         }
     }
 
-    /// Whether a fault may hold up words of a run or end it early.
+    /// Returns whether a fault may delay words of a run or end it early.
     fn is_disturbed(&self, run: &Run, now_ns: u64) -> bool {
         let Some(frame) = &self.frame else {
             return true;
@@ -55,21 +58,21 @@ impl Dcmi {
         self.faults.asked_for(Kind::BusBusy) || disturbing.into_iter().any(disturbs)
     }
 
-    /// Receives what is due up to the next word that has to leave first.
+    /// Receives the due bytes up to the next word that has to leave first.
     pub(super) fn receive_due(&mut self) {
         while let Some(due) = self.due.take_if(|_| self.receiver.waiting() == 0) {
             self.receive_group(due);
         }
     }
 
-    /// Receives what is due, although words wait.
+    /// Receives all due bytes, although words wait.
     pub(super) fn receive_all_due(&mut self) {
         while let Some(due) = self.due.take() {
             self.receive_group(due);
         }
     }
 
-    /// Receives the first group of what is due, and leaves the rest of it due.
+    /// Receives the first group of the due bytes; the rest stays due.
     fn receive_group(&mut self, Bytes { run, from, to }: Bytes) {
         let group = (from + GROUP).min(to);
         let waiting = self.receiver.waiting();
@@ -90,8 +93,8 @@ impl Dcmi {
         self.due = (group < to).then_some(Bytes { run, from, to });
     }
 
-    /// Before something happens to the interface amid a line that arrives as one: what came until
-    /// now is received, and the rest arrives in groups.
+    /// Prepares for an access to the interface amid a line that arrives as one event. The bytes
+    /// until now are received, and the rest arrives in groups.
     pub(super) fn catch_up(&mut self, context: &mut DeviceContext<'_>) {
         let (Some(next), Some(frame)) = (self.next, &self.frame) else {
             return;
@@ -153,7 +156,7 @@ mod tests {
     use rigless::soc::stm32h743::generated::dcmi::Register;
     use rigless::time::VirtualNanos;
 
-    /// A part, its camera interface that captures, and what a DMA took from it.
+    /// A part, its camera interface during a capture, and the words that a DMA took from it.
     struct Bench {
         part: Stm32h743,
         slot: usize,
@@ -215,7 +218,7 @@ mod tests {
             );
         }
 
-        /// The next thing happens, and the DMA takes words while there are any.
+        /// Runs the next step, and lets the DMA take words while there are any.
         fn step(&mut self) {
             let next = self.dcmi.next.expect("the camera goes on");
             let (registers, mut context) = self.part.bus_mut().drive(next.at, self.slot);
@@ -231,7 +234,7 @@ mod tests {
             }
         }
 
-        /// The bytes that arrive next, if any do.
+        /// Returns the bytes that arrive next; `None` if the next step is another.
         fn coming(&self) -> Option<Bytes> {
             match self.dcmi.next?.step {
                 Step::Bytes(bytes) => Some(bytes),
@@ -239,7 +242,7 @@ mod tests {
             }
         }
 
-        /// Until the rest of a line is to arrive as one.
+        /// Runs until the rest of a line is planned as one event.
         fn until_the_rest_of_a_line(&mut self) -> Bytes {
             for _ in 0..1_000 {
                 if let Some(bytes) = self.coming().filter(|it| it.to - it.from > GROUP) {
@@ -250,7 +253,7 @@ mod tests {
             panic!("every line arrives in groups");
         }
 
-        /// When so many bytes of the run that arrives next are on the lines, ns.
+        /// Returns the instant, ns, at which this many bytes of the next run are on the lines.
         fn instant(&self, until: u32) -> u64 {
             let run = self.coming().expect("bytes").run;
             let frame = self.dcmi.frame.as_ref().expect("a frame");
@@ -269,7 +272,8 @@ mod tests {
         assert_eq!(bench.dcmi.counters.overruns, 0);
     }
 
-    /// What is on the lines by then is received, the rest in groups, and all of it is the same.
+    /// The bytes on the lines by then are received, the rest comes in groups, and the total is the
+    /// same.
     #[test]
     fn a_write_amid_a_line_finds_what_has_come_and_loses_nothing() {
         let [mut bench, mut undisturbed] = [Bench::new(), Bench::new()];

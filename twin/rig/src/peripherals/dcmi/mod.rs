@@ -1,5 +1,5 @@
-//! The camera interface: what the sensor's signals do to it, in virtual time, and what the firmware
-//! sees of that.
+//! The camera interface (DCMI): the sensor's signals act on it in virtual time, and the firmware
+//! sees its registers.
 //!
 //! The sensor's clock drives everything. Bytes arrive in groups of sixteen, one FIFO's worth, at
 //! the instant at which the last of them is on the lines; the FIFO holds four words, and a fifth
@@ -26,7 +26,7 @@ use timeline::{Bytes, Epoch, Next, Step};
 
 /// Bytes per event: one FIFO's worth.
 const GROUP: u32 = 4 * receiver::FIFO_WORDS as u32;
-/// The DMA waits for a busy bus at most so long, ns: a group of bytes comes every 320 ns at 50 MHz,
+/// The longest wait of the DMA for a busy bus, ns. A group of bytes comes every 320 ns at 50 MHz,
 /// and the FIFO holds no more than one.
 const LONGEST_WAIT_NS: u64 = 250;
 /// GPIOB_IDR. A write has no effect on the chip; the rig uses it to make the port look at its pins.
@@ -40,7 +40,7 @@ mod flag {
     pub const LINE: u32 = 1 << 4;
 }
 
-/// Which pins carry the camera's signals to the interface.
+/// The pins that carry the camera's signals to the interface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pins {
     /// Data lines.
@@ -58,7 +58,7 @@ pub struct Pins {
 pub struct Counters {
     /// Frames that ended with data.
     pub frames: u64,
-    /// Frames that ended without.
+    /// Frames that ended without data.
     pub empty_frames: u64,
     /// Words put into the FIFO.
     pub words: u64,
@@ -79,7 +79,7 @@ pub struct Dcmi {
     frame: Option<Frame>,
     epoch: Epoch,
     next: Option<Next>,
-    /// Bytes that are due and wait for the FIFO to be emptied.
+    /// Bytes that are due and wait until the FIFO is emptied.
     due: Option<Bytes>,
     receiver: Receiver,
     settings: Settings,
@@ -87,7 +87,7 @@ pub struct Dcmi {
     enabled: u32,
     interrupt: InterruptLine,
     chance: Chance,
-    /// The DMA waits for the bus until this event.
+    /// The event until which the DMA waits for the bus.
     bus: Option<EventId>,
     requested: bool,
     vsync: Level,
@@ -97,9 +97,9 @@ pub struct Dcmi {
 }
 
 impl Dcmi {
-    /// An interface wired to a sensor.
+    /// Returns an interface wired to a sensor.
     ///
-    /// `seed` decides what a busy bus does ([`Kind::BusBusy`]).
+    /// `seed` decides the waits of a busy bus ([`Kind::BusBusy`]).
     pub fn new(camera: SharedCamera, faults: Faults, rules: Rules, seed: u64) -> Self {
         Self {
             camera,
@@ -126,27 +126,27 @@ impl Dcmi {
         }
     }
 
-    /// Counters so far.
+    /// Returns the present counters.
     pub fn counters(&self) -> Counters {
         self.counters
     }
 
-    /// The level of the VSYNC line.
+    /// Returns the level of the VSYNC line.
     pub fn vsync(&self) -> Level {
         self.vsync
     }
 
-    /// When it took this level.
+    /// Returns the time at which it took this level.
     pub fn vsync_at(&self) -> VirtualNanos {
         self.vsync_at
     }
 
-    /// Takes over how the pins are configured, and the bus clock in Hz.
+    /// Applies the pins' configuration and the bus clock in Hz.
     pub fn wire(&mut self, pins: Pins, hclk_hz: u64) {
         (self.pins, self.hclk_hz) = (pins, hclk_hz);
     }
 
-    /// The part was reset: the registers are back, the sensor goes on.
+    /// Resets the registers with the part; the sensor goes on.
     pub fn part_reset(&mut self) {
         self.receiver.reset();
         self.due = None;
@@ -157,7 +157,7 @@ impl Dcmi {
         self.pins = Pins::default();
     }
 
-    /// VSYNC changes: on the port's pin, and in the interface.
+    /// Changes VSYNC: on the port's pin, and in the interface.
     fn set_vsync(
         &mut self,
         level: Level,
@@ -185,7 +185,7 @@ impl Dcmi {
         self.drive(context);
     }
 
-    /// RM0433: the bus clock must be at least 2.5 times PIXCLK.
+    /// Checks RM0433's rule: the bus clock must be at least 2.5 times PIXCLK.
     fn check_clock(&self) {
         let Some(frame) = &self.frame else { return };
         let pixel_clock = frame.output.pixel_clock_hz;
@@ -214,7 +214,7 @@ impl Dcmi {
         }
     }
 
-    /// On a busy bus the DMA gets the words of a group only after a while.
+    /// Delays the words of a group to the DMA on a busy bus.
     fn wait_for_the_bus(&mut self, context: &mut DeviceContext<'_>) {
         let now = context.now().0;
         if self.bus.is_none() && self.faults.on(Kind::BusBusy, now) {
@@ -224,7 +224,7 @@ impl Dcmi {
         }
     }
 
-    /// Drives the interrupt and the DMA request as the state wants them.
+    /// Sets the interrupt and the DMA request by the present state.
     fn drive(&mut self, context: &mut DeviceContext<'_>) {
         let interrupt = Level::from(self.raised & self.enabled != 0);
         self.interrupt.drive(interrupt, context);
@@ -327,7 +327,7 @@ impl Device for Dcmi {
         if self.interrupt.falls_at(event, context) {
             return;
         }
-        // What is still there was not taken in time.
+        // Words that are still there were not taken in time.
         self.receive_all_due();
         if self.bus.take_if(|bus| *bus == event).is_some() {
             return self.drive(context);

@@ -10,7 +10,7 @@ use std::collections::VecDeque;
 /// Words in the FIFO.
 pub const FIFO_WORDS: usize = 4;
 
-/// The fields of CR.
+/// The control register CR.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Settings {
     /// DCMI_CR.
@@ -42,7 +42,7 @@ pub mod control {
 }
 
 impl Settings {
-    /// Whether all given CR bits are set.
+    /// Returns whether all given CR bits are set.
     pub fn has(&self, bits: u32) -> bool {
         self.control & bits == bits
     }
@@ -51,13 +51,13 @@ impl Settings {
         self.control >> shift & ((1 << bits) - 1)
     }
 
-    /// One frame in so many is captured.
+    /// Returns n if one frame in n is captured.
     fn frame_interval(&self) -> u32 {
         [1, 2, 4, 4][self.field(8, 2) as usize]
     }
 }
 
-/// The FIFO was full when a word was ready.
+/// An overrun: the FIFO was full when a word was ready.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overrun;
 
@@ -75,22 +75,22 @@ pub struct Receiver {
 }
 
 impl Receiver {
-    /// Whether a frame is being captured.
+    /// Returns whether a frame is being captured.
     pub fn capturing(&self) -> bool {
         self.capturing
     }
 
-    /// Words waiting.
+    /// Returns the count of waiting words.
     pub fn waiting(&self) -> usize {
         self.fifo.len()
     }
 
-    /// Takes the oldest word; zero when there is none.
+    /// Takes the oldest word; zero if the FIFO is empty.
     pub fn take(&mut self) -> u32 {
         self.fifo.pop_front().unwrap_or(0)
     }
 
-    /// VSYNC went to its valid level with CAPTURE set: captures this frame when its turn has come.
+    /// Handles VSYNC at its valid level with CAPTURE set: captures this frame if it is its turn.
     pub fn begin_frame(&mut self, settings: &Settings) {
         self.capturing = self.frames_seen.is_multiple_of(settings.frame_interval());
         self.frames_seen = self.frames_seen.wrapping_add(1);
@@ -98,10 +98,10 @@ impl Receiver {
         (self.packing, self.packed) = (0, 0);
     }
 
-    /// One byte at the valid level of HSYNC and VSYNC.
+    /// Takes one byte at the valid level of HSYNC and VSYNC.
     ///
     /// # Errors
-    /// When it completed a word and the FIFO was full: the FIFO is emptied and the frame is given
+    /// If it completes a word while the FIFO is full: the FIFO is emptied and the frame is given
     /// up.
     pub fn byte(&mut self, byte: u8, settings: &Settings) -> Result<(), Overrun> {
         let clock = self.clock;
@@ -118,7 +118,7 @@ impl Receiver {
         }
     }
 
-    /// HSYNC went to its blanking level. A last word that is not full is filled with zeros.
+    /// Handles HSYNC at its blanking level. An incomplete last word is filled with zeros.
     ///
     /// # Errors
     /// As [`Receiver::byte`].
@@ -131,13 +131,13 @@ impl Receiver {
         Ok(())
     }
 
-    /// The frame is over. Answers how many words it had.
+    /// Ends the frame. Returns its count of words.
     pub fn end_frame(&mut self) -> u32 {
         self.capturing = false;
         self.words
     }
 
-    /// The interface was switched off.
+    /// Resets the state when the interface is switched off.
     pub fn reset(&mut self) {
         *self = Self::default();
     }
@@ -162,7 +162,8 @@ impl Receiver {
     }
 }
 
-/// BSM and OEBS: all bytes, every other, one of four, two of four; from the first or the second on.
+/// Returns whether BSM and OEBS select a byte: all bytes, every other, one of four, two of four;
+/// from the first or the second on.
 fn selects_byte(column: u32, mode: u32, second: u32) -> bool {
     match mode {
         0 => true,
@@ -183,7 +184,7 @@ mod tests {
         }
     }
 
-    /// Everything that leaves the FIFO when it is emptied in time.
+    /// Returns all words that leave the FIFO if it is emptied in time.
     fn captured(settings: &Settings, lines: &[&[u8]]) -> Vec<u32> {
         let mut receiver = Receiver::default();
         receiver.begin_frame(settings);

@@ -1,4 +1,4 @@
-//! One frame's signals in time, and which of them the camera interface takes for data.
+//! One frame's signals in time, and the bytes that the camera interface takes for data.
 
 use crate::camera::encode;
 use crate::camera::output::Output;
@@ -8,33 +8,33 @@ use crate::truth::Exposed;
 /// A frame that the camera is sending.
 #[derive(Debug)]
 pub struct Frame {
-    /// When VSYNC began, ns.
+    /// Time at which VSYNC began, ns.
     pub start_ns: u64,
     /// Its signals.
     pub output: Output,
-    /// Which one; known from the end of VSYNC on.
+    /// The exposure of the frame; known from the end of VSYNC on.
     pub exposed: Option<Exposed>,
     picture: Option<Picture>,
     row: Option<(u32, Vec<u8>)>,
 }
 
-/// Bytes that the interface sees at the valid level of HSYNC, in one line.
+/// A run: bytes that the interface sees at the valid level of HSYNC, in one line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
     /// Line of the frame, from VSYNC on.
     pub line: u32,
     /// Pixel clock of the line at which the first byte is on the lines.
     pub start: u32,
-    /// Bytes.
+    /// Number of bytes.
     pub bytes: u32,
-    /// The row they belong to; `None` for what lies on the lines between rows.
+    /// The row of the bytes; `None` for the lines' levels between rows.
     pub row: Option<u32>,
     /// HSYNC goes to its blanking level at the end.
     pub ends_line: bool,
 }
 
 impl Frame {
-    /// A frame that begins now.
+    /// Returns a frame that begins now.
     pub fn new(start_ns: u64, output: Output) -> Self {
         Self {
             start_ns,
@@ -45,13 +45,13 @@ impl Frame {
         }
     }
 
-    /// The instant at which so many pixel clocks of a line have passed, ns.
+    /// Returns the instant at which this many pixel clocks of a line have passed, ns.
     pub fn instant(&self, line: u32, clock: u32) -> u64 {
         let clocks = u64::from(line) * u64::from(self.output.line_clocks) + u64::from(clock);
         self.start_ns + self.output.clocks_ns(clocks)
     }
 
-    /// The line and pixel clock at an instant, which may lie past the frame's end.
+    /// Returns the line and pixel clock at an instant, which may lie past the frame's end.
     pub fn position(&self, now_ns: u64) -> (u64, u32) {
         let passed = u128::from(now_ns.saturating_sub(self.start_ns));
         let clocks = passed * u128::from(self.output.pixel_clock_hz) / 1_000_000_000;
@@ -59,20 +59,20 @@ impl Frame {
         ((clocks / line_clocks) as u64, (clocks % line_clocks) as u32)
     }
 
-    /// Whether VSYNC is at its active level at an instant.
+    /// Returns whether VSYNC is at its active level at an instant.
     pub fn in_vsync(&self, now_ns: u64) -> bool {
         self.position(now_ns).0 < u64::from(self.output.vsync_lines)
     }
 
-    /// Whether HREF is at its active level at an instant.
+    /// Returns whether HREF is at its active level at an instant.
     pub fn in_row(&self, now_ns: u64) -> bool {
         let (line, clock) = self.position(now_ns);
         u32::try_from(line).is_ok_and(|line| self.row_of(line).is_some())
             && clock < self.output.row_bytes
     }
 
-    /// The first run at or after a line, before the line `end`. With `inverted`, the interface
-    /// takes HREF's idle level for data.
+    /// Returns the first run at or after a line, before the line `end`; `None` if there is no run.
+    /// With `inverted`, the interface takes HREF's idle level for data.
     pub fn run_from(&self, line: u32, end: u32, inverted: bool) -> Option<Run> {
         (line..end).find_map(|line| self.run_in(line, inverted))
     }
@@ -105,8 +105,8 @@ impl Frame {
             .filter(|&row| row < self.output.rows)
     }
 
-    /// Bytes of a run, `from..to`; the picture is asked for when the first row is needed. Between
-    /// rows the lines are low.
+    /// Returns the bytes `from..to` of a run. The picture is made when the first row is needed.
+    /// Between rows the lines are low.
     pub fn bytes(
         &mut self,
         run: &Run,
@@ -126,9 +126,9 @@ impl Frame {
     }
 }
 
-/// What is latched when the lines are sampled at the edge at which they change: bits that differ
-/// from the byte before are as likely old as new. The pattern is fixed, so that a run can be
-/// repeated.
+/// Returns the byte that is latched if the lines are sampled at the edge at which they change. Bits
+/// that differ from the byte before are old or new with equal probability. The pattern is fixed, to
+/// make runs repeatable.
 pub fn sampled_while_changing(before: u8, byte: u8, position: u64) -> u8 {
     let coin = (position.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 56) as u8;
     byte ^ ((before ^ byte) & coin)

@@ -1,4 +1,4 @@
-//! The sensor's signals one after the other: which comes next, and when.
+//! The sequence of the sensor's signals: the next step and its time.
 
 use rigless::device::{DeviceContext, Level, RegisterFile};
 use rigless::time::{EventId, VirtualNanos};
@@ -8,16 +8,16 @@ use super::signals::{Frame, Run};
 use super::{Dcmi, GROUP, flag};
 use crate::camera::output::Output;
 
-/// What the sensor does next.
+/// The sensor's next step.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Step {
     /// VSYNC goes to its active level: a frame begins.
     VsyncBegins,
-    /// VSYNC goes back.
+    /// VSYNC goes back to its idle level.
     VsyncEnds,
     /// Bytes arrive.
     Bytes(Bytes),
-    /// A silent sensor may speak again.
+    /// A silent sensor may start to send again.
     Retry,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Bytes {
     pub to: u32,
 }
 
-/// The step that is planned.
+/// The planned step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Next {
     pub step: Step,
@@ -37,7 +37,7 @@ pub(super) struct Next {
     pub event: EventId,
 }
 
-/// Where frame starts are counted from, so that they do not drift.
+/// The origin from which frame starts are counted, to avoid drift.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Epoch {
     at_ns: u64,
@@ -46,7 +46,7 @@ pub(super) struct Epoch {
 }
 
 impl Dcmi {
-    /// Starts the sensor's frame timing afresh: after power-up, a new clock, a register reset.
+    /// Restarts the sensor's frame timing: after power-up, a new clock, a register reset.
     pub fn start_over(&mut self, registers: &mut RegisterFile, context: &mut DeviceContext<'_>) {
         let now = context.now().0;
         self.next = None;
@@ -54,7 +54,7 @@ impl Dcmi {
         let pulse = (self.frame.take())
             .is_some_and(|frame| frame.exposed.is_none() && frame.output.vsync_active_high);
         if pulse {
-            // VSYNC was at its active level. That it falls back is an edge like any other.
+            // VSYNC was at its active level. Its fall is an edge like any other.
             self.camera.lock().count_edge(now);
         }
         self.set_vsync(Level::Low, registers, context);
@@ -74,7 +74,8 @@ impl Dcmi {
         }
     }
 
-    /// The events of this slot were dropped by a reset; the sensor does not care.
+    /// Schedules the next step again: a reset dropped the events of this slot, but does not affect
+    /// the sensor.
     pub fn reschedule(&mut self, context: &mut DeviceContext<'_>) {
         if let Some(next) = &mut self.next {
             next.event = context.schedule(next.at);
@@ -90,7 +91,7 @@ impl Dcmi {
         });
     }
 
-    /// Plans what follows from the beginning of a line on.
+    /// Plans the steps from the beginning of a line on.
     pub(super) fn plan_from(&mut self, line: u32, context: &mut DeviceContext<'_>) {
         let Some(frame) = &self.frame else { return };
         let vsync_lines = frame.output.vsync_lines;
@@ -123,7 +124,7 @@ impl Dcmi {
         self.plan_bytes(run, from, (from + GROUP).min(run.bytes), context);
     }
 
-    /// Plans that bytes arrive when the last of them is on the lines.
+    /// Plans the arrival of bytes, at the time when the last of them is on the lines.
     pub(super) fn plan_bytes(
         &mut self,
         run: Run,
@@ -136,13 +137,13 @@ impl Dcmi {
         self.plan(Step::Bytes(Bytes { run, from, to }), at, context);
     }
 
-    /// Whether data lines matter at all now.
+    /// Returns whether the data lines have any effect now.
     pub(super) fn listens(&self) -> bool {
         let wanted = self.receiver.capturing() || self.enabled & flag::LINE != 0;
         wanted && self.settings.has(control::ENABLE) && self.pins.clock && self.pins.hsync
     }
 
-    /// Whether HREF's idle level is taken for data.
+    /// Returns whether HREF's idle level is taken for data.
     pub(super) fn inverted(&self, output: &Output) -> bool {
         output.href_active_high == self.settings.has(control::HSYNC_BLANKS_HIGH)
     }

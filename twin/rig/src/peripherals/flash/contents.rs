@@ -1,4 +1,5 @@
-//! What the bank holds, in memory and in a file, and what a cut operation leaves of it.
+//! The bank's contents, in memory and in a file, and the effect of an interrupted operation on
+//! them.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -15,30 +16,30 @@ pub const SECTOR_BYTES: u32 = 128 << 10;
 pub const WORD_BYTES: u32 = 32;
 const BANK_BYTES: usize = (BANK.end - BANK.start) as usize;
 
-/// What an operation leaves that was cut off.
+/// The result of an interrupted operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Leaves {
-    /// What there was before.
+    /// The state before the operation.
     Before,
-    /// A word that does not read; of a sector some of each.
+    /// A word that cannot be read; a sector has some words of each state.
     Torn,
-    /// What there was to be.
+    /// The state after the complete operation.
     After,
 }
 
 /// A cut of the power.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cut {
-    /// At this operation, counted from 0.
+    /// The operation in which the power is cut, counted from 0.
     pub operation: u64,
-    /// What it leaves.
+    /// The result of that operation.
     pub leaves: Leaves,
 }
 
 impl FromStr for Cut {
     type Err = String;
 
-    /// `N` or `N:before`, `N:torn`, `N:after`.
+    /// Reads `N` or `N:before`, `N:torn`, `N:after`.
     fn from_str(text: &str) -> Result<Self, String> {
         let (number, leaves) = text.split_once(':').unwrap_or((text, "torn"));
         let operation = number
@@ -61,17 +62,17 @@ pub enum Operation {
     Program {
         /// Its address.
         word: u32,
-        /// What it becomes.
+        /// Its new contents.
         bytes: [u8; WORD_BYTES as usize],
     },
     /// A sector is erased.
     Erase {
-        /// Where it begins.
+        /// The sector's first address.
         sector: u32,
     },
 }
 
-/// The bank's bytes, and which of its words do not read.
+/// The bank's bytes, and its unreadable words.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contents {
     /// The bytes.
@@ -95,7 +96,7 @@ impl Contents {
     /// Reads a file: the bank's bytes, then the addresses of torn words, little-endian.
     ///
     /// # Errors
-    /// When it cannot be read, or is no such file.
+    /// If it cannot be read, or has another format.
     pub fn load(file: &Path) -> anyhow::Result<Self> {
         let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
         if bytes.len() < BANK_BYTES || !bytes.len().is_multiple_of(4) {
@@ -125,26 +126,26 @@ impl Contents {
     /// Writes such a file.
     ///
     /// # Errors
-    /// When it cannot be written.
+    /// If it cannot be written.
     pub fn save(&self, file: &Path) -> anyhow::Result<()> {
         let torn = self.torn.iter().flat_map(|address| address.to_le_bytes());
         let bytes: Vec<u8> = self.array.iter().copied().chain(torn).collect();
         std::fs::write(file, bytes).with_context(|| file.display().to_string())
     }
 
-    /// Words that do not read.
+    /// Returns the count of unreadable words.
     pub fn torn(&self) -> usize {
         self.torn.len()
     }
 
-    /// What the word at an address reads as; `None` when it does not read.
+    /// Returns the word at an address; `None` if it cannot be read.
     pub fn word(&self, address: u32) -> Option<&[u8]> {
         let at = (address - BANK.start) as usize;
         let bytes = &self.array[at..at + WORD_BYTES as usize];
         (!self.torn.contains(&address)).then_some(bytes)
     }
 
-    /// Does an operation, or what a cut of the power leaves of it.
+    /// Carries out an operation, completely or with the result of a power cut.
     pub fn operate(&mut self, operation: &Operation, leaves: Leaves) {
         match (*operation, leaves) {
             (_, Leaves::Before) => {}
@@ -168,7 +169,7 @@ impl Contents {
         self.torn.range(from..range.end as u32).next().is_some()
     }
 
-    /// A word was programmed; whether it was blank.
+    /// Marks a word as programmed. Returns whether it was blank.
     pub(super) fn programmed(&mut self, word: u32) -> bool {
         self.written.insert(word) && !self.torn.contains(&word)
     }
@@ -183,7 +184,7 @@ impl Contents {
         self.torn.insert(word);
     }
 
-    /// Of three words one is blank, one does not read, and one is as it was.
+    /// Tears a sector: of three words one is blank, one is unreadable, and one is unchanged.
     fn tear_sector(&mut self, sector: u32) {
         let words = (sector..sector + SECTOR_BYTES).step_by(WORD_BYTES as usize);
         for (nth, word) in words.enumerate() {

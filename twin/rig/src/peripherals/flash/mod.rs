@@ -1,11 +1,11 @@
-//! The second bank of the flash, where firmware keeps things: words of 256 bits with an error
-//! correcting code, contents that outlive a run, and power that is cut at an operation.
+//! The second bank of the flash, in which firmware stores its settings: words of 256 bits with an
+//! error correcting code, contents that outlive a run, and power cuts during an operation.
 //!
 //! Registers, keys, write buffer, queue and times are rigless' (RM0433 chapter 4, DS12110 table
-//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits). Here are the operations:
-//! which words are blank, which were torn by a cut, what firmware must not do to them. A torn word
-//! reads as a bus error, which the MDMA reports; a read by the core passes unseen, as the
-//! emulator's core reads flash by itself.
+//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits). This module has the
+//! operations: blank words, words torn by a cut, and the accesses that firmware must not make to
+//! them. A torn word reads as a bus error, which the MDMA reports. A read by the core is not
+//! checked, because the emulator's core reads flash by itself.
 
 mod contents;
 
@@ -30,16 +30,16 @@ const BUSY: u64 = 1 << 0 | 1 << 2;
 /// CR2: the sector's number, three bits from here.
 const SECTOR_BIT: u32 = 8;
 
-/// The bank's contents, for the emulator to begin with.
+/// Returns the bank's contents with which the emulator begins.
 ///
 /// # Errors
-/// Never: plain bytes are an image.
+/// Never: plain bytes are a valid image.
 pub fn image(contents: &Contents) -> anyhow::Result<Image> {
     let (name, bytes) = (Path::new("flash"), contents.array.clone());
     Ok(Image::new(name, bytes, Some(BANK.start.into()))?)
 }
 
-/// What the emulator has of the bank.
+/// Returns the emulator's contents of the bank.
 pub fn read_array(host: &mut dyn Host) -> Vec<u8> {
     let addresses = (u64::from(BANK.start)..u64::from(BANK.end)).step_by(8);
     let words = addresses.map(|address| host.read(address, Width::W64).unwrap_or(u64::MAX));
@@ -58,14 +58,14 @@ struct State {
     /// Words that were read or programmed, by their addresses.
     touched: BTreeSet<u32>,
     under_way: bool,
-    /// The power is cut when the operation under way has ended.
+    /// The operation at whose end the power is cut.
     cut_at_its_end: Option<Operation>,
-    /// The operation that the power was cut in, and what it leaves.
+    /// The operation in which the power was cut, and its result.
     was_cut: Option<(Operation, Leaves)>,
 }
 
 impl Bank {
-    /// A bank with these contents; the power is cut as asked for.
+    /// Returns a bank with these contents and a planned cut of the power.
     pub fn new(contents: Contents, cut: Option<Cut>) -> Self {
         Self(Arc::new(Mutex::new(State {
             contents,
@@ -82,24 +82,24 @@ impl Bank {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Programming and erasing operations so far, the one that was cut, too.
+    /// Returns the programming and erasing operations of the run, including an interrupted one.
     pub fn operations(&self) -> Vec<Operation> {
         self.lock().operations.clone()
     }
 
-    /// Addresses of the words that were read or programmed so far. What the program makes of the
-    /// bank depends on no other word.
+    /// Returns the addresses of the words that were read or programmed during the run. The
+    /// program's behaviour depends on no other word of the bank.
     pub fn touched(&self) -> BTreeSet<u32> {
         self.lock().touched.clone()
     }
 
-    /// Whether the power was cut.
+    /// Returns whether the power was cut.
     pub fn was_cut(&self) -> bool {
         self.lock().was_cut.is_some()
     }
 
-    /// Whether a read of so many bytes is a bus error. Noted as a breach when it would wait for an
-    /// operation.
+    /// Returns whether a read of this many bytes is a bus error. Notes a breach if the read would
+    /// wait for an operation.
     pub fn refuses(&self, address: u64, bytes: u64, rules: &Rules) -> bool {
         let range = address..address + bytes;
         if range.end <= u64::from(BANK.start) || range.start >= u64::from(BANK.end) {
@@ -118,7 +118,7 @@ impl Bank {
         state.contents.is_torn(range)
     }
 
-    /// The contents at the end of a run; `array` is what the emulator has of the bank.
+    /// Returns the contents at the end of a run; `array` are the emulator's contents of the bank.
     pub fn left(&self, array: Vec<u8>) -> Contents {
         let state = self.lock();
         let mut contents = state.contents.clone();
@@ -130,7 +130,7 @@ impl Bank {
     }
 }
 
-/// The words of the bank that a range of addresses has a part in.
+/// Iterates over the words of the bank that overlap a range of addresses.
 fn words(range: &Range<u64>) -> impl Iterator<Item = u32> + use<> {
     let from = range.start.max(BANK.start.into()) as u32 / WORD_BYTES * WORD_BYTES;
     let to = range.end.min(BANK.end.into()) as u32;
@@ -138,7 +138,7 @@ fn words(range: &Range<u64>) -> impl Iterator<Item = u32> + use<> {
 }
 
 impl State {
-    /// An operation begins.
+    /// Begins an operation.
     fn begin(&mut self, operation: Operation, rules: &Rules) {
         let number = self.operations.len() as u64;
         let leaves = self.cut.filter(|cut| cut.operation == number);
@@ -184,13 +184,13 @@ pub struct Flash {
     interface: flash::Flash,
     bank: Bank,
     rules: Rules,
-    /// The word that was stored to last, and what was stored.
+    /// The word with the latest store, and the stored bytes.
     word: u32,
     bytes: [u8; WORD_BYTES as usize],
 }
 
 impl Flash {
-    /// Out of reset.
+    /// Returns the interface out of reset.
     pub fn new(bank: Bank, rules: Rules) -> Self {
         Self {
             interface: flash::Flash::new(),
@@ -201,7 +201,7 @@ impl Flash {
         }
     }
 
-    /// Looks whether an operation began or ended.
+    /// Checks whether an operation began or ended.
     fn look(&mut self, registers: &RegisterFile, operation: Option<Operation>) {
         if registers.get(Register::Sr1) & BUSY != 0 {
             self.rules.broken(|| {

@@ -1,4 +1,4 @@
-//! What a channel's registers ask for, and whether that is allowed.
+//! Decodes and checks the transfer that a channel's registers describe.
 
 use rigless::emulator::{Error, Memory};
 use rigless::soc::Width;
@@ -11,11 +11,11 @@ const TCM: [std::ops::Range<u64>; 2] = [0..64 << 10, 0x2000_0000..0x2002_0000];
 /// One block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
-    /// First address.
+    /// First address of the source.
     pub source: u64,
-    /// First address.
+    /// First address of the destination.
     pub destination: u64,
-    /// Size.
+    /// Size in bytes.
     pub bytes: u64,
 }
 
@@ -30,8 +30,8 @@ impl Block {
     }
 }
 
-/// What the registers of a channel ask for, or what is wrong with it. `get` reads a register by its
-/// row, `control` is what was written to CR.
+/// Returns the transfer that the registers of a channel describe. `get` reads a register by its
+/// row, `control` is the value written to CR. The error describes what is wrong.
 pub fn asked_for(get: &dyn Fn(usize) -> u64, control: u64) -> Result<Block, String> {
     let (tcr, tbr) = (get(row::TCR), get(row::TBR));
     let field = |shift: u32, bits: u32| tcr >> shift & ((1 << bits) - 1);
@@ -66,7 +66,7 @@ pub fn asked_for(get: &dyn Fn(usize) -> u64, control: u64) -> Result<Block, Stri
     })
 }
 
-/// Whether the simulation knows what is asked for.
+/// Checks that the simulation supports the transfer.
 fn simulated(get: &dyn Fn(usize) -> u64, control: u64) -> Result<(), String> {
     let tcr = get(row::TCR);
     let field = |shift: u32, bits: u32| tcr >> shift & ((1 << bits) - 1);
@@ -107,7 +107,7 @@ struct Port {
     size: u64,
     /// TCR.SBURST or DBURST.
     burst: u64,
-    /// On the AHB port, where ITCM and DTCM are; otherwise on AXI.
+    /// Whether it is on the AHB port, as ITCM and DTCM are; otherwise on AXI.
     ahb: bool,
 }
 
@@ -148,7 +148,7 @@ impl Port {
 mod tests {
     use super::*;
 
-    /// A band from AXI SRAM to DTCM, with some registers changed.
+    /// Decodes the transfer of a band from AXI SRAM to DTCM, with some registers changed.
     fn asked(changes: &[(usize, u64)]) -> Result<Block, String> {
         let tcr = 0b1010 | 3 << 4 | 2 << 6 | 3 << 8 | 2 << 10 | 3 << 12 | 3 << 15 | 127 << 18;
         let usual = [

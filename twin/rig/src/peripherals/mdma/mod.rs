@@ -1,11 +1,11 @@
-//! The master DMA controller, which alone reaches DTCM and ITCM: blocks of memory on software
-//! request.
+//! The master DMA controller (MDMA), which alone reaches DTCM and ITCM: it moves blocks of memory
+//! on software request.
 //!
-//! RM0433 rev 7 chapter 14. A request moves its block after the time that it takes at 240 MHz, all
-//! at once at its end. Simulated: 16 channels, software requests for one block, increments, sizes
-//! with packing, flags, interrupt, errors. Not simulated: hardware triggers, repeated blocks,
-//! linked lists, endianness, offsets other than the size; using them ends the run with an error,
-//! and so does a transfer that the manual forbids.
+//! RM0433 rev 7 chapter 14. A request moves its whole block at its end, after the time that the
+//! block takes at 240 MHz. Simulated: 16 channels, software requests for one block, increments,
+//! sizes with packing, flags, interrupt, errors. Not simulated: hardware triggers, repeated blocks,
+//! linked lists, endianness, offsets other than the size. Their use ends the run with an error, as
+//! does a transfer that the manual forbids.
 
 mod block;
 
@@ -22,15 +22,15 @@ use crate::rules::Rules;
 use block::{Block, asked_for};
 
 const CHANNELS: usize = 16;
-/// Registers of a channel in the vendor's table, the first channel's from row 1 on.
+/// Number of a channel's registers in the vendor's table; the first channel's begin at row 1.
 const ROWS: usize = 13;
-/// One buffer of 128 bytes is read in 16 beats of 8 bytes, written in 32 of 4, with as many cycles
-/// again for arbitration as reading takes: an assumption.
+/// One buffer of 128 bytes is read in 16 beats of 8 bytes and written in 32 of 4. Arbitration takes
+/// as many cycles as reading: an assumption.
 const BUFFER_BYTES: u64 = 128;
 const BUFFER_CYCLES: u64 = 64;
 const BUS_HZ: u64 = 240_000_000;
-/// A block on a busy bus takes at most so many times as long: 84 µs for a band, half of what the
-/// camera takes to send it.
+/// The largest factor by which a busy bus lengthens a block. A band takes 84 µs at most, half of
+/// the time in which the camera sends it.
 const LONGEST_WAIT: u64 = 16;
 /// Rows of a channel.
 mod row {
@@ -76,14 +76,14 @@ pub struct Mdma {
     chance: Chance,
     channels: [Channel; CHANNELS],
     interrupt: InterruptLine,
-    /// Blocks that ended and whose bytes are not yet moved.
+    /// Blocks that ended, with bytes not yet moved.
     to_move: Vec<Block>,
     memory_bytes: u64,
 }
 
 impl Mdma {
-    /// A controller at rest.
-    /// `seed` decides how long others hold the bus under [`Kind::BusBusy`].
+    /// Returns a controller at rest. `seed` decides the time for which others hold the bus under
+    /// [`Kind::BusBusy`].
     pub fn new(rules: Rules, faults: Faults, bank: Bank, seed: u64) -> Self {
         Self {
             rules,
@@ -97,13 +97,13 @@ impl Mdma {
         }
     }
 
-    /// Bytes moved so far out of memories, which is what bands and snapshots are; not those of the
-    /// flash.
+    /// Returns the count of bytes moved out of memories, that is, of bands and snapshots. Bytes of
+    /// the flash do not count.
     pub fn memory_bytes(&self) -> u64 {
         self.memory_bytes
     }
 
-    /// How often a block takes the time that it takes alone.
+    /// Returns the factor by which the bus lengthens a block.
     fn patience(&mut self, now_ns: u64) -> u64 {
         if !self.faults.on(Kind::BusBusy, now_ns) {
             return 1;
@@ -139,7 +139,7 @@ impl Mdma {
         }
     }
 
-    /// A block's time is over.
+    /// Ends a block after its time.
     fn end_block(
         &mut self,
         nth: usize,

@@ -1,8 +1,8 @@
 //! The core's three register blocks on the bus: global, device, and FIFOs.
 //!
-//! The vendor's register tables leave out the FIFOs and some endpoints. So the part's slots are
-//! exchanged for slots that cover every word, with the same clock gate; the reset line and the
-//! clock follow the slot.
+//! The vendor's register tables leave out the FIFOs and some endpoints. The part's slots are
+//! therefore replaced by slots that cover every word, with the same clock gate. The reset line and
+//! the clock follow the slot.
 
 use rigless::device::{DeviceContext, ErasedDevice, Level, RegisterFile, RequestChange};
 use rigless::mcu::Mcu;
@@ -19,10 +19,10 @@ use crate::usb_host::SharedHost;
 const BASE: u64 = 0x4008_0000;
 /// OTG_FS global interrupt.
 const LINES: &[u16] = &[101];
-/// Where the vendor's file puts power and clock gating, and the FIFOs behind it.
+/// Offset of power and clock gating in the vendor's file; the FIFOs follow it.
 const FIFO_OFFSET: u64 = 0xE00;
 
-/// Which block a slot is.
+/// The block of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Which {
     Global,
@@ -37,7 +37,7 @@ static FIFO: LazyLock<&'static [RegisterSpec]> = LazyLock::new(|| {
     words(std::iter::once(0).chain((0..ENDPOINTS as u32).map(|n| first_fifo + n * 0x1000)))
 });
 
-/// A register table of plain words, made once per process.
+/// Returns a register table of plain words, made once per process.
 fn words(offsets: impl Iterator<Item = u32>) -> &'static [RegisterSpec] {
     let word = |offset: u32| RegisterSpec {
         name: Box::leak(format!("WORD_{offset:05X}").into_boxed_str()),
@@ -76,15 +76,15 @@ impl Which {
 pub struct Blocks {
     blocks: [Block; 3],
     slots: [usize; 3],
-    /// Holds the part's own slots.
+    /// The bus that holds the part's own slots.
     donor: Bus,
 }
 
 impl Blocks {
-    /// Takes the place of the part's own blocks.
+    /// Replaces the part's own blocks.
     ///
     /// # Errors
-    /// When the part is not laid out as expected.
+    /// If the part is not laid out as expected.
     pub fn fit(part: &mut Stm32h743, core: &SharedCore, host: &SharedHost) -> Result<Self, Error> {
         let mut slots = [0; 3];
         for (which, slot) in Which::ALL.into_iter().zip(&mut slots) {
@@ -105,29 +105,29 @@ impl Blocks {
         Ok(blocks)
     }
 
-    /// Takes the place of the part's own blocks, or gives it back. A part is reset with its own
-    /// blocks in place.
+    /// Exchanges these blocks with the part's own ones, in either direction. A part is reset with
+    /// its own blocks in place.
     pub fn exchange(&mut self, part: &mut Stm32h743) {
         for slot in self.slots {
             std::mem::swap(part.bus_mut().slot_mut(slot), self.donor.slot_mut(slot));
         }
     }
 
-    /// The model for a slot, if it is one of the three.
+    /// Returns the model of a slot; `None` if it is not one of the three.
     pub fn model(&mut self, slot: usize) -> Option<&mut dyn ErasedDevice> {
         let nth = self.slots.iter().position(|had| *had == slot)?;
         Some(&mut self.blocks[nth])
     }
 
-    /// Lets the host look at the port at an instant: at the start, and after a reset.
+    /// Makes the host check the port at an instant: at the start, and after a reset.
     pub fn wake_host(&mut self, bus: &mut Bus, at: VirtualNanos) {
         let (_, mut context) = bus.drive(at, self.slots[0]);
         self.blocks[0].schedule_host(at.0, &mut context);
     }
 }
 
-/// A bus with the part's instances in the part's order, so that a gate names the same bits, and
-/// with our blocks.
+/// Returns a bus with the part's instances in the part's order, in which gates have the same bits,
+/// and with the rig's blocks.
 fn donor(part: &Stm32h743) -> Result<Bus, Error> {
     let ours = Which::ALL.map(Which::peripheral);
     let replaced = |had: &Peripheral| {
@@ -236,7 +236,7 @@ impl ErasedDevice for Block {
         self.drive(context);
     }
 
-    /// The board tells the clock, with its error ([`crate::board::Wiring`]).
+    /// The clock comes from the board, with its error ([`crate::board::Wiring`]).
     fn on_clock(
         &mut self,
         _hz: u64,

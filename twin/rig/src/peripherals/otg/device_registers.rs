@@ -7,13 +7,14 @@ pub const SOFT_DISCONNECT: u32 = 1 << 1;
 /// DSTS: enumerated at full speed.
 const FULL_SPEED: u32 = 3 << 1;
 
-/// Registers of one endpoint.
+/// Register offsets of one endpoint.
 const CONTROL: u32 = 0x00;
 const INTERRUPT: u32 = 0x08;
 const SIZE: u32 = 0x10;
 const FIFO_ROOM: u32 = 0x18;
 
-/// Which endpoint's which register an offset names: the direction's base, 0x20 bytes each.
+/// Returns the endpoint and the register at an offset from the direction's base, 0x20 bytes each.
+/// Returns `None` if the offset is outside.
 fn endpoint(offset: u32, base: u32) -> Option<(usize, u32)> {
     let inside = offset.checked_sub(base)?;
     let number = (inside / 0x20) as usize;
@@ -21,7 +22,7 @@ fn endpoint(offset: u32, base: u32) -> Option<(usize, u32)> {
 }
 
 impl Core {
-    /// A read by the firmware.
+    /// Handles a read by the firmware.
     pub(super) fn read_device(&self, offset: u32, now_ns: u64) -> u32 {
         match offset {
             0x00 => self.dcfg,
@@ -63,7 +64,7 @@ impl Core {
         }
     }
 
-    /// A write by the firmware.
+    /// Handles a write by the firmware.
     pub(super) fn write_device(&mut self, offset: u32, value: u32) {
         match offset {
             0x00 => self.dcfg = value,
@@ -112,7 +113,7 @@ mod tests {
     use super::super::{Answer, Packet};
     use super::*;
 
-    /// A device set up as far as the transceiver and the connection.
+    /// Returns a device that is set up as far as the transceiver and the connection.
     fn attached() -> Core {
         let mut core = Core {
             clock_hz: 48_000_000,

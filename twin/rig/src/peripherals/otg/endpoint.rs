@@ -24,7 +24,7 @@ mod event {
     pub const NAK_EFFECTIVE: u32 = 1 << 6;
 }
 
-/// Control bits after a write: commands act and do not stay.
+/// Returns the control bits after a write: commands act and do not stay.
 fn controlled(old: u32, written: u32) -> u32 {
     let toggles = bit::NEXT_IS_DATA0 | bit::NEXT_IS_DATA1;
     let commands = bit::CLEAR_NAK | bit::SET_NAK | toggles | bit::DISABLE;
@@ -41,8 +41,9 @@ fn controlled(old: u32, written: u32) -> u32 {
     now
 }
 
-/// A data toggle, whether the next packet is DATA1, after a write of the control register. A bus
-/// reset leaves it: drivers set it. The core sees to that of endpoint 0 by itself.
+/// Returns the data toggle (whether the next packet is DATA1) after a write of the control
+/// register. A bus reset leaves it: drivers set it. The core manages the toggle of endpoint 0
+/// itself.
 fn toggled(data1: bool, written: u32) -> bool {
     (data1 || written & bit::NEXT_IS_DATA1 != 0) && written & bit::NEXT_IS_DATA0 == 0
 }
@@ -60,12 +61,12 @@ pub struct In {
 }
 
 impl In {
-    /// DIEPCTL as read; endpoint 0 is always active.
+    /// Returns DIEPCTL as the firmware reads it; endpoint 0 is always active.
     pub fn control(&self, number: usize) -> u32 {
         self.control | if number == 0 { bit::ACTIVE } else { 0 }
     }
 
-    /// A write of DIEPCTL.
+    /// Handles a write of DIEPCTL.
     pub fn write_control(&mut self, value: u32) {
         if value & bit::DISABLE != 0 && self.control & bit::ENABLE != 0 {
             self.interrupts |= event::DISABLED;
@@ -77,7 +78,7 @@ impl In {
         }
     }
 
-    /// One word into the FIFO; false when it is full.
+    /// Puts one word into the FIFO. Returns false if it is full.
     pub fn push(&mut self, word: u32, depth: u32) -> bool {
         let room = self.room(depth) > 0;
         if room {
@@ -86,12 +87,12 @@ impl In {
         room
     }
 
-    /// Free words of a FIFO of this depth.
+    /// Returns the free words of a FIFO of this depth.
     pub fn room(&self, depth: u32) -> u32 {
         depth.saturating_sub(self.fifo.len() as u32)
     }
 
-    /// Whether the FIFO is empty.
+    /// Returns whether the FIFO is empty.
     pub fn fifo_empty(&self) -> bool {
         self.fifo.is_empty()
     }
@@ -101,24 +102,25 @@ impl In {
         self.fifo.clear();
     }
 
-    /// Bus reset: no transfer, and no longer active.
+    /// Handles a bus reset: no transfer, and no longer active.
     pub fn stop(&mut self) {
         self.control &= !(bit::ENABLE | bit::STALL | bit::ACTIVE);
         self.size = 0;
         self.fifo.clear();
     }
 
-    /// A SETUP packet ends a stall and sets NAK.
+    /// Handles a SETUP packet: ends a stall and sets NAK.
     pub fn setup_received(&mut self) {
         self.control = (self.control | bit::NAK_STATUS) & !bit::STALL;
     }
 
-    /// Whether it answers STALL.
+    /// Returns whether it answers STALL.
     pub fn stalled(&self) -> bool {
         self.control & bit::STALL != 0
     }
 
-    /// The packet that is ready, if one is wholly in the FIFO, and whether it is DATA1.
+    /// Returns the packet that is ready, and whether it is DATA1. Returns `None` if no packet is
+    /// wholly in the FIFO.
     pub fn packet(&mut self, number: usize) -> Option<(Vec<u8>, bool)> {
         let ready = self.control(number) & (bit::ENABLE | bit::NAK_STATUS | bit::ACTIVE)
             == bit::ENABLE | bit::ACTIVE;
@@ -151,12 +153,12 @@ pub struct Out {
 }
 
 impl Out {
-    /// DOEPCTL as read; endpoint 0 is always active.
+    /// Returns DOEPCTL as the firmware reads it; endpoint 0 is always active.
     pub fn control(&self, number: usize) -> u32 {
         self.control | if number == 0 { bit::ACTIVE } else { 0 }
     }
 
-    /// A write of DOEPCTL.
+    /// Handles a write of DOEPCTL.
     pub fn write_control(&mut self, value: u32) {
         if value & bit::DISABLE != 0 && self.control & bit::ENABLE != 0 {
             self.interrupts |= event::DISABLED;
@@ -167,38 +169,38 @@ impl Out {
             self.control & bit::ACTIVE != 0 && (self.was_enabled || value & bit::ENABLE != 0);
     }
 
-    /// A SETUP packet ends a stall and sets NAK.
+    /// Handles a SETUP packet: ends a stall and sets NAK.
     pub fn setup_received(&mut self) {
         self.control = (self.control | bit::NAK_STATUS) & !bit::STALL;
     }
 
-    /// Whether it answers STALL.
+    /// Returns whether it answers STALL.
     pub fn stalled(&self) -> bool {
         self.control & bit::STALL != 0
     }
 
-    /// Bus reset: takes nothing, and no longer active.
+    /// Handles a bus reset: it takes no packets and is no longer active.
     pub fn stop(&mut self) {
         self.control = (self.control | bit::NAK_STATUS) & !(bit::ENABLE | bit::STALL | bit::ACTIVE);
         self.was_enabled = false;
     }
 
-    /// Whether it takes a packet.
+    /// Returns whether it takes a packet.
     pub fn armed(&self, number: usize) -> bool {
         let open = self.control & bit::NAK_STATUS == 0;
         let packets = self.size >> 19 & 0x3FF;
         open && (number == 0 || self.was_enabled && packets > 0)
     }
 
-    /// Whether a packet is the next one, not one that it has already; the host takes its
-    /// acknowledgement for that of the next one all the same.
+    /// Returns whether a packet is the next one. If not, the endpoint already has it, and the host
+    /// takes the acknowledgement for that of the next packet.
     pub fn is_next(&mut self, data1: bool) -> bool {
         let next = self.data1 == data1;
         self.data1 ^= next;
         next
     }
 
-    /// It took a packet: NAK until the firmware is ready for the next one.
+    /// Handles a received packet: NAK until the firmware is ready for the next one.
     pub fn packet_received(&mut self, length: usize) {
         self.control |= bit::NAK_STATUS;
         let (packets, bytes) = (self.size >> 19 & 0x3FF, self.size & 0x7_FFFF);
@@ -206,12 +208,12 @@ impl Out {
         self.size = self.size & !(0x3FF << 19 | 0x7_FFFF) | packets.saturating_sub(1) << 19 | rest;
     }
 
-    /// The firmware has read the entry that ends a transfer.
+    /// Handles the firmware's read of the entry that ends a transfer.
     pub fn transfer_done(&mut self) {
         self.interrupts |= event::TRANSFER_DONE;
     }
 
-    /// The firmware has read the entry that ends a SETUP stage.
+    /// Handles the firmware's read of the entry that ends a SETUP stage.
     pub fn setup_done(&mut self) {
         self.interrupts |= event::SETUP_DONE;
     }

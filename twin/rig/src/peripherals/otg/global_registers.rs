@@ -2,17 +2,17 @@
 
 use super::{Core, interrupt, packet_status};
 
-/// OTG_CID as silicon answers it. (ST's register description file says 0x1200, which is an older
-/// core's.)
+/// OTG_CID as silicon answers it. (ST's register description file has 0x1200, the value of an older
+/// core.)
 const CORE_ID: u32 = 0x0000_2300;
 /// GRSTCTL: the AHB master is idle.
 const AHB_IDLE: u32 = 1 << 31;
 
 impl Core {
-    /// A read by the firmware.
+    /// Handles a read by the firmware.
     pub(super) fn read_global(&mut self, offset: u32) -> u32 {
         match offset {
-            // The ID pin says B-device, the session follows the override.
+            // The ID pin reads as B-device; the session follows the override.
             0x00 => self.gotgctl | 1 << 16 | u32::from(self.session_valid()) << 19,
             0x08 => self.gahbcfg,
             0x0C => self.gusbcfg,
@@ -30,7 +30,7 @@ impl Core {
         }
     }
 
-    /// A write by the firmware.
+    /// Handles a write by the firmware.
     pub(super) fn write_global(&mut self, offset: u32, value: u32) {
         match offset {
             0x00 => self.gotgctl = value & 0xFF,
@@ -47,7 +47,7 @@ impl Core {
         }
     }
 
-    /// GRSTCTL: core reset, FIFO flushes. All finish at once.
+    /// Handles GRSTCTL: core reset, FIFO flushes. All finish at once.
     fn write_reset(&mut self, value: u32) {
         const CORE: u32 = 1;
         const RECEIVE: u32 = 1 << 4;
@@ -72,7 +72,7 @@ impl Core {
         }
     }
 
-    /// GRXSTSP: takes the oldest entry; its data are then read from the FIFO.
+    /// Takes the oldest entry for GRXSTSP. Its data are then read from the FIFO.
     fn pop_received(&mut self) -> u32 {
         let Some(entry) = self.received.pop_front() else {
             return 0;
@@ -86,12 +86,12 @@ impl Core {
         entry.status
     }
 
-    /// A read of the receive FIFO. An empty one gives zero.
+    /// Reads the receive FIFO; zero if it is empty.
     pub(super) fn read_fifo(&mut self) -> u32 {
         self.reading.pop_front().unwrap_or(0)
     }
 
-    /// A write of an endpoint's transmit FIFO.
+    /// Writes a word to an endpoint's transmit FIFO.
     pub(super) fn write_fifo(&mut self, endpoint: usize, word: u32) {
         let depth = self.transmit_fifo[endpoint] >> 16;
         if !self.ins[endpoint].push(word, depth) {
@@ -99,7 +99,7 @@ impl Core {
         }
     }
 
-    /// Clears the latched start-of-frame flag, which nobody may be reading.
+    /// Clears the latched start-of-frame flag if the firmware does not use its interrupt.
     pub fn forget_start_of_frame(&mut self) {
         if self.gintmsk & interrupt::SOF == 0 {
             self.latched &= !interrupt::SOF;

@@ -1,14 +1,14 @@
 //! The full-speed USB OTG core (OTG2 at 0x4008_0000) as a device: registers, FIFOs, interrupts.
 //!
 //! RM0433 rev 7 chapter 60, FIFO mode (no internal DMA). The host on the other end of the cable
-//! calls [`Core::setup`], [`Core::receive`] and [`Core::transmit`]; everything else is what the
-//! firmware reads and writes. Bytes leave the device only through its transmit FIFOs.
+//! calls [`Core::setup`], [`Core::receive`] and [`Core::transmit`]; all other accesses are reads
+//! and writes of the firmware. Bytes leave the device only through its transmit FIFOs.
 //!
 //! Simulated: soft connect, bus reset, enumeration at full speed, suspend, resume, address, stall,
 //! NAK, FIFO depths, data toggles. Not simulated: isochronous transfers, remote wake-up, host mode,
-//! and timing below a transaction. An OUT endpoint counts as armed when it is active, its NAK
-//! status is clear and its packet count is not zero; EPENA must have been set once since it became
-//! active. That is what drivers for this core rely on.
+//! and timing below a transaction. An OUT endpoint counts as armed if it is active, its NAK status
+//! is clear and its packet count is not zero. EPENA must have been set once since it became active.
+//! Drivers for this core rely on that.
 
 mod blocks;
 mod device_registers;
@@ -24,7 +24,7 @@ use endpoint::{In, Out};
 use crate::busy_bus::InterruptLine;
 use crate::faults::Faults;
 
-/// Endpoints each way.
+/// Number of endpoints in each direction.
 pub const ENDPOINTS: usize = 9;
 
 /// GINTSTS bits.
@@ -59,25 +59,25 @@ mod packet_status {
     pub const SETUP_DATA: u32 = 6;
 }
 
-/// What a transaction ended with.
+/// The end of a transaction.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Answer<T> {
-    /// Done.
+    /// The device acknowledged.
     Ack(T),
-    /// Not now.
+    /// The device is not ready.
     Nak,
-    /// Never.
+    /// The endpoint is stalled.
     Stall,
-    /// Nobody has this address.
+    /// No device has this address.
     Silence,
 }
 
 /// A packet of data.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Packet {
-    /// What it carries.
+    /// Its data.
     pub bytes: Vec<u8>,
-    /// Whether it is DATA1. Means nothing on endpoint 0, whose toggles the core sees to.
+    /// Whether it is DATA1. Without meaning on endpoint 0, whose toggles the core manages.
     pub data1: bool,
 }
 
@@ -119,7 +119,7 @@ pub struct Core {
     pub lost_words: u64,
 }
 
-/// The core as its register blocks and the host share it.
+/// The core, shared by its register blocks and the host.
 #[derive(Clone, Debug)]
 pub struct SharedCore {
     core: Arc<Mutex<Core>>,
@@ -127,7 +127,7 @@ pub struct SharedCore {
 }
 
 impl SharedCore {
-    /// One out of reset; `seed` decides what a busy bus does to its interrupt line.
+    /// Returns a core out of reset; `seed` decides the effect of a busy bus on its interrupt line.
     pub fn new(faults: Faults, seed: u64) -> Self {
         Self {
             core: Arc::default(),
@@ -135,12 +135,12 @@ impl SharedCore {
         }
     }
 
-    /// The core. One thread runs the whole rig, so nobody waits here.
+    /// Locks the core. One thread runs the whole rig, therefore the lock never waits.
     pub fn lock(&self) -> MutexGuard<'_, Core> {
         self.core.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Its interrupt line, likewise.
+    /// Locks its interrupt line; this lock never waits either.
     pub fn line(&self) -> MutexGuard<'_, InterruptLine> {
         self.line.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -177,7 +177,7 @@ impl Default for Core {
 }
 
 impl Core {
-    /// Every register back to its reset value; clock and wiring stay.
+    /// Sets every register to its reset value; clock and wiring stay.
     pub fn reset(&mut self) {
         *self = Core {
             clock_hz: self.clock_hz,
@@ -187,8 +187,8 @@ impl Core {
         };
     }
 
-    /// Whether the device pulls D+ up: transceiver on and clocked, device mode, session valid, not
-    /// soft-disconnected.
+    /// Returns whether the device pulls D+ up: transceiver on and clocked, device mode, session
+    /// valid, not soft-disconnected.
     pub fn attached(&self) -> bool {
         const TRANSCEIVER_ON: u32 = 1 << 16;
         const DEVICE_MODE: u32 = 1 << 30;
@@ -200,19 +200,20 @@ impl Core {
             && self.dctl & device_registers::SOFT_DISCONNECT == 0
     }
 
-    /// B-session valid: overridden by GOTGCTL. VBUS itself is not wired to PA9 on this board.
+    /// Returns whether the B-session is valid, overridden by GOTGCTL. VBUS itself is not wired to
+    /// PA9 on this board.
     fn session_valid(&self) -> bool {
         const OVERRIDE: u32 = 1 << 6 | 1 << 7;
         const VBUS_DETECTION: u32 = 1 << 21;
         self.gccfg & VBUS_DETECTION == 0 && self.gotgctl & OVERRIDE == OVERRIDE
     }
 
-    /// The level of the core's interrupt line.
+    /// Returns the level of the core's interrupt line.
     pub fn interrupt(&self) -> bool {
         self.gahbcfg & 1 != 0 && self.gintsts() & self.gintmsk != 0
     }
 
-    /// The host resets the bus.
+    /// Handles a reset of the bus by the host.
     pub fn bus_reset(&mut self) {
         self.suspended = false;
         self.latched |= interrupt::USBRST;
@@ -222,12 +223,12 @@ impl Core {
         self.address = 0;
     }
 
-    /// The reset is over: full speed.
+    /// Handles the end of the reset: full speed.
     pub fn enumerated(&mut self) {
         self.latched |= interrupt::ENUMDNE;
     }
 
-    /// No activity on the bus for three milliseconds.
+    /// Handles three milliseconds without activity on the bus.
     pub fn suspend(&mut self) {
         if !self.suspended {
             self.suspended = true;
@@ -235,7 +236,7 @@ impl Core {
         }
     }
 
-    /// The host resumes the bus without a reset.
+    /// Handles a resume of the bus without a reset.
     pub fn resume(&mut self) {
         if self.suspended {
             self.suspended = false;
@@ -243,12 +244,12 @@ impl Core {
         }
     }
 
-    /// A start of frame.
+    /// Handles a start of frame.
     pub fn start_of_frame(&mut self) {
         self.latched |= interrupt::SOF;
     }
 
-    /// A SETUP transaction. A device cannot refuse it, but it may have no room.
+    /// Handles a SETUP transaction. A device cannot refuse it, but it may have no room.
     pub fn setup(&mut self, address: u8, packet: [u8; 8]) -> Answer<()> {
         if !self.answers(address) {
             return Answer::Silence;
@@ -263,8 +264,8 @@ impl Core {
         Answer::Ack(())
     }
 
-    /// An OUT transaction. A packet that is not the next one by its toggle is acknowledged, and
-    /// nobody sees it.
+    /// Handles an OUT transaction. A packet whose toggle is not that of the next one is
+    /// acknowledged and dropped.
     pub fn receive(&mut self, address: u8, endpoint: usize, packet: &Packet) -> Answer<()> {
         let room = self.receive_room();
         if !self.answers(address) {
@@ -287,7 +288,7 @@ impl Core {
         Answer::Ack(())
     }
 
-    /// An IN transaction.
+    /// Handles an IN transaction.
     pub fn transmit(&mut self, address: u8, endpoint: usize) -> Answer<Packet> {
         if !self.answers(address) {
             return Answer::Silence;
@@ -298,8 +299,8 @@ impl Core {
         }
         let packet = sender.packet(endpoint);
         if endpoint == 0 && packet.is_some() {
-            // A new address holds from the end of the transfer that sets it, though it is written
-            // before.
+            // A new address takes effect at the end of the transfer that sets it, though the
+            // register is written before.
             self.address = self.dcfg_address();
         }
         match packet {
@@ -316,13 +317,13 @@ impl Core {
         self.attached() && self.in_step() && !self.suspended && self.address == u32::from(address)
     }
 
-    /// Whether host and device understand each other: full speed allows 48 MHz ± 0.25 % (USB 2.0,
-    /// section 7.1.11).
+    /// Returns whether the clock is good enough for host and device to communicate: full speed
+    /// allows 48 MHz ± 0.25 % (USB 2.0, section 7.1.11).
     fn in_step(&self) -> bool {
         self.clock_hz.abs_diff(48_000_000) <= 120_000
     }
 
-    /// Free words of the receive FIFO.
+    /// Returns the free words of the receive FIFO.
     fn receive_room(&self) -> usize {
         let used: usize = self
             .received
