@@ -1,7 +1,7 @@
-//! Hosts and cables that do anything, and a camera that fails at the same time: the device never
-//! resets, tells no force that is not there, loses no count, and answers afterwards.
+//! Attacks on the firmware: hosts and cables do anything, and the camera fails at the same time.
+//! The device must never reset, report a false force or miscount, and it must answer afterwards.
 //!
-//! `HIVTAC_ATTACKS` is how many runs there are, from seed `HIVTAC_ATTACK_SEED` on; each is 0.9 s of
+//! `HIVTAC_ATTACKS` sets the number of runs, from seed `HIVTAC_ATTACK_SEED` on; each is 0.9 s of
 //! virtual time.
 
 use crate::common::{Run, Setup, command, firmware, hello};
@@ -15,15 +15,15 @@ use hivtac_wire::message::{MODEL_BYTES, ModelPart, Request};
 use hivtac_wire::settings::Selection;
 use serde_json::Value;
 
-/// Runs, unless told.
+/// Default number of runs.
 const RUNS: u64 = 3;
-/// The attack lasts from here to there, ms, and ends with a cable that is put back.
+/// Time of the attack, ms. It ends with a cable that is put back.
 const ATTACK_MS: std::ops::Range<u64> = 165..440;
 const PLUGGED_MS: u64 = 470;
-/// The host has enumerated again.
+/// Time by which the host has enumerated the device again.
 const GREETED_MS: u64 = 700;
 const END_MS: u64 = 900;
-/// Faults that may be there at any time during an attack, several at once.
+/// Faults that may be on at any time during an attack, several at once.
 const FAULTS: [&str; 9] = [
     "camera-silent",
     "frame-short",
@@ -35,11 +35,12 @@ const FAULTS: [&str; 9] = [
     "host-not-reading",
     "bus-busy",
 ];
-/// A force is wrong that is farther off than so many of its standard uncertainties, and than this.
+/// A force counts as wrong if its error is larger than this many of its standard uncertainties, and
+/// than the next value.
 const SIGMAS: f64 = 6.0;
 const OFF_N: f64 = 1e-3;
 
-/// Numbers that follow from a seed (SplitMix64).
+/// Random numbers that follow from a seed (SplitMix64).
 struct Numbers(u64);
 
 impl Numbers {
@@ -63,7 +64,7 @@ impl Numbers {
     }
 }
 
-/// A SETUP packet: anything, or a standard or class request with one or more wrong bytes.
+/// Returns a SETUP packet: any bytes, or a standard or class request with one or more wrong bytes.
 fn setup_packet(numbers: &mut Numbers) -> [u8; 8] {
     let known = [
         [0x80, 6, 0, 1, 0, 0, 18, 0],
@@ -86,7 +87,7 @@ fn setup_packet(numbers: &mut Numbers) -> [u8; 8] {
     packet
 }
 
-/// Exposure, gain and rate: what a camera can do and what it cannot, or nothing asked of it.
+/// Returns settings of exposure, gain and rate: possible ones, impossible ones, or none.
 fn camera_settings(numbers: &mut Numbers) -> CameraSettings {
     let exposure = Microseconds(numbers.below(30_000) as u32);
     let gain = Sixteenths(numbers.below(80) as u16);
@@ -97,7 +98,7 @@ fn camera_settings(numbers: &mut Numbers) -> CameraSettings {
     }
 }
 
-/// A part of a model that is none.
+/// Returns a part of an invalid model.
 fn model_part(numbers: &mut Numbers) -> ModelPart {
     let bytes = numbers.bytes::<64>();
     ModelPart {
@@ -109,7 +110,7 @@ fn model_part(numbers: &mut Numbers) -> ModelPart {
     }
 }
 
-/// Whatever a host may ask for that neither changes what a force is nor restarts the device.
+/// Returns any request that neither changes the meaning of a force nor restarts the device.
 fn request(numbers: &mut Numbers) -> Request {
     let frames = 1 + numbers.below(8) as u16;
     let bytes = numbers.below(2 * MODEL_BYTES as u64) as u32;
@@ -136,7 +137,7 @@ fn request(numbers: &mut Numbers) -> Request {
     requests[numbers.below(requests.len() as u64) as usize].clone()
 }
 
-/// Bytes for the device: noise, and messages that are whole, damaged or cut.
+/// Returns bytes for the device: noise, and messages that are whole, damaged or cut.
 fn bytes(numbers: &mut Numbers) -> Vec<u8> {
     let request = request(numbers);
     let mut message = match numbers.below(5) {
@@ -168,7 +169,7 @@ fn action(numbers: &mut Numbers) -> Action {
     }
 }
 
-/// A run with an attack, and a host that afterwards does as it should.
+/// Makes a run with an attack, and a host that behaves correctly afterwards.
 fn attacked(seed: u64) -> Run {
     let mut numbers = Numbers(seed);
     let mut setup = Setup {
@@ -184,7 +185,7 @@ fn attacked(seed: u64) -> Run {
         let from = ATTACK_MS.start + numbers.below(span - 20);
         let until = from + 1 + numbers.below(ATTACK_MS.end - from);
         let fault = format!("{}@{from}-{until}", numbers.one_of(&FAULTS));
-        // Names of faults outlive the run that they are for.
+        // Names of faults must outlive their run.
         setup = setup.fault(Box::leak(fault.into_boxed_str()));
     }
     setup
@@ -198,7 +199,7 @@ fn attacked(seed: u64) -> Run {
         .run()
 }
 
-/// How far a force is from the true one, N, and how far it may be.
+/// Returns the error of a force, N, and the largest allowed error.
 fn off_n(force: &Force, truth: &Value) -> (f64, f64) {
     let true_n: Vec<f64> = ["x_n", "y_n", "z_n"]
         .map(|name| truth[name].as_f64().unwrap())
@@ -215,8 +216,8 @@ fn off_n(force: &Force, truth: &Value) -> (f64, f64) {
     )
 }
 
-/// A frame whose markers moved in a way that nobody saw, since one before it was lost, and the very
-/// first one.
+/// Returns whether the markers' motion before a frame is unknown: a frame before it was lost, or it
+/// is the very first one.
 fn moved_unseen(run: &Run, nth: usize) -> bool {
     let samples = run.samples();
     let before = nth.checked_sub(1).map(|before| samples[before].frame + 1);

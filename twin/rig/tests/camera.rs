@@ -1,5 +1,5 @@
-//! What a real OV7725 does and a table of registers does not tell: the firmware must not rest on
-//! it.
+//! Tests of the behaviour of a real OV7725 that its register table does not show. The firmware must
+//! not rely on the table alone.
 
 use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
@@ -23,8 +23,8 @@ fn assert_good(run: &Run) {
     }
 }
 
-/// Data sheets and drivers disagree about what some registers hold after a reset; the rig gives
-/// them other values for each seed, and ends a run that captures a frame which depends on one.
+/// Data sheets and drivers disagree about the values of some registers after a reset. The rig gives
+/// them different values for each seed, and ends a run that captures a frame which depends on one.
 #[test]
 fn no_frame_depends_on_a_register_that_nobody_wrote() {
     for seed in [2, 3, 4] {
@@ -36,15 +36,15 @@ fn no_frame_depends_on_a_register_that_nobody_wrote() {
     }
 }
 
-/// Supplies and registers outlive the microcontroller's reset. Another program has left something
-/// in each of them.
+/// Supplies and registers outlive the microcontroller's reset. Another program has changed each of
+/// them.
 #[test]
 fn what_another_program_left_in_the_camera_is_reset() {
     assert_good(&Setup::new(firmware(), 220).fault("camera-used").run());
 }
 
-/// Exposure and gain begin anywhere. The first sample is of a frame that is exposed as well as the
-/// later ones: its markers are as large.
+/// Exposure and gain begin with any values. The first sample's frame is as well exposed as the
+/// later ones: its markers have the same size.
 #[test]
 fn the_first_sample_is_well_exposed() {
     let setup = Setup {
@@ -58,8 +58,8 @@ fn the_first_sample_is_well_exposed() {
     assert!(first.abs_diff(later) < 500, "{first} and {later} µN");
 }
 
-/// On command exposure and gain are found anew: frames pass meanwhile, are counted, and the forces
-/// are as before.
+/// On command, exposure and gain are searched anew. Frames pass meanwhile and are counted, and the
+/// forces afterwards are as before.
 #[test]
 fn exposure_is_found_anew_on_command() {
     let run = Setup::new(firmware(), 330)

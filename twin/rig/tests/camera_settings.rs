@@ -1,5 +1,5 @@
-//! Exposure, gain and rate that a user sets: in use, kept through restarts and power cuts, refused
-//! out of their ranges.
+//! Tests of exposure, gain and rate as a user sets them. They are used, kept through restarts and
+//! power cuts, and refused out of their ranges.
 
 use std::path::Path;
 
@@ -17,16 +17,16 @@ use hivtac_wire::settings::{CameraReport, Selection};
 const SET: u16 = 30;
 const KEEP: u16 = 40;
 const REPORT: u16 = 50;
-/// Forces come by then.
+/// Forces come by this time.
 const SET_MS: u64 = 220;
-/// Registers are set, and three frames came.
+/// By these times the registers are set, and three frames came.
 const KEEP_MS: u64 = 290;
 const KEPT_MS: u64 = 330;
-/// Some frames behind a start, and the report.
+/// Time for some frames after a start, and the report.
 const RESTART_MS: u64 = 240;
-/// Exposure and gain at half the rate are found, and frames came.
+/// By this time exposure and gain at half the rate are found, and frames came.
 const AT_HALF_RATE_MS: u64 = 620;
-/// The same at the full one.
+/// The same at the full rate.
 const AT_FULL_RATE_MS: u64 = 460;
 
 const CAMERA: Selection = Selection {
@@ -53,7 +53,7 @@ fn at(rate: Rate) -> CameraSettings {
     }
 }
 
-/// Has the camera set, and the settings told at the end.
+/// Sets the camera, and asks for the settings at the end.
 fn setting(setup: Setup, settings: CameraSettings) -> Setup {
     let report_ms = setup.virtual_ms - 20;
     setup
@@ -70,7 +70,7 @@ fn started(flash: &Path) -> Run {
     setup.at(RESTART_MS - 20, report).run()
 }
 
-/// A run that keeps the camera so.
+/// Returns a run that keeps these camera settings.
 fn keeping(flash: &Path, settings: CameraSettings, virtual_ms: u64) -> Setup {
     let setup = Setup {
         flash: Some(flash.to_owned()),
@@ -79,7 +79,7 @@ fn keeping(flash: &Path, settings: CameraSettings, virtual_ms: u64) -> Setup {
     setting(setup, settings).at(KEEP_MS, send(KEEP, Request::Keep(CAMERA)))
 }
 
-/// Time from sample to sample whose frames follow each other, ms, as they were truly exposed.
+/// Returns the true times between the exposures of samples with consecutive frames, ms.
 fn frame_times_ms(run: &Run, frames: std::ops::Range<u32>) -> Vec<f64> {
     let exposed_s = |frame: u32| {
         let line = run.truth.iter().find(|line| line["frame"] == frame);
@@ -91,8 +91,8 @@ fn frame_times_ms(run: &Run, frames: std::ops::Range<u32>) -> Vec<f64> {
     frames.map(|sample| time(sample.frame)).collect()
 }
 
-/// Asserts that each frame was measured or passed while the camera was set, but for the one under
-/// way then and the one under way now.
+/// Asserts that each frame was measured, or passed while the camera was set. Exceptions are the
+/// frame under way at that time and the one under way now.
 fn assert_counted(run: &Run) {
     let stats = run.stats();
     assert_eq!(
@@ -106,8 +106,8 @@ fn assert_counted(run: &Run) {
     assert_eq!(stats.camera_restarts, 0);
 }
 
-/// The light of the scene exposes the film well in 4 ms at a gain of one: here in half of that,
-/// twice amplified.
+/// The light of the scene exposes the film well in 4 ms at a gain of one. Here it is half of that
+/// time, with a gain of two.
 #[test]
 fn exposure_and_gain_that_are_set_are_in_use_while_frames_are_counted() {
     let run = setting(Setup::new(firmware(), 330), exposed(2_000, Some(32))).run();
@@ -136,8 +136,8 @@ fn exposure_and_gain_that_are_set_are_in_use_while_frames_are_counted() {
         assert_eq!(sample.status.0 & dark.0, 0, "{sample:?}");
         assert!(sample.force.is_some(), "{sample:?}");
     }
-    // Between device and truth is one time before and another after, as the exposure's middle is
-    // later in the frame: 1 ms, which both know.
+    // The difference of device time and true time changes once: the exposure's middle is later in
+    // the frame. It is 1 ms, and both clocks include it.
     run.assert_times();
 }
 
@@ -151,7 +151,7 @@ fn a_gain_alone_follows_the_light_and_then_stays() {
     assert!(!last.contains(Status::IMAGE_DARK), "{last:?}");
 }
 
-/// An eighth of the light that the film needs: the search for it would find more.
+/// An eighth of the light that the film needs: a search would find more.
 #[test]
 fn a_kept_exposure_is_used_at_the_start_in_place_of_the_search() {
     let Device { flash, .. } = &Device::new();
@@ -171,7 +171,7 @@ fn a_kept_exposure_is_used_at_the_start_in_place_of_the_search() {
             "{sample:?}"
         );
     }
-    // As a new device, the camera too: it finds the light.
+    // The device and the camera are as new: the device searches the light.
     let reset = Setup {
         flash: Some(flash.clone()),
         ..Setup::new(firmware(), 450)
@@ -214,7 +214,8 @@ fn what_is_out_of_its_range_is_refused_and_nothing_changes() {
     assert_eq!(run.missing_frames(), [0; 0]);
 }
 
-/// Frames come half as often, with the forces of the tip and the right times; and as before again.
+/// Frames come half as often, with the tip's forces and the right times; afterwards the old rate
+/// returns.
 #[test]
 fn the_rate_is_changed_while_forces_are_read_and_kept() {
     let Device { flash, .. } = &Device::new();
@@ -234,7 +235,7 @@ fn the_rate_is_changed_while_forces_are_read_and_kept() {
         "{after:?}"
     );
     assert!(run.followed().iter().all(|sample| sample.force.is_some()));
-    // The next start: at that rate at once.
+    // The next start has that rate at once.
     let setup = Setup {
         flash: Some(flash.clone()),
         ..Setup::new(firmware(), AT_FULL_RATE_MS)
@@ -253,8 +254,8 @@ fn the_rate_is_changed_while_forces_are_read_and_kept() {
     assert!(after.len() >= 8, "{after:?}");
 }
 
-/// Power is cut at each operation of keeping an exposure, in each way: the device has that or the
-/// one before.
+/// Power is cut at each operation that keeps an exposure, in each way: the device has the new
+/// exposure or the old one.
 #[test]
 fn after_a_power_cut_the_old_exposure_or_the_new_is_there() {
     let device = Device::new();
@@ -284,7 +285,7 @@ fn after_a_power_cut_the_old_exposure_or_the_new_is_there() {
     assert_eq!((found.first(), found.last()), (Some(&old), Some(&new)));
 }
 
-/// The other camera: its registers are others, what they do is the same.
+/// The other camera has different registers with the same effects.
 #[test]
 fn the_global_shutter_camera_takes_exposure_gain_and_rate() {
     let settings = CameraSettings {
@@ -314,7 +315,7 @@ fn the_global_shutter_camera_takes_exposure_gain_and_rate() {
     let after = frame_times_ms(&run, gap + 1..u32::MAX);
     assert!(after.len() >= 8, "{after:?}");
     assert!(after.iter().all(|ms| (8.1..8.3).contains(ms)), "{after:?}");
-    // At the end of the run the scene's press comes near the largest force.
+    // At the end of the run the scene's press is near the largest force.
     let samples = run.samples();
     let last = samples.iter().rev().take(8);
     let forces = last.filter(|sample| sample.force.is_some()).count();

@@ -1,4 +1,4 @@
-//! The command: ready line, clients, hang-up, signals, limits and errors.
+//! Tests of the command `hivtac-rig`: ready line, clients, hang-up, signals, limits and errors.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -10,7 +10,7 @@ use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
 use hivtac_wire::message::DeviceMessage;
 
-/// Longest wall time of anything here.
+/// Longest wall time of a test's wait.
 const PATIENCE: Duration = Duration::from_secs(120);
 
 fn rig() -> Command {
@@ -19,7 +19,7 @@ fn rig() -> Command {
     command
 }
 
-/// Starts a rig and reads its ready line: the words after `ready`.
+/// Starts a rig and reads its ready line. Returns the words after `ready`.
 fn start(arguments: &[&str]) -> (Child, Vec<String>) {
     let mut child = rig().arg(firmware()).args(arguments).spawn().unwrap();
     let mut line = String::new();
@@ -31,7 +31,7 @@ fn start(arguments: &[&str]) -> (Child, Vec<String>) {
     (child, words.collect())
 }
 
-/// Waits for the end; the code and what was said on standard error.
+/// Waits for the end. Returns the exit code and the standard error.
 fn end(mut child: Child) -> (Option<i32>, String) {
     let began = Instant::now();
     while child.try_wait().unwrap().is_none() {
@@ -51,8 +51,8 @@ fn end(mut child: Child) -> (Option<i32>, String) {
     (child.wait().unwrap().code(), error)
 }
 
-/// Says hello again and again, as a client does that does not know when the device listens, until
-/// it answers.
+/// Sends hello again and again until the device answers, like a client that does not know when the
+/// device listens.
 fn greet(port: &mut (impl Read + Write)) -> DeviceMessage {
     let mut decoder = Decoder::<DEVICE_FRAME_LIMIT>::new();
     let began = Instant::now();
@@ -147,7 +147,7 @@ fn a_script_gives_bytes_truth_and_counters() {
     let read = |name: &str| std::fs::read(path(name)).unwrap();
     assert!(!read("out").is_empty());
     let stats: serde_json::Value = serde_json::from_slice(&read("stats")).unwrap();
-    // A run ends with the instruction under way: a few nanoseconds after its time is over.
+    // A run ends with the present instruction: a few nanoseconds after its time is over.
     let virtual_s = stats["virtual_s"].as_f64().unwrap();
     assert!((0.2..0.200_001).contains(&virtual_s), "{virtual_s}");
     assert_eq!(stats["usb"]["bytes_in"], read("out").len());

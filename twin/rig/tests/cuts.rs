@@ -1,10 +1,10 @@
-//! The power is cut at every operation of what writes the flash, in every way: of one run that goes
-//! to its end the rig tells the operations, from which follows what each cut leaves.
+//! Helpers for tests that cut the power at every operation that writes the flash, in every way. One
+//! complete run gives the list of operations, from which the result of each cut follows.
 //!
-//! Images that a start cannot tell apart are started once. A run of the rig depends on nothing but
-//! what it is given, and the rig tells which words of the flash a run read or programmed: with
-//! another image that agrees in all of these words it goes the same way, bit for bit.
-//! `models::a_start_depends_on_no_word_that_the_rig_does_not_tell` shows that nothing else counts.
+//! Images that a start cannot distinguish are started once. A run of the rig depends only on its
+//! inputs, and the rig reports the words of the flash that a run read or programmed. With another
+//! image that has the same values in all of these words, the run is the same, bit for bit.
+//! `models::a_start_depends_on_no_word_that_the_rig_does_not_tell` shows that no other word counts.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -13,10 +13,10 @@ use hivtac_rig::peripherals::flash::{
     BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES,
 };
 
-/// What is found in a device at its start, and the words of its flash that decided that.
+/// The state of a device at its start, and the words of its flash that decided it.
 pub type Start<T> = (T, BTreeSet<u32>);
 
-/// What a cut leaves of the flash that was there before a whole run.
+/// Returns the contents that a cut of a complete run leaves of the flash `before` it.
 pub fn left(before: &Contents, whole: &[Operation], cut: Cut) -> Contents {
     let (done, rest) = whole.split_at(cut.operation as usize);
     let mut contents = before.clone();
@@ -27,7 +27,8 @@ pub fn left(before: &Contents, whole: &[Operation], cut: Cut) -> Contents {
     contents
 }
 
-/// What each cut of a whole run leaves, in turn. A cut after one operation is one before the next.
+/// Iterates over the results of each cut of a complete run. A cut after one operation is a cut
+/// before the next.
 fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (Cut, Contents)> {
     let mut contents = before.clone();
     let last = whole.len() - 1;
@@ -46,8 +47,8 @@ fn images(before: &Contents, whole: &[Operation]) -> impl Iterator<Item = (Cut, 
     })
 }
 
-/// Starts a device with what each cut of a whole run leaves, once with images that a start cannot
-/// tell apart; gives what was found with each to `judge`. Returns how many starts there were.
+/// Starts a device with the result of each cut of a complete run, once for all images that a start
+/// cannot distinguish. Passes each device's state to `judge`. Returns the number of starts.
 pub fn start_each<T>(
     before: &Contents,
     whole: &[Operation],
@@ -79,7 +80,7 @@ pub fn start_each<T>(
     started.len()
 }
 
-/// Whether the flash holds these bytes at the beginning of one of the sectors for models.
+/// Returns whether the flash holds these bytes at the beginning of one of the sectors for models.
 pub fn holds_model(contents: &Contents, file: &[u8]) -> bool {
     let sectors = (BANK.start..BANK.end).step_by(SECTOR_BYTES as usize);
     let is_here = |sector: u32| {
@@ -92,8 +93,8 @@ pub fn holds_model(contents: &Contents, file: &[u8]) -> bool {
     sectors.skip(2).take(2).any(is_here)
 }
 
-/// The flash of a device that saved what it keeps as often as its log's first sector has room for,
-/// so that the next time begins with an erase of the other one. It was saved there once.
+/// Returns the flash of a device whose settings were saved until its log's first sector was full.
+/// The next save begins with an erase of the other sector.
 pub fn full(mut contents: Contents) -> Contents {
     let sector = BANK.start..BANK.start + SECTOR_BYTES;
     let words = |range: std::ops::Range<u32>| range.step_by(WORD_BYTES as usize);

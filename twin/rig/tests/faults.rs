@@ -1,4 +1,5 @@
-//! Each fault ends in the status or counter that the firmware's documents name, and is survived.
+//! Tests that each fault leads to the status or counter in the firmware's documents, and that the
+//! device survives it.
 
 use crate::common::{HELLO_MS, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
@@ -6,7 +7,7 @@ use hivtac_rig::usb_host::Port;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Request;
 
-/// The camera is plugged in late. It is looked for again and again, and frames come.
+/// The camera is plugged in late. The firmware searches it again and again, and frames come.
 #[test]
 fn an_absent_camera_is_reported_and_found_later() {
     let run = Setup::new(firmware(), 1300)
@@ -16,7 +17,7 @@ fn an_absent_camera_is_reported_and_found_later() {
     assert!(run.samples().len() >= 3, "{:?}", run.stats());
 }
 
-/// Another camera is not driven with this one's registers.
+/// The firmware does not write its own camera's registers to a different camera.
 #[test]
 fn a_camera_with_another_id_is_refused() {
     let run = Setup::new(firmware(), 700).fault("camera-wrong-id").run();
@@ -25,7 +26,8 @@ fn a_camera_with_another_id_is_refused() {
     assert_eq!(run.report.sccb_writes, 0);
 }
 
-/// A microcontroller that was reset amid a byte finds the camera holding SDA; nine clocks free it.
+/// After a reset amid a byte, the microcontroller finds the camera holding SDA; nine clocks free
+/// it.
 #[test]
 fn a_camera_that_holds_sda_is_freed() {
     let run = Setup::new(firmware(), 240).fault("sda-stuck").run();
@@ -33,8 +35,7 @@ fn a_camera_that_holds_sda_is_freed() {
     assert_eq!(run.report.resets, 0);
 }
 
-/// Errata: I²C1 reports bus errors that there were not. One register write more is all that it
-/// costs.
+/// Errata: I²C1 reports false bus errors. The only cost is one repeated register write.
 #[test]
 fn a_bus_error_that_there_was_not_costs_one_transfer() {
     for ms in [20, 42, 51] {
@@ -45,7 +46,8 @@ fn a_bus_error_that_there_was_not_costs_one_transfer() {
     }
 }
 
-/// The camera holds SCL for longer than a transfer may take: it is set up again when it lets go.
+/// The camera holds SCL for longer than a transfer may take. It is set up again when it releases
+/// SCL.
 #[test]
 fn a_held_clock_is_waited_for() {
     let run = Setup::new(firmware(), 860).fault("scl-stretch@60-90").run();
@@ -75,12 +77,12 @@ fn a_silent_camera_is_restarted() {
         last.frame > restarted.frame && last.force.is_some(),
         "{last:?}"
     );
-    // Frame numbers go on: they still name the exposures.
+    // Frame numbers continue: they still name the exposures.
     run.assert_times();
 }
 
-/// The DMA loses the bus for a millisecond, which the rows of one frame or of two that follow each
-/// other meet: each is dropped, counted, and the next sample says so.
+/// The DMA loses the bus for a millisecond, during the rows of one frame or of two consecutive
+/// ones. Each is dropped and counted, and the next sample reports it.
 #[test]
 fn an_overrun_costs_a_frame_and_is_told() {
     let run = Setup::new(firmware(), 300).fault("dcmi-overrun@243").run();
@@ -103,8 +105,8 @@ fn an_overrun_costs_a_frame_and_is_told() {
     assert!(samples.len() >= 5 && samples.last().map(|s| s.frame) > after.last().copied());
 }
 
-/// Copies of bands and words of the camera wait for the bus, at random, and interrupts come back
-/// after they were cleared: no frame is lost.
+/// Copies of bands and words of the camera wait for the bus, at random, and interrupts come again
+/// after they were cleared. No frame is lost.
 #[test]
 fn a_busy_bus_costs_nothing() {
     let run = Setup::new(firmware(), 280).fault("bus-busy").run();
@@ -129,8 +131,8 @@ fn a_short_frame_costs_itself_and_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
-/// The camera sends rows after the last one: the frame counts as too long, whether it was measured
-/// by then or, on a slow core, not yet; the next sample says so. That one is whole.
+/// The camera sends rows after the last one. The frame counts as too long, whether it was already
+/// measured or, on a slow core, not yet. The next sample reports it, and that frame is whole.
 #[test]
 fn a_long_frame_is_told_and_costs_no_other() {
     let run = Setup::new(firmware(), 300).fault("frame-long@230").run();
@@ -138,7 +140,7 @@ fn a_long_frame_is_told_and_costs_no_other() {
     assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
     let told = run.frames_after_a_loss();
     let missing = run.missing_frames();
-    // Two that follow each other are told by one sample, the next.
+    // Two consecutive losses are reported by one sample, the next.
     let together = missing.windows(2).filter(|pair| pair[0] + 1 == pair[1]);
     let dropped = told.len() + together.count();
     assert_eq!(dropped, stats.dropped_size as usize, "{missing:?} {told:?}");
@@ -147,8 +149,8 @@ fn a_long_frame_is_told_and_costs_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
-/// The host leaves the port open and does not read: samples are dropped and counted, the camera
-/// goes on, and the stream is in step again at once.
+/// The host leaves the port open and does not read. Samples are dropped and counted, the camera
+/// goes on, and the stream is synchronous again at once.
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
     let run = Setup::new(firmware(), 600)
@@ -171,8 +173,8 @@ fn a_host_that_does_not_read_loses_samples_and_nothing_else() {
     assert!(gaps >= 1, "the loss shows in the sequence numbers");
 }
 
-/// The cable is pulled and put back: a new enumeration, a new conversation, frame numbers that went
-/// on.
+/// The cable is pulled and put back: there is a new enumeration and a new conversation, and the
+/// frame numbers went on.
 #[test]
 fn a_pulled_cable_is_survived() {
     let ms = HELLO_MS;

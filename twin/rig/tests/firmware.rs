@@ -1,10 +1,10 @@
-//! The firmware as it is flashed: what it sends is what the camera saw.
+//! Tests of the firmware as it is flashed: its samples match what the camera saw.
 
 use crate::common::{Setup, firmware};
 use hivtac_rig::run::INSTRUCTIONS_PER_SECOND;
 use hivtac_terms::status::Status;
 
-/// Statuses that say something about the picture. On an undisturbed scene none of them may appear.
+/// Statuses about the picture. None of them may appear in an undisturbed scene.
 const PICTURE: Status = Status(
     Status::MARKERS_MISSING.0
         | Status::MARKERS_AMBIGUOUS.0
@@ -64,11 +64,11 @@ fn frames_back_to_back_are_all_measured() {
     // under way.
     let whole = stats.frames_exposed - stats.dropped_setup - 1;
     assert!(stats.frames_processed.abs_diff(whole) <= 1, "{stats:?}");
-    // All words of every frame that has ended, and some of the one under way, or all.
+    // All words of every frame that has ended, and some or all of the one under way.
     let under_way = dcmi.words - dcmi.frames * 38_400;
     assert!((0..=38_400).contains(&under_way), "{dcmi:?}");
-    // Each band reached the core once, but for those of the first frame: no motion is known of it
-    // yet, so that it may be looked at again. On a busy bus the last ones are under way.
+    // Each band reached the core once, except those of the first frame. Its motion is unknown; for
+    // that reason it may get a second look. On a busy bus the last bands are under way.
     let words = run.report.mdma_bytes / 4;
     let once = [0, 38_400]
         .iter()
@@ -76,7 +76,8 @@ fn frames_back_to_back_are_all_measured() {
     assert!(once, "{words} of {dcmi:?}");
 }
 
-/// Whether regions of memory are enforced, and whether an earlier run translated the program.
+/// The runs differ in the enforcement of memory regions and in whether an earlier run translated
+/// the program.
 #[test]
 fn the_same_seed_gives_the_same_bytes() {
     let setup = || Setup::new(firmware(), 240);

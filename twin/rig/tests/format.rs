@@ -1,6 +1,6 @@
-//! Another pixel format while frames are streamed: no frame is read as what it is not, the ones
-//! that pass meanwhile are counted, and the way back leads to the very forces that there would have
-//! been.
+//! Tests of changes of the pixel format during a stream. No frame is read in the wrong format, and
+//! frames that pass meanwhile are counted. After the way back, the forces are those of a run
+//! without the changes.
 
 use crate::common::{Run, Setup, command, firmware, set_threshold};
 use hivtac_rig::script::Action;
@@ -14,14 +14,14 @@ const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 4
 const RED_CR: Threshold = Threshold::Yuv422(Yuv422 { cr_low: 162 });
 const DARK: Threshold = Threshold::Mono(Mono { low: 0, high: 88 });
 
-/// What the device answered to a command.
+/// Returns the device's answer to a command; `None` without an answer.
 fn outcome(run: &Run, asked: u16) -> Option<Outcome> {
     let answers = run.answers(asked);
     assert!(answers.len() <= 1, "one reply to a command");
     answers.first().map(|(outcome, _)| *outcome)
 }
 
-/// The samples before and after the only gap in the frames.
+/// Returns the samples before and after the only gap in the frames.
 fn around_the_gap(samples: &[&Sample]) -> (usize, u32) {
     let gaps = samples.windows(2).enumerate();
     let mut gaps = gaps.filter(|(_, pair)| pair[1].frame != pair[0].frame + 1);
@@ -30,7 +30,7 @@ fn around_the_gap(samples: &[&Sample]) -> (usize, u32) {
     (at + 1, pair[1].frame - pair[0].frame - 1)
 }
 
-/// At whatever time of a frame it comes (one takes 6.4 ms).
+/// The command comes at several times within a frame (one takes 6.4 ms).
 #[test]
 fn no_frame_is_read_in_the_wrong_format() {
     for ms in [230, 232, 234] {
@@ -46,7 +46,7 @@ fn no_frame_is_read_in_the_wrong_format() {
             "{ms} ms: {passed} frames passed"
         );
         assert!(samples.len() >= old + 3, "{ms} ms: {}", samples.len());
-        // Before the first one there may have been none, so that it is measured as it is seen.
+        // The first frame may have no predecessor; it is then measured as it is seen.
         for sample in &samples[1..old] {
             assert!(sample.force.is_some(), "{ms} ms: {sample:?}");
         }
@@ -68,7 +68,7 @@ fn no_frame_is_read_in_the_wrong_format() {
 
 #[test]
 fn the_way_back_leads_to_the_same_forces() {
-    // The same program, so that the camera starts at the same instant.
+    // The program is the same, to make the camera start at the same instant.
     let undisturbed = Setup::new(firmware(), 520).run();
     let run = Setup::new(firmware(), 520)
         .at(220, set_threshold(80, RED_CR))
@@ -84,14 +84,15 @@ fn the_way_back_leads_to_the_same_forces() {
     let gap = samples
         .windows(2)
         .rposition(|pair| pair[1].frame != pair[0].frame + 1);
-    // How the markers move is not known before the second frame.
+    // The markers' motion is unknown before the second frame.
     let back = &samples[gap.unwrap() + 2..];
     let with_force = back.iter().filter(|sample| sample.force.is_some());
     assert!(with_force.count() >= 4, "{back:?}");
     for sample in back.iter().filter(|sample| sample.force.is_some()) {
         let others = undisturbed.samples();
         let same = others.iter().find(|it| it.frame == sample.frame);
-        // Uncertainties have what the film may remember of each run's own forces.
+        // Uncertainties include what the film may remember of each run's own forces, and are left
+        // out.
         let told = |sample: &Sample| {
             let force = sample.force.unwrap();
             (force.cartesian, force.place.map(|place| (place.x, place.y)))
@@ -114,9 +115,9 @@ fn a_change_waits_for_a_camera_that_is_away() {
     assert!(!last.status.contains(Status::MARKERS_MISSING), "{last:?}");
 }
 
-/// A line that flows reaches memory in three steps, any other one in groups of bytes, as all do
-/// where the bus is to be busy, here long after the end. The device sends the same, at the same
-/// times, also when a change of the format stops and starts the capture.
+/// A line as one event reaches memory in three steps, any other one in groups of bytes. All lines
+/// come in groups if the bus is ever busy, here long after the end. The device sends the same bytes
+/// at the same times, also if a change of the format stops and starts the capture.
 #[test]
 fn how_lines_reach_memory_changes_nothing() {
     let setup = || Setup::new(firmware(), 330).at(225, set_threshold(80, RED_CR));

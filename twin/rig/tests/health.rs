@@ -1,4 +1,4 @@
-//! What the flashed firmware says of itself, and how it gives way to the part's own loader.
+//! Tests of the firmware's self-test and health report, and of its switch to the part's own loader.
 
 use crate::common::{Run, Setup, command, firmware};
 use crate::settings::{Device, of_another_version};
@@ -12,7 +12,7 @@ use hivtac_wire::message::{Outcome, Request};
 
 const ASKED: u16 = 40;
 const ASKED_MS: u64 = 200;
-/// While registers are read back that were written.
+/// The time is within the read-back of written registers.
 const FORGETS: &str = "camera-forgets@97";
 
 fn ask(request: Request, virtual_ms: u64) -> Setup {
@@ -58,8 +58,8 @@ fn a_camera_of_another_kind_is_told() {
     assert_eq!((health.problems, health.at_start), (now, another));
 }
 
-/// Its registers go back to what they hold after a reset while they are set: it is set up anew,
-/// and forces come; that something was wrong at the start is told all the same.
+/// The camera's registers go back to their reset values during the set-up. The camera is set up
+/// anew, and forces come. The report still names the problem at the start.
 #[test]
 fn a_register_that_does_not_hold_what_was_written_is_told() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
@@ -76,7 +76,7 @@ fn a_register_that_does_not_hold_what_was_written_is_told() {
     assert!(run.samples().last().unwrap().force.is_some());
 }
 
-/// The camera's clock loop multiplies half as much as it should.
+/// The camera's clock loop multiplies by half of its proper factor.
 #[test]
 fn frames_that_take_another_time_than_they_should_are_told() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
@@ -101,8 +101,8 @@ fn kept_settings_that_are_not_read_are_told() {
     assert_eq!((health.problems, health.at_start), (unread, unread));
 }
 
-/// The built-in model is another than the one that the computer asked when the firmware was built,
-/// and its checksum is right: what makes forces of markers does not do what it should.
+/// The built-in model is replaced by a different one with a valid checksum. Its answers differ from
+/// those computed at build time: the arithmetic counts as faulty.
 #[test]
 fn a_built_in_model_that_answers_otherwise_is_told() {
     let directory = tempfile::tempdir().unwrap();
@@ -124,7 +124,7 @@ fn a_built_in_model_that_answers_otherwise_is_told() {
     assert_eq!((health.problems, health.at_start), (arithmetic, arithmetic));
 }
 
-/// The model with one bit changed, and its checksum, so that it answers otherwise.
+/// Returns the model with one bit changed, which changes its answer, and with the right checksum.
 fn of_another_answer(file: &[u8]) -> Vec<u8> {
     let answer = |file: &[u8]| {
         let model = Model::parse(file).ok()?;
@@ -143,8 +143,9 @@ fn of_another_answer(file: &[u8]) -> Vec<u8> {
     others.next().expect("some bit matters")
 }
 
-/// The loader's stand-in is gone from USB for a third of a second, and then starts the program by a
-/// jump. What was reset for it is no fault of the program: one that only restarts says so.
+/// The loader's stand-in is absent from USB for a third of a second, and then starts the program by
+/// a jump. The reset for it is not reported as a fault of the program; a plain restart is still
+/// reported.
 #[test]
 fn the_parts_own_loader_is_started_on_request_and_leaves_no_trace() {
     const AGAIN: u16 = 41;

@@ -1,5 +1,5 @@
-//! What the LED shows, read from its pin as a person does: by flashes and pauses, or by how bright
-//! it is where it is dimmed.
+//! Tests of the LED's signals, read from its pin as a person sees them: by flashes and pauses, or
+//! by the brightness while it is dimmed.
 
 use std::ops::Range;
 
@@ -11,29 +11,29 @@ use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::threshold::{Mono, Threshold};
 use hivtac_wire::message::Request;
 
-/// What is on for less is dimmed, s.
+/// Shorter pulses count as dimming, s.
 const SHORTEST_FLASH_S: f64 = 0.02;
-/// Time in which an eye takes the mean, s.
+/// Time over which an eye averages, s.
 const GLANCE_S: f64 = 0.02;
 
-/// What a person sees.
+/// A pattern as a person sees it.
 #[derive(Debug, PartialEq)]
 enum Pattern {
-    /// So many flashes, again after a period, s.
+    /// This many flashes, repeated with a period, s.
     Flashes(usize, f64),
     /// Brighter and darker, with a period, s.
     Breathes(f64),
 }
 
 impl Pattern {
-    /// Asserts that it is this one; the period may be off by so much.
+    /// Asserts that the pattern is `expected`; the period may differ by `off_s`.
     fn assert_is(&self, expected: &Pattern, off_s: f64) {
         let ((kind, period), (other, expected_s)) = (self.parts(), expected.parts());
         let is_near = (period - expected_s).abs() <= off_s;
         assert!(kind == other && is_near, "{self:?} instead of {expected:?}");
     }
 
-    /// How many flashes, none where it breathes, and the period, s.
+    /// Returns the number of flashes (`None` if it breathes) and the period, s.
     fn parts(&self) -> (Option<usize>, f64) {
         match *self {
             Pattern::Flashes(count, period_s) => (Some(count), period_s),
@@ -42,11 +42,11 @@ impl Pattern {
     }
 }
 
-/// When the LED was on, s.
+/// The times during which the LED was on, s.
 struct Light(Vec<Range<f64>>);
 
 impl Light {
-    /// Of a run, from a time on; what is on at the run's end is left out.
+    /// Returns the times of a run, from a time on; a pulse that lasts to the run's end is left out.
     fn of(report: &Report, from_s: f64) -> Light {
         let edges = report.led_edges_ns.as_chunks().0.iter();
         let lit = edges.map(|[on, off]| *on as f64 / 1e9..*off as f64 / 1e9);
@@ -62,8 +62,8 @@ impl Light {
         }
     }
 
-    /// Groups of flashes: a pause within one is shorter than that behind it. The first and the last
-    /// group may not be whole.
+    /// Returns groups of flashes: a pause within a group is shorter than the one after it. The
+    /// first and the last group may be incomplete.
     fn flashes(&self) -> Pattern {
         let pauses = self.0.windows(2);
         let pauses: Vec<f64> = pauses.map(|pair| pair[1].start - pair[0].end).collect();
@@ -78,7 +78,8 @@ impl Light {
         Pattern::Flashes(second - first, self.0[second].start - self.0[first].start)
     }
 
-    /// Twice the time from the middle of what is brighter than half to the middle of the dark.
+    /// The period is twice the time from the middle of the bright half to the middle of the dark
+    /// half.
     fn breath(&self) -> Pattern {
         let [from, to] = [self.0[0].start, self.0[self.0.len() - 1].end];
         let glances =
@@ -94,7 +95,7 @@ impl Light {
         Pattern::Breathes(2.0 * ((dark[0].end + dark[1].start) / 2.0 - brightest))
     }
 
-    /// The mean of a glance, 0 to 1.
+    /// Returns the mean brightness over a glance, 0 to 1.
     fn brightness(&self, at: f64) -> f64 {
         let end = at + GLANCE_S;
         let shares = self
@@ -105,8 +106,8 @@ impl Light {
     }
 }
 
-/// Silicon that is too old: two flashes, and a pause of seven times that. How long one is depends
-/// on the core's clock, which the rig does not follow there.
+/// Asserts the signal of a chip revision that is too old: two flashes, and a pause of seven times
+/// that. The duration of a flash depends on the core's clock, which the rig does not follow there.
 pub fn assert_flashes_twice(report: &Report) {
     let light = Light::of(report, 0.0);
     let flash_s = light.0[0].end - light.0[0].start;
@@ -114,8 +115,8 @@ pub fn assert_flashes_twice(report: &Report) {
     light.pattern().assert_is(&expected, flash_s);
 }
 
-/// What the second board shows from its first frames on, at its lowest rate: frames are what a run
-/// costs.
+/// Returns the pattern of the second board from its first frames on, at its lowest rate: the frames
+/// make up most of a run's time.
 fn shown(setup: Setup) -> Pattern {
     let slowly = CameraSettings {
         rate: Rate::Quarter,
@@ -137,7 +138,7 @@ fn it_breathes_while_frames_give_forces() {
     shown(openmv(4_300)).assert_is(&Pattern::Breathes(4.0), 0.1);
 }
 
-/// No marker is so dark.
+/// The threshold is darker than all markers.
 #[test]
 fn it_blinks_once_a_second_when_frames_give_no_force() {
     let nothing = Threshold::Mono(Mono { low: 0, high: 0 });
@@ -152,7 +153,7 @@ fn it_blinks_five_times_a_second_without_a_camera() {
     pattern.assert_is(&Pattern::Flashes(1, 0.2), 0.02);
 }
 
-/// What is kept is of another version, which is found at the start, while frames give forces.
+/// The kept settings have another version, which the start detects, while frames give forces.
 #[test]
 fn it_flashes_three_times_when_the_self_test_found_something() {
     let device = Device::new();

@@ -1,10 +1,10 @@
-//! Frames full of salt: the flashed firmware looks at each of them again, in the time that there
-//! is.
+//! Tests of second looks: in frames full of salt, the firmware looks at each frame again in the
+//! available time.
 
 use crate::common::{Run, Setup, firmware, instructions_per_second};
 use hivtac_terms::status::Status;
 
-/// Every frame needs a second look.
+/// Runs a scene in which every frame needs a second look.
 fn salted(instructions_per_second: u64) -> Run {
     let setup = Setup {
         scene: "tests/salt.toml",
@@ -44,8 +44,8 @@ fn salted_frames_keep_their_force_and_their_rate() {
     run.assert_only_setup_drops();
 }
 
-/// The camera writes over a frame before it is looked at again: then the first look stands. Frames
-/// that come too late are counted.
+/// The camera overwrites a frame before its second look: then the first look stands. Frames whose
+/// second look comes too late are counted.
 #[test]
 fn a_look_that_comes_too_late_is_given_up() {
     for fourths in [2, 3] {

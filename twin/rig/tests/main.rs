@@ -1,5 +1,5 @@
-//! The flashed firmware in the rig. One program, so that its tests run side by side whatever they
-//! are about, and are linked once; `cargo test settings::` runs one file's.
+//! Tests of the flashed firmware in the rig. They are one program, to run in parallel and to be
+//! linked once. `cargo test settings::` runs the tests of one file.
 
 mod common;
 

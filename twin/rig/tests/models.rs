@@ -1,4 +1,4 @@
-//! Models that a host sends to the flashed firmware: used from a frame on, kept through restarts
+//! Tests of models that a host sends to the firmware: used from a frame on, kept through restarts
 //! and power cuts, or refused.
 
 use std::path::{Path, PathBuf};
@@ -20,7 +20,7 @@ use hivtac_wire::settings::{Name, Selection};
 
 /// The model that is built into the firmware.
 const BUILT_IN: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
-/// One for frames in YUV422.
+/// A model for frames in YUV422.
 const YUV422: &[u8] = include_bytes!("../../../calibration/models/yuv422/default.hvtm");
 /// The unique number of the rig's part.
 const UNIT: &[u8; 12] = b"hivtac-rig-1";
@@ -29,21 +29,21 @@ const BEGIN: u16 = 40;
 const USE: u16 = 41;
 const LATER: u16 = 42;
 const FIRST_PART: u16 = 1000;
-/// When they are sent, ms.
+/// Time at which they are sent, ms.
 const SEND_MS: u64 = 170;
-/// Some frames behind a restart.
+/// Time for some frames after a restart.
 const RESTART_MS: u64 = 215;
-/// By then a model is in use: the parts take 0.15 s, an erase 1 s, the words 0.4 s; and the log of
-/// a new device another erase.
+/// Time by which a model is in use. The parts take 0.15 s, an erase 1 s, the words 0.4 s; the log
+/// of a new device needs another erase.
 const UPDATED_MS: u64 = 1_850;
 const FIRST_UPDATED_MS: u64 = UPDATED_MS + 1_000;
-/// By then a reset is done, though it erases a sector.
+/// Time by which a reset is done, even if it erases a sector.
 const RESET_MS: u64 = 1_300;
-/// Of the second bank.
+/// Sizes in the second bank.
 const SECTOR_BYTES: usize = 128 << 10;
 const WORD_BYTES: usize = 32;
 
-/// A model file with some bytes changed, and the checksum that fits.
+/// Returns a model file with some bytes changed, and the checksum that fits.
 fn changed(file: &[u8], changes: &[(usize, &[u8])]) -> Vec<u8> {
     let mut file = file.to_vec();
     for (at, bytes) in changes {
@@ -55,7 +55,7 @@ fn changed(file: &[u8], changes: &[(usize, &[u8])]) -> Vec<u8> {
     file
 }
 
-/// The built-in model, as if it were calibrated on this unit: origin and unit.
+/// Returns the built-in model as if it were calibrated on this unit: origin and unit.
 fn own() -> Vec<u8> {
     changed(BUILT_IN, &[(62, &[1]), (64, UNIT)])
 }
@@ -65,7 +65,7 @@ fn crc_of(file: &[u8]) -> u32 {
     u32::from_le_bytes(crc.try_into().unwrap())
 }
 
-/// All that sends a model and has it used.
+/// Returns all messages that send a model and put it to use.
 fn upload(file: &[u8]) -> Vec<u8> {
     let bytes = file.len() as u32;
     let mut commands = command(BEGIN, Request::BeginModel { bytes });
@@ -91,7 +91,8 @@ fn setup(flash: &Path, virtual_ms: u64) -> Setup {
     }
 }
 
-/// An update without a camera, which is not needed for it, and costs most of the time here.
+/// Makes an update without a camera. The update does not need one, and the camera costs most of the
+/// time.
 fn update(flash: &Path, file: &[u8]) -> Setup {
     setup(flash, FIRST_UPDATED_MS)
         .fault("camera-absent")
@@ -103,20 +104,20 @@ fn model(run: &Run) -> &ModelIdentity {
     hello.model.as_ref().expect("a model")
 }
 
-/// The checksum of a device's model, and where that is from.
+/// The checksum of a device's model, and its source.
 type Has = (u32, ModelSource);
 
-/// What a device has after a restart; it measures with that.
+/// Returns the model of a device after a restart; the device measures with it.
 fn restarted(flash: &Path) -> Has {
     has(&started(flash))
 }
 
-/// A device after a restart.
+/// Returns the run of a device after a restart.
 fn started(flash: &Path) -> Run {
     setup(flash, RESTART_MS).run()
 }
 
-/// What it has, and measures with.
+/// Returns the device's model, and asserts that it measures with it.
 fn has(run: &Run) -> Has {
     let followed = run.followed();
     let sample = followed.last().expect("it measures");
@@ -140,7 +141,7 @@ static NAMED: LazyLock<Vec<u8>> = LazyLock::new(|| {
     std::fs::read(&device.flash).unwrap()
 });
 
-/// The same device, once it was sent a model of its own.
+/// The flash of the same device after it got its own model.
 static UPDATED: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let device = Device::new(Some(&NAMED));
     let run = update(&device.flash, &own()).run();
@@ -149,7 +150,7 @@ static UPDATED: LazyLock<Vec<u8>> = LazyLock::new(|| {
     std::fs::read(&device.flash).unwrap()
 });
 
-/// A folder, and in it a flash.
+/// A folder with a flash file.
 pub struct Device {
     _directory: tempfile::TempDir,
     pub flash: PathBuf,
@@ -178,13 +179,14 @@ impl Device {
         Contents::load(&self.flash).unwrap()
     }
 
-    /// One with a model of its own, as if it were calibrated.
+    /// Returns a device with its own model, as if it were calibrated.
     pub fn updated() -> Device {
         Device::new(Some(&UPDATED))
     }
 }
 
-/// The same film, so the same forces: but from one frame on they are those of the unit's own model.
+/// The film is the same, and so are the forces; but from one frame on they come from the unit's own
+/// model.
 #[test]
 fn a_model_is_used_from_a_frame_on_and_after_a_restart() {
     let device = Device::new(Some(&NAMED));
@@ -221,8 +223,8 @@ fn a_model_is_used_from_a_frame_on_and_after_a_restart() {
     );
 }
 
-/// Of another unit, of another frame size, packed otherwise, damaged, cut: none is kept, and the
-/// device says why.
+/// A model of another unit, for another frame size, in another layout, damaged, or cut is not kept,
+/// and the device reports the reason.
 #[test]
 fn a_model_that_is_none_for_this_device_is_refused_with_its_reason() {
     let mut damaged = own();
@@ -294,7 +296,7 @@ fn parts_that_do_not_follow_each_other_are_refused() {
     assert_eq!(run.report.flash_operations, []);
 }
 
-/// A model for other pixels brings the camera to send them; no frame is read as what it is not.
+/// A model for another pixel format makes the camera send it; no frame is read in the wrong format.
 #[test]
 fn a_model_for_another_pixel_format_sets_the_camera() {
     let device = Device::new(Some(&NAMED));
@@ -320,7 +322,8 @@ fn a_model_for_another_pixel_format_sets_the_camera() {
     );
 }
 
-/// A threshold of the user's own stays, and so there is no force; the built-in model takes it back.
+/// The user's own threshold stays, and for that reason there is no force. The built-in model
+/// restores it.
 #[test]
 fn the_built_in_model_comes_back_on_request() {
     let device = Device::updated();
@@ -341,7 +344,7 @@ fn the_built_in_model_comes_back_on_request() {
     assert_eq!(restarted(&device.flash), built_in);
 }
 
-/// A cut run leaves what the operations of the whole one say.
+/// Asserts that a cut run leaves the result that the operations of the complete run predict.
 fn assert_left(before: &Contents, update: impl Fn(&Path) -> Setup, whole: &[Operation], cut: Cut) {
     let device = Device::of(before);
     let setup = Setup {
@@ -353,8 +356,8 @@ fn assert_left(before: &Contents, update: impl Fn(&Path) -> Setup, whole: &[Oper
     assert!(device.contents() == left.contents(), "{cut:?}");
 }
 
-/// A device with a model of its own is sent another, and the power is cut at each operation of
-/// that, in each way: it has the old or the new one, to the last bit.
+/// A device with its own model gets another one, and the power is cut at each of the update's
+/// operations, in each way. The device has the old or the new model, to the last bit.
 fn every_cut_of_an_update(before: &Contents) {
     let (old, new) = (own(), changed(&own(), &[(300, &[1])]));
     let updating = |flash: &Path| update(flash, &new);
@@ -390,15 +393,16 @@ fn after_a_power_cut_in_an_update_the_old_or_the_new_model_is_there() {
     every_cut_of_an_update(&Device::updated().contents());
 }
 
-/// The record that names the model does not fit the log's sector any more: the other is erased.
+/// The record that names the model no longer fits into the log's sector: the other sector is
+/// erased.
 #[test]
 #[ignore = "slow"]
 fn after_a_power_cut_in_an_update_of_a_full_log_the_old_or_the_new_model_is_there() {
     every_cut_of_an_update(&cuts::full(Device::updated().contents()));
 }
 
-/// Words that a start neither read nor programmed, by what the rig says, are all torn, and hold
-/// something else: what the device sends stays the same, bit for bit.
+/// All words that a start neither read nor programmed, by the rig's report, are torn and get other
+/// contents. The device sends the same bytes, bit for bit.
 #[test]
 fn a_start_depends_on_no_word_that_the_rig_does_not_tell() {
     let device = Device::updated();
@@ -416,7 +420,7 @@ fn a_start_depends_on_no_word_that_the_rig_does_not_tell() {
             .iter_mut()
             .for_each(|byte| *byte = !*byte);
     }
-    // The log's two sectors and the model's words are read, and no others.
+    // Only the log's two sectors and the model's words are read.
     let read = 2 * SECTOR_BYTES / WORD_BYTES + BUILT_IN.len() / WORD_BYTES;
     assert!((read..read + 40).contains(&words.len()), "{}", words.len());
     spoilt.extend(others.iter().flat_map(|word| word.to_le_bytes()));
@@ -427,7 +431,7 @@ fn a_start_depends_on_no_word_that_the_rig_does_not_tell() {
     assert_eq!(&again.report.flash_words, words);
 }
 
-/// A factory reset is cut at each operation of it, in each way.
+/// Cuts a factory reset at each of its operations, in each way.
 fn every_cut_of_a_reset(before: &Contents) {
     let device = Device::of(before);
     let setup = setup(&device.flash, RESET_MS)
@@ -462,15 +466,15 @@ fn after_a_power_cut_in_a_reset_everything_or_nothing_is_forgotten() {
     every_cut_of_a_reset(&Device::updated().contents());
 }
 
-/// It begins with an erase of the log's other sector.
+/// The reset begins with an erase of the log's other sector.
 #[test]
 #[ignore = "slow"]
 fn after_a_power_cut_in_a_reset_of_a_full_log_everything_or_nothing_is_forgotten() {
     every_cut_of_a_reset(&cuts::full(Device::updated().contents()));
 }
 
-/// A word of it that does not read, and one that reads otherwise: the device goes on with the
-/// built-in model, says so, and takes another.
+/// One word of the model cannot be read, or reads differently. The device continues with the
+/// built-in model, reports it, and accepts another model.
 #[test]
 fn a_kept_model_that_is_spoilt_is_replaced_by_the_built_in_one() {
     let slot = 2 * SECTOR_BYTES;
@@ -492,7 +496,7 @@ fn a_kept_model_that_is_spoilt_is_replaced_by_the_built_in_one() {
     }
 }
 
-/// The host goes away in the middle, and another one begins again.
+/// The host goes away in the middle of an update, and another host begins again.
 #[test]
 fn an_update_ends_with_its_conversation() {
     let device = Device::new(None);

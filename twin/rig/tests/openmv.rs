@@ -1,4 +1,5 @@
-//! The second board, an OpenMV Cam H7 with an MT9V034: what holds for the first one holds for it.
+//! Tests of the second board, an OpenMV Cam H7 with an MT9V034: it has the properties of the first
+//! one.
 
 use crate::common::{Run, Setup, bug, command, firmware, openmv, set_threshold};
 use crate::led;
@@ -10,12 +11,12 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
 use hivtac_wire::message::{Outcome, Request, Sample};
 
-/// All that a sample of an undisturbed scene says before a tare. The demo's tip wanders over the
-/// film, which is a slip where it is fast.
+/// All statuses of a sample in an undisturbed scene before a tare. The demo's tip wanders over the
+/// film; fast parts are a slip.
 const USUAL: Status =
     Status(Status::TARE_MISSING.0 | Status::NOT_CALIBRATED.0 | Status::CONTACT.0 | Status::SLIP.0);
 
-/// When the middle of a frame was exposed, s.
+/// Returns the time of the middle of a frame's exposure, s.
 fn exposed_s(run: &Run, frame: u64) -> f64 {
     let line = run.truth.iter().find(|line| line["frame"] == frame);
     line.expect("exposed")["time_s"].as_f64().unwrap()
@@ -56,7 +57,7 @@ fn every_frame_is_measured_at_240_a_second_within_7_ms() {
     }
 }
 
-/// What the firmware says is what the tip did.
+/// The firmware's forces are those of the tip.
 #[test]
 fn forces_are_the_true_ones() {
     let run = openmv(420).run();
@@ -82,7 +83,7 @@ fn half_as_many_instructions_per_second_are_enough() {
     assert_eq!(run.missing_frames(), Vec::<u32>::new());
 }
 
-/// A camera of the other kind is named as what it is, on either board, and nothing is written to
+/// A camera of the other kind is reported by its name, on either board, and nothing is written to
 /// it.
 #[test]
 fn a_camera_of_the_other_kind_is_named() {
@@ -101,7 +102,7 @@ fn a_camera_of_the_other_kind_is_named() {
     }
 }
 
-/// An MT9V032 is none of those that this firmware drives.
+/// An MT9V032 is not among this firmware's cameras.
 #[test]
 fn a_camera_with_another_version_is_refused() {
     let run = openmv(700).fault("camera-wrong-id").run();
@@ -116,7 +117,7 @@ fn an_absent_camera_is_reported_and_found_later() {
     assert!(run.samples().len() >= 6, "{:?}", run.stats());
 }
 
-/// Its reset line and its register reset take back what another program has left.
+/// Its reset line and its register reset undo the settings of another program.
 #[test]
 fn what_another_program_left_in_the_camera_is_reset() {
     assert_good(&openmv(420).fault("camera-used").run());
@@ -147,7 +148,7 @@ fn a_short_frame_is_dropped() {
     assert_eq!(after.len(), 1, "{after:?}");
 }
 
-/// The camera sees no colours: a threshold of its luma is taken at once, others are refused.
+/// The camera sees no colours: a threshold of its luma is accepted at once, others are refused.
 #[test]
 fn only_thresholds_of_its_luma_are_taken() {
     let red = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
@@ -181,7 +182,7 @@ fn exposure_is_found_anew_on_command() {
     run.assert_times();
 }
 
-/// Revision Y, which some of these boards have: the LED flashes and nothing is set up.
+/// Revision Y, which some of these boards have: the LED flashes and nothing else is set up.
 #[test]
 fn an_old_revision_is_refused_with_a_flashing_led() {
     let setup = Setup {
@@ -194,7 +195,7 @@ fn an_old_revision_is_refused_with_a_flashing_led() {
     led::assert_flashes_twice(&outcome.report);
 }
 
-/// On the first board, whose crystal is twice as fast, this firmware sets clocks that are too fast.
+/// The first board's crystal is twice as fast: on it, this firmware sets clocks that are too fast.
 #[test]
 fn on_the_other_board_it_breaks_a_rule_of_the_chip() {
     let setup = Setup {
@@ -206,7 +207,8 @@ fn on_the_other_board_it_breaks_a_rule_of_the_chip() {
     assert!(error.to_string().contains("HCLK"), "{error}");
 }
 
-/// DCMI takes blank rows for a frame; a camera that does not bin sends four times as much.
+/// In one bug DCMI takes blank rows for a frame; in the other a camera without binning sends four
+/// times the data.
 #[test]
 fn seeded_bugs_are_noticed() {
     for name in ["openmv-h7-bug-polarity", "openmv-h7-bug-camera-register"] {

@@ -1,5 +1,5 @@
-//! What a program must not do ends the run with a message. The programs here are a few instructions
-//! that write registers, in an ELF made on the spot.
+//! Tests of the chip's rules: a program that breaks one ends the run with a message. The programs
+//! are a few instructions that write registers, in an ELF that the test makes.
 
 use std::num::NonZeroU64;
 use std::path::Path;
@@ -24,7 +24,7 @@ const AHB2ENR: u32 = 0x5802_44DC;
 const DMA1_STREAM0: u32 = 0x4002_0010;
 const DCMI_CR: u32 = 0x4802_0000;
 
-/// An ELF that writes (address, value) pairs and then stands still.
+/// Returns an ELF that writes (address, value) pairs and then stands still.
 fn program(writes: &[(u32, u32)]) -> Vec<u8> {
     const BASE: u32 = 0x0800_0000;
     // ldr r0, table; loop: ldmia r0!, {r1, r2}; cbz r1, end; str r2, [r1]; b loop; end: b end
@@ -94,7 +94,7 @@ fn outcome_where(protection: Protection, writes: &[(u32, u32)]) -> Result<Outcom
     run_program(file.path(), None, None, protection).map_err(|error| format!("{error:#}"))
 }
 
-/// DMA1 stream 0, peripheral to memory, from DCMI_DR to an address.
+/// Returns the writes for DMA1 stream 0, peripheral to memory, from DCMI_DR to an address.
 fn dma_to(memory: u32) -> [(u32, u32); 5] {
     [
         (AHB1ENR, 1),
@@ -134,7 +134,7 @@ fn a_dma_stream_that_a_timer_drives_ends_the_run() {
     assert!(error.contains("DMAMUX1 channel 0"), "{error}");
 }
 
-/// A program that makes a region read-only, writes to it, and then what ends a run.
+/// The program makes a region read-only and writes to it; the writes after that would end the run.
 #[test]
 fn a_program_that_breaks_its_own_protection_gets_no_further() {
     const MPU_CTRL: u32 = 0xE000_ED94;
@@ -187,12 +187,12 @@ const FLASH_KEYR1: u32 = 0x5200_2004;
 const BANK_1: u32 = 0x0800_0000;
 const BANK_2: u32 = 0x0810_0000;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// PG, and 64 bits at a time.
+/// FLASH_CR: PG, and 64 bits at a time.
 const PROGRAM: u32 = 1 << 1 | 3 << 4;
-/// SER of sector 0, START, and 64 bits at a time.
+/// FLASH_CR: SER of sector 0, START, and 64 bits at a time.
 const ERASE: u32 = 1 << 2 | 1 << 7 | 3 << 4;
 
-/// Programs the 32 bytes of a word. `bank` is 0 for the first.
+/// Returns the writes that program the 32 bytes of a word. `bank` is 0 for the first.
 fn program_word(bank: u32, address: u32) -> Vec<(u32, u32)> {
     let stores = (0..8).map(|nth| (address + 4 * nth, 0x1111_1111 * nth));
     let mut writes = unlocked(bank, PROGRAM);
@@ -205,7 +205,7 @@ fn unlocked(bank: u32, control: u32) -> Vec<(u32, u32)> {
     vec![(keyr, KEYS[0]), (keyr, KEYS[1]), (keyr + 8, control)]
 }
 
-/// Longer than a word takes: writes that do nothing.
+/// Returns writes without an effect that take longer than programming a word.
 fn pause() -> Vec<(u32, u32)> {
     vec![(0x2000_0100, 0); 20_000]
 }

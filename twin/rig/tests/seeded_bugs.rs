@@ -1,12 +1,12 @@
-//! Firmware with a seeded bug must fail, each in its own way: that is what shows that the rig would
-//! notice.
+//! Tests with firmware that has a seeded bug. Each bug must fail in its own way, which shows that
+//! the rig detects it.
 
 use crate::common::{Setup, bug};
 use hivtac_rig::usb_host::Port;
 use hivtac_terms::status::Status;
 
-/// DMAMUX connects another request: nobody empties the FIFO, so every frame overruns at its fifth
-/// word.
+/// DMAMUX connects another request. The FIFO is never emptied, and every frame overruns at its
+/// fifth word.
 #[test]
 fn a_wrong_dmamux_request_overruns_every_frame() {
     let run = Setup::new(bug("bug-dmamux-request"), 280).run();
@@ -32,8 +32,7 @@ fn wrong_polarities_give_frames_of_the_wrong_size() {
     );
 }
 
-/// The camera's format register stays at YUV: frames of the right size, without a red marker in
-/// them.
+/// The camera's format register stays at YUV: frames have the right size, but no red marker.
 #[test]
 fn a_wrong_camera_register_leaves_no_markers() {
     let run = Setup::new(bug("bug-camera-register"), 280).run();
@@ -61,7 +60,8 @@ fn a_wrong_camera_register_leaves_no_markers() {
     }
 }
 
-/// The DMA moves half of each band: the frame has twice as many of them, and counts as too long.
+/// The DMA moves half of each band: the frame has twice the number of bands, and counts as too
+/// long.
 #[test]
 fn half_size_bands_make_every_frame_too_long() {
     let run = Setup::new(bug("bug-half-buffer"), 280).run();
@@ -73,8 +73,8 @@ fn half_size_bands_make_every_frame_too_long() {
     );
 }
 
-/// USB runs from an oscillator that is off by 0.6 %: the host sees a device and understands nothing
-/// of it.
+/// USB runs from an oscillator with an error of 0.6 %: the host sees a device and cannot
+/// communicate with it.
 #[test]
 fn with_an_untrimmed_oscillator_usb_never_enumerates() {
     let run = Setup::new(bug("bug-usb-clock"), 280).run();

@@ -1,4 +1,4 @@
-//! What the flashed firmware keeps in its flash, through restarts and power cuts.
+//! Tests of the settings in the device's flash: they are kept through restarts and power cuts.
 
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -17,14 +17,14 @@ use hivtac_wire::settings::{Found, Name, RestPosition, Selection, SettingsReport
 const SET: u16 = 30;
 const KEEP: u16 = 40;
 const REPORT: u16 = 50;
-/// When they are sent, ms.
+/// Times at which they are sent, ms.
 const SET_MS: u64 = 170;
 const KEEP_MS: u64 = 190;
-/// Some frames behind a restart, and the report.
+/// Time for some frames after a restart, and the report.
 const RESTART_MS: u64 = 225;
-/// An erase takes 1 s.
+/// Time by which an erase, which takes 1 s, is over.
 const ERASED_MS: u64 = 1_350;
-/// Where the firmware writes: of the second bank's sectors the first two.
+/// The firmware writes the first two of the second bank's sectors.
 const SECTOR_BYTES: usize = 128 << 10;
 
 fn name(text: &str) -> Name {
@@ -35,7 +35,7 @@ fn send(id: u16, request: Request) -> Action {
     Action::Send(command(id, request))
 }
 
-/// A run at rest with this flash that asks for the settings at its end.
+/// Returns a run at rest with this flash that asks for the settings at its end.
 fn setup(flash: &Path, virtual_ms: u64) -> Setup {
     let setup = Setup::new(firmware(), virtual_ms);
     let setup = setup.at(virtual_ms - 20, send(REPORT, Request::GetSettings));
@@ -46,7 +46,7 @@ fn setup(flash: &Path, virtual_ms: u64) -> Setup {
     }
 }
 
-/// Gives a name and keeps that alone; without a camera, which is not needed for it.
+/// Sets a name and keeps only that; without a camera, which this does not need.
 fn naming(flash: &Path, text: &str, virtual_ms: u64) -> Setup {
     let only_name = Selection {
         name: true,
@@ -58,12 +58,13 @@ fn naming(flash: &Path, text: &str, virtual_ms: u64) -> Setup {
         .at(KEEP_MS, send(KEEP, Request::Keep(only_name)))
 }
 
-/// What a device says after a restart.
+/// Returns the settings of a device after a restart.
 fn restarted(flash: &Path) -> SettingsReport {
     told(setup(flash, RESTART_MS)).0
 }
 
-/// What a device says in a run, and the words of the flash that decided it.
+/// Returns the settings that a device reports in a run, and the words of the flash that decided
+/// them.
 fn told(setup: Setup) -> Start<SettingsReport> {
     let run = setup.run();
     assert!(!run.samples().is_empty(), "it measures");
@@ -76,7 +77,7 @@ fn told(setup: Setup) -> Start<SettingsReport> {
     (report.clone(), run.report.flash_words.clone())
 }
 
-/// The flash of a device that keeps the name "old" and a tare, and what it says of them.
+/// The flash of a device that keeps the name "old" and a tare, and its report of them.
 static OLD: LazyLock<(Vec<u8>, SettingsReport)> = LazyLock::new(old);
 
 fn old() -> (Vec<u8>, SettingsReport) {
@@ -98,7 +99,7 @@ fn old() -> (Vec<u8>, SettingsReport) {
     (std::fs::read(&flash).unwrap(), kept)
 }
 
-/// A folder, and in it that flash.
+/// A folder with that flash.
 pub struct Device {
     _directory: tempfile::TempDir,
     pub flash: PathBuf,
@@ -125,13 +126,13 @@ fn name_tare_and_threshold_are_kept_while_forces_go_on() {
     let first = restarted(&device.flash);
     let expected = SettingsReport {
         found: Found::Settings,
-        // Nobody saw the untouched film for a second since it started.
+        // The untouched film has not been seen for a second since the start.
         seen: None,
         ..device.kept.clone()
     };
     assert_eq!(first, expected);
     assert!(first.tare.is_some());
-    // Another threshold, kept alone: the device begins with it, and keeps the rest.
+    // Another threshold is kept alone: the device begins with it, and keeps the rest.
     let green = Threshold::Rgb565(HsvBox::of_limits([40, 80, 100, 255, 45, 255]));
     let only_threshold = Selection {
         threshold: true,
@@ -149,8 +150,8 @@ fn name_tare_and_threshold_are_kept_while_forces_go_on() {
     assert_eq!(run.settings().erases, 1, "there is room for hundreds");
 }
 
-/// What is told of gravity is not answered, goes with a tare, and is kept; what is no direction
-/// counts as unknown, and says so.
+/// The message about gravity gets no answer. Its direction belongs to a tare and is kept. An
+/// invalid direction counts as unknown, and the device reports that.
 #[test]
 fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     let directory = tempfile::tempdir().unwrap();
@@ -166,7 +167,8 @@ fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     let report = run.settings();
     assert_eq!((report.down, report.kept.down), (Down::Told(told), true));
     assert_eq!(report.tare.unwrap().down, Some(told));
-    // A restart leaves it; turned over, the sensor measures on, and a jumble is said to be one.
+    // A restart keeps it. Turned over, the sensor continues to measure, and it reports an invalid
+    // direction.
     let run = setup(&flash, 260)
         .at(SET_MS, down(Down::Told(Direction([0, 600, 800]))))
         .at(SET_MS + 30, down(Down::Told(Direction([1, 2, 3]))))
@@ -183,15 +185,15 @@ fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     assert_eq!(run.missing_frames(), [0; 0], "forces go on");
 }
 
-/// Power is cut at each operation of a change of the name, in each way: the device has the old one
-/// or the new one, its tare, and says the same at the next start.
+/// Cuts the power at each operation of a change of the name, in each way. The device has the old or
+/// the new name and its tare, and reports the same at the next start.
 fn every_cut_of_a_new_name(before: &Contents) {
     let device = Device::new();
     before.save(&device.flash).unwrap();
     let run = naming(&device.flash, "new", ERASED_MS).run();
     assert_eq!(run.outcome(KEEP), Outcome::Done);
     let start = |flash: &Path| {
-        // What is not settled is written anew at the start, which may take an erase.
+        // An incomplete record is written anew at the start, which may need an erase.
         let (first, words) = told(setup(flash, ERASED_MS).fault("camera-absent@225"));
         let again = setup(flash, RESTART_MS).fault("camera-absent").run();
         assert_eq!(again.settings().name, first.name);
@@ -219,14 +221,14 @@ fn after_a_power_cut_the_old_or_the_new_is_there() {
     every_cut_of_a_new_name(&Contents::load(&Device::new().flash).unwrap());
 }
 
-/// It begins with an erase of the log's other sector.
+/// The change begins with an erase of the log's other sector.
 #[test]
 fn after_a_power_cut_in_a_full_log_the_old_or_the_new_is_there() {
     every_cut_of_a_new_name(&cuts::full(Contents::load(&Device::new().flash).unwrap()));
 }
 
-/// A device that never kept anything begins with an erase. One that was cut leaves some of its
-/// words blank, some torn, and some as they were.
+/// A device that never kept anything begins with an erase. A cut erase leaves some words blank,
+/// some torn, and some unchanged.
 #[test]
 fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
     let directory = tempfile::tempdir().unwrap();
@@ -248,12 +250,12 @@ fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
     assert_eq!(restarted(&flash).name, "new");
 }
 
-/// The flash of a device whose record has another first byte, and the checksum for it.
+/// Changes the first byte of the record in a device's flash, and sets the right checksum.
 pub fn of_another_version(flash: &Path) {
     let mut contents = Contents::load(flash).unwrap();
     let sector = &mut contents.array[..SECTOR_BYTES];
-    // Of the storage's layout: 10 bytes before the record, of which the last four are a checksum
-    // over generation and record.
+    // By the storage's layout: 10 bytes before the record, with a checksum over generation and
+    // record in the last four.
     let length = usize::from(sector[1]);
     let words = sector.chunks(32);
     let mut record: Vec<u8> = words.clone().next().unwrap()[10..].to_vec();
@@ -286,7 +288,8 @@ fn settings_of_another_version_are_told_and_stay_until_something_is_kept() {
     assert_eq!((found.name.as_str(), found.found), ("new", Found::Settings));
 }
 
-/// Of another format; with a marker outside every picture; of a film that is pressed.
+/// The rest positions have another format, a marker outside every picture, or are those of a
+/// pressed film.
 #[test]
 fn a_rest_position_that_is_none_is_refused_and_nothing_changes() {
     let device = Device::new();

@@ -1,4 +1,4 @@
-//! The chip as it may be met: an old revision, and a program that the ROM's loader starts.
+//! Tests of variants of the chip: an old revision, and a program that the ROM's loader starts.
 
 use crate::common::{Setup, firmware};
 use crate::led;
@@ -6,8 +6,8 @@ use hivtac_rig::chip::Revision;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::usb_host::Port;
 
-/// Revision Y ends at 400 MHz: the LED flashes twice a second and nothing is set up, least of all
-/// 480 MHz, which would end the run.
+/// Revision Y ends at 400 MHz. The LED flashes twice a second and nothing else is set up; 480 MHz
+/// would end the run.
 #[test]
 fn an_old_revision_is_refused_with_a_flashing_led() {
     let setup = Setup {

@@ -1,5 +1,5 @@
-//! Contact, slip and filter of the flashed firmware: those that the sensing on this computer makes
-//! of the same forces, bit for bit.
+//! Tests of contact, slip and filter in the firmware: they equal, bit for bit, those that the
+//! sensing on this computer computes from the same forces.
 
 use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
@@ -11,11 +11,11 @@ use hivtac_terms::units::{MicroNewtons, Milliseconds, UnsignedMicroNewtons};
 use hivtac_wire::message::{Outcome, Request, Sample};
 use std::collections::BTreeMap;
 
-/// Numbers of commands, and when they are sent.
+/// Numbers of commands, and the time at which they are sent.
 const SET: u16 = 30;
 const WRONG: u16 = 31;
 const SET_MS: u64 = 360;
-/// The tip has been lifted by then.
+/// Time by which the tip has been lifted.
 const END_MS: u64 = 520;
 
 fn setup() -> Setup {
@@ -25,11 +25,11 @@ fn setup() -> Setup {
     }
 }
 
-/// A status, and a force's components, µN: uncertainties hold what the film may remember, which a
-/// sample that is followed again holds twice.
+/// A status, and a force's components, µN. Uncertainties are left out: they include what the film
+/// may remember, which a sample that is followed again would include twice.
 type Told = (Status, Option<[MicroNewtons; 3]>);
 
-/// A sample of another run: what its frame itself tells.
+/// Returns a sample of another run with only the values of its own frame.
 fn measured(sample: &Sample) -> Measurement {
     Measurement {
         status: sample.status,
@@ -39,7 +39,8 @@ fn measured(sample: &Sample) -> Measurement {
     }
 }
 
-/// What the sensing here makes of samples, with other settings from the one with this index on.
+/// Returns the results of the sensing on this computer for samples, with other settings from the
+/// index `from` on.
 fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<Told> {
     let mut temporal = Temporal::new();
     let followed = samples.iter().enumerate().map(|(nth, sample)| {
@@ -62,7 +63,8 @@ fn told(run: &Run) -> Vec<Told> {
     samples.iter().map(told).collect()
 }
 
-/// The truth of each frame: whether the tip presses, and how far its contact has moved, mm.
+/// Returns the truth of each frame: whether the tip presses, and the distance that its contact has
+/// moved, mm.
 fn truth(run: &Run) -> BTreeMap<u32, (bool, f64)> {
     let lines = run.truth.iter().map(|line| {
         let number = |key: &str| line[key].as_f64();
@@ -82,7 +84,7 @@ fn a_drag_is_a_contact_and_slips_and_new_settings_hold_for_whole_frames() {
     assert_eq!(told(&run), followed(&samples, usual, usize::MAX));
     check_truth(&run);
 
-    // Another filter, and limits under which nothing touches.
+    // Another filter, and limits above every touch.
     let other = TemporalSettings {
         contact: ContactLimits {
             begins: UnsignedMicroNewtons(500_000),
@@ -103,14 +105,14 @@ fn a_drag_is_a_contact_and_slips_and_new_settings_hold_for_whole_frames() {
     assert_eq!(changed.outcome(SET), Outcome::Done);
     assert_eq!(changed.outcome(WRONG), Outcome::InvalidArgument);
     assert_eq!(changed.hellos().last().unwrap().filter, other.filter);
-    // The reply passes samples that wait, by one or two.
+    // The reply overtakes waiting samples, by one or two.
     let before = changed.answers(SET)[0].1;
     let fits = |from: &usize| told(&changed) == followed(&samples, other, *from);
     let from = (before - 1..before + 3).find(fits);
     assert!(from.is_some(), "every frame by one of the two settings");
 }
 
-/// Contact and slip are told when they are true, and soon.
+/// Checks that contact and slip are reported when they are true, and soon.
 fn check_truth(run: &Run) {
     let truth = truth(run);
     let first = |is: &dyn Fn(&Sample) -> bool| {
@@ -126,8 +128,8 @@ fn check_truth(run: &Run) {
     );
     let moves = first(&|sample| truth[&sample.frame].1 > 1e-6);
     let slips = first(&|sample| sample.status.contains(Status::SLIP));
-    // While the force still rises, its place may seem to move some frames earlier: from when the
-    // pull is strong enough for a slip.
+    // While the force still rises, its place may seem to move some frames earlier, once the pull is
+    // strong enough for a slip.
     assert!((moves - 4..moves + 4).contains(&slips), "{moves} {slips}");
     let last = run.samples().last().unwrap().status;
     assert!(!last.contains(Status::CONTACT), "{last:?}");

@@ -1,4 +1,5 @@
-//! A frame is sent as the camera showed it, while forces go on; and what cuts that short.
+//! Tests of snapshots: a frame is sent as the camera showed it while forces go on; some events end
+//! it early.
 
 use crate::common::{HELLO_MS, Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
@@ -6,9 +7,9 @@ use hivtac_terms::status::Status;
 use hivtac_twin::{Preset, Scene, Shutter};
 use hivtac_wire::message::{DeviceMessage, Outcome, Reply, Request, Snapshot};
 
-/// When it is asked for, ms.
+/// Time at which it is requested, ms.
 const ASKED_MS: u64 = 240;
-/// The number of that command.
+/// The number of the command.
 const ID: u16 = 7;
 
 fn setup(virtual_ms: u64) -> Setup {
@@ -19,13 +20,13 @@ fn take(id: u16) -> Action {
     Action::Send(command(id, Request::Snapshot))
 }
 
-/// One snapshot: what it is said to be, and the bytes that came in order.
+/// One snapshot: its header, and its bytes that came in order.
 struct Taken {
     header: Snapshot,
     bytes: Vec<u8>,
 }
 
-/// All snapshots that were begun.
+/// Returns all snapshots that were begun.
 fn snapshots(run: &Run) -> Vec<Taken> {
     let mut all: Vec<Taken> = Vec::new();
     for message in &run.messages {
@@ -45,7 +46,7 @@ fn snapshots(run: &Run) -> Vec<Taken> {
     all
 }
 
-/// What the camera showed in that frame, byte for byte.
+/// Returns the camera's picture of that frame, byte for byte.
 fn shown(run: &Run, frame: u32) -> Vec<u8> {
     let line = run.truth.iter().find(|line| line["frame"] == frame);
     let line = line.unwrap_or_else(|| panic!("frame {frame} was never exposed"));
@@ -63,21 +64,21 @@ fn shown(run: &Run, frame: u32) -> Vec<u8> {
         .collect()
 }
 
-/// Asserts that it is whole and what the camera showed.
+/// Asserts that a snapshot is complete and equals the camera's picture.
 fn assert_shown(run: &Run, taken: &Taken) {
     assert_eq!(taken.bytes.len(), 153_600);
     assert!(taken.bytes == shown(run, taken.header.frame), "every byte");
 }
 
-/// What was answered to a command.
+/// Returns the answers to a command.
 fn outcomes(run: &Run, id: u16) -> Vec<Outcome> {
     let answers = run.answers(id);
     answers.into_iter().map(|(outcome, _)| outcome).collect()
 }
 
-/// What samples leave of the line is enough for a frame in a seventh of a second: no sample and no
-/// frame is lost, a sample waits for a part at most, and two others that are asked for meanwhile
-/// are refused.
+/// Samples leave enough of the line's capacity to send a frame in a seventh of a second. No sample
+/// and no frame is lost, and a sample waits for one part at most. Two other requests during the
+/// snapshot are refused.
 #[test]
 fn a_frame_is_sent_as_it_was_shown_and_forces_go_on() {
     let run = setup(440)
@@ -111,7 +112,7 @@ fn assert_reply_is_last(run: &Run) {
     assert!(!run.messages[end..].iter().any(is_part));
 }
 
-/// Samples leave at most 1.5 ms later than before, at half speed, too.
+/// Checks that samples leave at most 1.5 ms later than before, also at half speed.
 fn check_latency(run: &Run, kept: u64) {
     let latencies = run.latencies();
     let longest = |frames: std::ops::Range<u64>| {
@@ -128,8 +129,8 @@ fn check_latency(run: &Run, kept: u64) {
     assert!(own.max(then) - before < 1.5e-3);
 }
 
-/// A frame that is broken is not sent; the next whole one is. While blocks take up to 16 times as
-/// long, its bands are copied all the same.
+/// A broken frame is not sent; the next whole one is. Although blocks take up to 16 times as long,
+/// its bands are copied.
 #[test]
 fn an_overrun_costs_a_frame_and_a_busy_bus_nothing() {
     let run = setup(450).fault("dcmi-overrun@233").fault("bus-busy").run();
@@ -141,7 +142,7 @@ fn an_overrun_costs_a_frame_and_a_busy_bus_nothing() {
     assert_eq!(run.missing_frames().len(), 1);
 }
 
-/// A camera that is silent for longer than a snapshot waits.
+/// The camera is silent for longer than a snapshot waits.
 #[test]
 fn without_frames_it_is_given_up() {
     let run = setup(2400).fault("camera-silent@235-2300").run();
@@ -149,8 +150,8 @@ fn without_frames_it_is_given_up() {
     assert_eq!(outcomes(&run, ID), [Outcome::NoGoodFrames]);
 }
 
-/// The host takes no bytes for longer than the device waits: that snapshot is given up, and said
-/// to be; samples go on, and the next snapshot is whole.
+/// The host takes no bytes for longer than the device waits. The device gives up the snapshot and
+/// reports it. Samples go on, and the next snapshot is whole.
 #[test]
 fn a_host_that_does_not_read_ends_it() {
     let run = setup(670)
@@ -167,7 +168,7 @@ fn a_host_that_does_not_read_ends_it() {
     assert!(run.samples().iter().filter(after).count() > 20);
 }
 
-/// The host is started anew: the old conversation's snapshot ends, and the new one's is whole.
+/// The host starts again: the old conversation's snapshot ends, and the new one's is whole.
 #[test]
 fn a_new_conversation_ends_it_and_can_have_its_own() {
     let again = 300;
@@ -196,7 +197,7 @@ fn a_new_conversation_ends_it_and_can_have_its_own() {
     assert_eq!(outcomes(&run, 8), [Outcome::Done]);
 }
 
-/// The cable is pulled amid the parts and put back: nothing of it is left behind.
+/// The cable is pulled amid the parts and put back: nothing of the snapshot remains.
 #[test]
 fn a_pulled_cable_ends_it() {
     let again = HELLO_MS + 400;

@@ -1,4 +1,4 @@
-//! A tare of the flashed firmware: taken of a film at rest, refused with the reason otherwise.
+//! Tests of the firmware's tare: accepted for a film at rest, otherwise refused with the reason.
 
 use crate::common::{Run, Setup, command, firmware};
 use crate::models::Device;
@@ -11,7 +11,7 @@ use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample};
 use hivtac_wire::settings::TareReport;
 
 const ASKED: u16 = 40;
-/// Two means of a second of the untouched film, behind the start.
+/// Time for two means over a second of the untouched film, after the start.
 const REZEROED_MS: u64 = 3_000;
 
 fn tared(scene: &'static str, at_ms: u64) -> Run {
@@ -26,7 +26,7 @@ fn outcome(run: &Run) -> Outcome {
     answers[0].0
 }
 
-/// What a tare gave.
+/// Returns the report of a tare.
 fn report(run: &Run) -> TareReport {
     let mut reports = run.messages.iter().filter_map(|message| match message {
         DeviceMessage::Tared(report) => Some(*report),
@@ -57,11 +57,11 @@ fn markers_that_are_covered_from_one_side_are_refused_and_nothing_changes() {
     }
 }
 
-/// A touch of this range, mN.
+/// The range of a touch, mN.
 type Touch = std::ops::Range<f64>;
 
-/// The answers to these commands, each sent at its time; where a touch is expected, one in that
-/// range, mN.
+/// Sends commands, each at its time, and checks their answers. If a touch is expected, the answer
+/// must have one in that range, mN.
 fn answered(scene: &'static str, asked: &[(u64, Request, Result<Outcome, Touch>)]) -> Run {
     let setup = Setup::new(firmware(), 300);
     answered_by(Setup { scene, ..setup }, asked)
@@ -85,8 +85,8 @@ fn answered_by(mut setup: Setup, asked: &[(u64, Request, Result<Outcome, Touch>)
     run
 }
 
-/// The rest position is given to a sensor over whose film a tip moves; a press that far is refused
-/// to who insists, too. Then one that is a pixel off, to a sensor at rest.
+/// The rest position goes to a sensor over whose film a tip moves. A press at that depth is refused
+/// even with insistence. Then a rest position with an error of a pixel goes to a sensor at rest.
 #[test]
 fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_before() {
     let rest = report(&tared("rest", 200)).rest;
@@ -122,7 +122,7 @@ fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_befor
     assert!(small.iter().all(|px| px.0.abs() < one / 16), "{moved:?}");
 }
 
-/// A millinewton is less than a contact, and more than a rest position bears: 0.1 N would read
+/// A millinewton is less than a contact, but more than a rest position allows: 0.1 N would read as
 /// 67 mN.
 #[test]
 fn what_still_presses_is_no_rest() {
@@ -136,8 +136,8 @@ fn what_still_presses_is_no_rest() {
     );
 }
 
-/// Of a unit of which nothing is known a press of 10 mN is more than gluing, lens and camera do; of
-/// one that was calibrated a millinewton is more than nothing.
+/// For an unknown unit, a press of 10 mN is more than the effects of gluing, lens and camera. For a
+/// calibrated unit, a millinewton is already too much.
 #[test]
 fn a_first_tare_of_a_pressed_film_is_refused() {
     let tare = |touch| [(200, Request::Tare { frames: 4 }, Err(touch))];
@@ -151,8 +151,8 @@ fn a_first_tare_of_a_pressed_film_is_refused() {
     answered_by(setup, &tare(0.7..1.4));
 }
 
-/// A rest position that is 0.1 px off: a second of the untouched film tells, and re-zeroing goes
-/// towards it.
+/// The rest position has an error of 0.1 px. A second of the untouched film shows it, and
+/// re-zeroing moves towards it.
 #[test]
 fn a_rest_position_that_is_off_is_seen_and_followed() {
     let mut rest = report(&tared("rest", 200)).rest;
@@ -192,13 +192,14 @@ fn a_rest_position_that_is_off_is_seen_and_followed() {
         assert!(told, "{bit:?}");
     }
     let settings = run.settings();
-    // It went once, by the usual rate.
+    // It moved once, by the usual rate.
     assert_eq!(settings.rezeroed, Px(327));
     let seen = settings.seen.expect("it was seen").0;
     assert!((85..=105).contains(&seen), "{seen} thousandths of a pixel");
 }
 
-/// A rest position that no frame has confirmed: what the camera may have shifted since is stated.
+/// No frame has confirmed the rest position: the uncertainties state the possible shift of the
+/// camera since the tare.
 #[test]
 fn a_shift_since_the_tare_is_within_what_is_stated() {
     let rest = report(&tared("rest", 200)).rest;

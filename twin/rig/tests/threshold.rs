@@ -1,5 +1,5 @@
-//! A new threshold while frames are streamed: its table is made in place, the frames that pass
-//! meanwhile are counted, and none is of two thresholds.
+//! Tests of a new threshold during a stream: its table is made in place, frames that pass meanwhile
+//! are counted, and no frame mixes two thresholds.
 
 use crate::common::{Setup, firmware, set_threshold};
 use hivtac_rig::script::Action;
@@ -7,7 +7,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Threshold};
 use hivtac_wire::message::{Outcome, Sample};
 
-/// Accepts nothing that the scene shows.
+/// A threshold that accepts nothing in the scene.
 const GREEN: HsvBox = HsvBox {
     hue_low: 50,
     hue_high: 70,
@@ -22,7 +22,7 @@ fn set(id: u16, threshold: HsvBox) -> Action {
     set_threshold(id, Threshold::Rgb565(threshold))
 }
 
-/// At whatever time of a frame it comes (one takes 6.4 ms).
+/// The command comes at several times within a frame (one takes 6.4 ms).
 #[test]
 fn no_frame_is_of_two_thresholds_and_those_that_pass_are_counted() {
     for ms in [230, 232, 234, 236] {
@@ -32,12 +32,12 @@ fn no_frame_is_of_two_thresholds_and_those_that_pass_are_counted() {
             panic!("{ms} ms: {:?}", run.answers(ASKED));
         };
         let samples = run.samples();
-        // With the markers' red every frame has a force; without it nothing is seen. Half of both
-        // would be something else.
+        // With the markers' red every frame has a force; without it no marker is seen. A mix of
+        // both would differ from either.
         let is_old = |sample: &&&Sample| !sample.status.contains(Status::MODEL_MISMATCH);
         let old = samples.iter().take_while(is_old).count();
         assert_eq!(old, before, "{ms} ms");
-        // Before the first one there may have been none, so that it is measured as it is seen.
+        // The first frame may have no predecessor; it is then measured as it is seen.
         assert!(samples[1..old].iter().all(|sample| sample.force.is_some()));
         assert!(
             old >= 2 && samples.len() >= old + 2,

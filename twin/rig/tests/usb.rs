@@ -1,9 +1,9 @@
-//! Control transfers of any kind: the device answers, stalls what it does not know, and goes on.
+//! Tests of control transfers of any kind: the device answers, stalls unknown ones, and goes on.
 
 use crate::common::{Run, Setup, firmware};
 use hivtac_rig::script::Action;
 
-/// What became of a control transfer, by the host's log.
+/// Returns the result of a control transfer from the host's log.
 fn outcome(run: &Run, setup: [u8; 8]) -> String {
     let title = format!(
         "control {}",
@@ -22,7 +22,7 @@ fn with_requests(setups: &[[u8; 8]]) -> Run {
     setup.run()
 }
 
-/// The samples go on to the end without a gap, and nothing was reset.
+/// Asserts that the samples go on to the end without a gap or a reset.
 fn goes_on(run: &Run) {
     assert_eq!((run.report.resets, run.rejected.frames()), (0, 0));
     assert!(run.missing_frames().is_empty());
@@ -62,8 +62,8 @@ fn the_status_of_an_endpoint_that_exists_is_told() {
     goes_on(&run);
 }
 
-/// CLEAR_FEATURE has toggles begin with DATA0 on both sides, whether or not there was a halt, and
-/// so has SET_CONFIGURATION. Whatever the toggles were before: at another time of each request.
+/// CLEAR_FEATURE and SET_CONFIGURATION restart toggles at DATA0 on both sides, with or without a
+/// halt. Each request is sent at several times, to cover both toggles before it.
 #[test]
 fn toggles_begin_anew_where_the_standard_says_so() {
     let clear = |endpoint| [0x02, 1, 0, 0, endpoint, 0, 0, 0];

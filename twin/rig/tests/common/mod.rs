@@ -1,9 +1,9 @@
-//! Runs the firmware under a scripted host, and decodes what it sends.
+//! Runs the firmware under a scripted host, and decodes the device's messages.
 //!
-//! `HIVTAC_ELF` names the firmware, `HIVTAC_BUG_ELFS` a directory with `bug-….elf`, one for each
+//! `HIVTAC_ELF` names the firmware. `HIVTAC_BUG_ELFS` names a directory with `bug-….elf` for each
 //! seeded bug, `yuv422.elf` with the model for YUV422, and `openmv-h7.elf` for that board.
-//! `HIVTAC_INSTRUCTIONS_PER_SECOND` lets every test run at another speed, `HIVTAC_BUSY_BUS` on a
-//! busy bus.
+//! `HIVTAC_INSTRUCTIONS_PER_SECOND` runs every test at another speed, `HIVTAC_BUSY_BUS` on a busy
+//! bus.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroU64;
@@ -37,15 +37,15 @@ use hivtac_wire::settings::SettingsReport;
 use hivtac_wire::version::HelloPrefix;
 use serde_json::Value;
 
-/// When the host says hello, ms: the port exists from about 140 ms on.
+/// Time at which the host says hello, ms: the port exists from about 140 ms on.
 pub const HELLO_MS: u64 = 160;
 
-/// The firmware under test.
+/// Returns the firmware under test.
 pub fn firmware() -> PathBuf {
     path_from("HIVTAC_ELF", "the firmware ELF")
 }
 
-/// A run of the firmware for the OpenMV Cam H7 on that board.
+/// Returns a run of the firmware for the OpenMV Cam H7 on that board.
 pub fn openmv(virtual_ms: u64) -> Setup {
     Setup {
         board: board::Kind::OpenmvH7,
@@ -54,7 +54,7 @@ pub fn openmv(virtual_ms: u64) -> Setup {
     }
 }
 
-/// The firmware with a seeded bug, another feature, another model, or for another board.
+/// Returns the firmware with a seeded bug, another feature, another model, or for another board.
 pub fn bug(name: &str) -> PathBuf {
     let path = path_from(
         "HIVTAC_BUG_ELFS",
@@ -78,7 +78,8 @@ fn path_from(variable: &str, what: &str) -> PathBuf {
              are cargo features of that package"
         )
     };
-    // Cargo runs tests in the package's folder; a relative path is meant from the project's root.
+    // Cargo runs tests in the package's folder, but a relative path is relative to the project's
+    // root.
     let path = PathBuf::from(path);
     let path = if path.is_relative() {
         PathBuf::from(env!("CARGO_MANIFEST_DIR"))
@@ -95,8 +96,8 @@ fn path_from(variable: &str, what: &str) -> PathBuf {
     path
 }
 
-/// What every test assumes of the core, unless it says otherwise: `HIVTAC_INSTRUCTIONS_PER_SECOND`,
-/// or the default.
+/// Returns the core's speed for every test that does not set another:
+/// `HIVTAC_INSTRUCTIONS_PER_SECOND`, or the default.
 pub fn instructions_per_second() -> u64 {
     match std::env::var("HIVTAC_INSTRUCTIONS_PER_SECOND") {
         Ok(text) => text
@@ -106,18 +107,18 @@ pub fn instructions_per_second() -> u64 {
     }
 }
 
-/// A run under a scripted host that opens the port, says hello, starts the stream, and asks for
+/// A run under a scripted host, which opens the port, says hello, starts the stream, and asks for
 /// counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
     pub board: board::Kind,
     pub camera: part::Kind,
-    /// A scene's name, or its file from the package's folder.
+    /// A scene's name, or its file relative to the package's folder.
     pub scene: &'static str,
     pub seed: u64,
     pub faults: Vec<&'static str>,
     pub actions: Vec<(u64, Action)>,
-    /// The flash's second bank, kept in this file.
+    /// File with the flash's second bank.
     pub flash: Option<PathBuf>,
     pub cut: Option<Cut>,
     pub virtual_ms: u64,
@@ -159,8 +160,9 @@ impl Setup {
         self
     }
 
-    /// With the firmware's own regions of memory enforced. Elsewhere they are not, which is several
-    /// times as fast: `firmware::the_same_seed_gives_the_same_bytes` shows that it changes nothing.
+    /// Enforces the firmware's own regions of memory. Elsewhere they are not enforced, which is
+    /// several times as fast. `firmware::the_same_seed_gives_the_same_bytes` shows that this
+    /// changes nothing.
     pub fn protected(self) -> Self {
         Self {
             protection: Protection::Enforced,
@@ -228,7 +230,7 @@ impl Setup {
     }
 }
 
-/// One JSON value a line.
+/// Reads one JSON value per line.
 fn json_lines(file: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(file).unwrap();
     let lines = text.lines();
@@ -237,22 +239,22 @@ fn json_lines(file: &Path) -> Vec<Value> {
         .collect()
 }
 
-/// A host's hello, with a zero byte before it.
+/// Returns a host's hello, with a zero byte before it.
 pub fn hello() -> Vec<u8> {
     frame(&HostMessage::Hello(HelloPrefix::OURS.into()))
 }
 
-/// A command.
+/// Returns a command.
 pub fn command(id: u16, request: Request) -> Vec<u8> {
     frame(&HostMessage::Command(Command { id, request }))
 }
 
-/// What is known of gravity.
+/// Returns the message that sets what is known of gravity.
 pub fn down(down: Down) -> Action {
     Action::Send(frame(&HostMessage::Down(down)))
 }
 
-/// A command that sets the threshold.
+/// Returns a command that sets the threshold.
 pub fn set_threshold(id: u16, threshold: Threshold) -> Action {
     Action::Send(command(id, Request::SetThreshold(threshold)))
 }
@@ -262,7 +264,7 @@ fn frame(message: &HostMessage) -> Vec<u8> {
     [&[0], encode(message, &mut buffer).unwrap()].concat()
 }
 
-/// What a run gave.
+/// The results of a run.
 pub struct Run {
     pub bytes: Vec<u8>,
     pub messages: Vec<DeviceMessage>,
@@ -309,8 +311,9 @@ impl Run {
             .collect()
     }
 
-    /// Samples right after one of the frame before. Of others nobody knows how fast their markers
-    /// move, and a force that changes while they are exposed may be unexplained.
+    /// Returns the samples that come right after a sample of the previous frame. For all others the
+    /// speed of the markers is unknown; a force that changes during their exposure may be
+    /// unexplained.
     pub fn followed(&self) -> Vec<&Sample> {
         let samples = self.samples();
         let pairs = samples.windows(2);
@@ -333,7 +336,7 @@ impl Run {
             .collect()
     }
 
-    /// What the device answered to a command, and how many samples it had sent before.
+    /// Returns the device's answers to a command, each with the number of samples sent before it.
     pub fn answers(&self, asked: u16) -> Vec<(message::Outcome, usize)> {
         let (mut samples, mut answers) = (0, Vec::new());
         for message in &self.messages {
@@ -348,14 +351,14 @@ impl Run {
         answers
     }
 
-    /// What the device answered to a command, once.
+    /// Returns the device's answer to a command; there must be exactly one.
     pub fn outcome(&self, asked: u16) -> message::Outcome {
         let answers = self.answers(asked);
         assert_eq!(answers.len(), 1, "one reply to {asked}");
         answers[0].0
     }
 
-    /// The last settings.
+    /// Returns the last settings.
     pub fn settings(&self) -> &SettingsReport {
         let settings = self.messages.iter().rev().find_map(|m| {
             if let DeviceMessage::Settings(s) = m {
@@ -367,7 +370,7 @@ impl Run {
         settings.expect("settings came")
     }
 
-    /// The first answer about its health.
+    /// Returns the first report of the device's health.
     pub fn health(&self) -> &Health {
         let health = self.messages.iter().find_map(|m| match m {
             DeviceMessage::Health(health) => Some(health),
@@ -376,7 +379,7 @@ impl Run {
         health.expect("it tells")
     }
 
-    /// The last counters.
+    /// Returns the last counters.
     pub fn stats(&self) -> &Stats {
         let stats = self.messages.iter().rev().find_map(|m| {
             if let DeviceMessage::Stats(s) = m {
@@ -388,7 +391,7 @@ impl Run {
         stats.unwrap_or_else(|| panic!("no stats came; the USB port: {:#?}", self.report.usb_log))
     }
 
-    /// Log lines, joined.
+    /// Returns the log lines, joined.
     pub fn log(&self) -> String {
         let lines = self.messages.iter().filter_map(|m| {
             if let DeviceMessage::Log(l) = m {
@@ -400,15 +403,15 @@ impl Run {
         lines.collect::<Vec<_>>().join("\n")
     }
 
-    /// The frames between the first and the last sample that have none.
+    /// Returns the frames without a sample between the first and the last sample.
     pub fn missing_frames(&self) -> Vec<u32> {
         let frames: Vec<u32> = self.samples().iter().map(|sample| sample.frame).collect();
         let between = |pair: &[u32]| pair[0] + 1..pair[1];
         frames.windows(2).flat_map(between).collect()
     }
 
-    /// Asserts that every frame was measured, or passed while something was set. Two may be under
-    /// way: one that is read out, and one before it that is computed.
+    /// Asserts that every frame was measured, or passed during a change of settings. Two frames may
+    /// be under way: one in readout, and the one before it in computation.
     pub fn assert_only_setup_drops(&self) {
         let stats = self.stats();
         let losses = [
@@ -421,7 +424,7 @@ impl Run {
         assert!(stats.frames_exposed - counted <= 2, "{stats:?}");
     }
 
-    /// The frames whose samples say that a frame before them was lost.
+    /// Returns the frames whose samples report that a frame before them was lost.
     pub fn frames_after_a_loss(&self) -> Vec<u32> {
         let told = |sample: &&&Sample| sample.status.contains(Status::FRAME_DROPPED);
         let samples = self.samples();
@@ -433,7 +436,7 @@ impl Run {
     }
 
     /// Asserts that every sample names an exposure, and that the device's clock and the true one
-    /// differ by one and the same time: its start.
+    /// have a constant difference: the start of the device's clock.
     pub fn assert_times(&self) {
         let ahead = |sample: &&Sample| sample.time_us as i64 - self.true_time_us(sample.frame);
         let ahead: Vec<i64> = self.samples().iter().map(ahead).collect();
@@ -447,7 +450,8 @@ impl Run {
         );
     }
 
-    /// From the middle of a frame's exposure until its sample's last byte had left, s.
+    /// Returns the time from the middle of a frame's exposure until its sample's last byte had
+    /// left, s.
     pub fn latencies(&self) -> BTreeMap<u64, f64> {
         let number = |line: &Value| line["frame"].as_u64().unwrap();
         let time = |line: &Value| line["time_s"].as_f64().unwrap();
