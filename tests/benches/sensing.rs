@@ -1,5 +1,5 @@
-//! `cargo bench --package hivtac-tests`: throughput of the sensing's stages on this computer, so
-//! that a regression shows without an emulator.
+//! Measures the throughput of the sensing's stages on this computer, to show a regression without
+//! an emulator: `cargo bench --package hivtac-tests`.
 
 use std::hint::black_box;
 
@@ -46,7 +46,7 @@ impl Frame {
         black_box(&self.pixels).chunks_exact(usize::from(self.size[0]))
     }
 
-    /// What the threshold makes of it.
+    /// Returns the masks that the threshold makes of the rows.
     fn masks(&self, table: &ScreenedTable) -> Vec<Vec<u32>> {
         let word = |pixels: &[u16]| {
             let bits = pixels.iter().map(|&raw| u32::from(table.accepts(raw)));
@@ -64,7 +64,7 @@ fn table() -> Box<ScreenedTable> {
     table
 }
 
-/// The scanner alone: from pixels, and from masks, which leaves the threshold out.
+/// Measures the scanner alone: from pixels, and from masks, that is, without the threshold.
 fn scanner(criterion: &mut Criterion) {
     let (table, mut scanner) = (table(), Box::new(Scanner::<64>::new()));
     for frame in Frame::all() {
@@ -100,7 +100,7 @@ fn scanner(criterion: &mut Criterion) {
     }
 }
 
-/// From pixels to features.
+/// Measures the way from pixels to features.
 fn frame(criterion: &mut Criterion) {
     let mut sensor = Box::new(Sensor::<64, ScreenedTable>::new());
     let mut group = criterion.benchmark_group("frame");
@@ -121,7 +121,7 @@ fn frame(criterion: &mut Criterion) {
     }
 }
 
-/// One inference; its elements are multiplications.
+/// Measures one inference; its elements are multiplications.
 fn network(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("network");
     for widths in [&[11, 64, 64, 3][..], &[11, 512, 512, 512, 3]] {

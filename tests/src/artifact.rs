@@ -1,12 +1,12 @@
-//! The programs that the tests run. `cargo xtask test` builds them and names them in environment
-//! variables.
+//! Finds the programs that the tests run. `cargo xtask test` builds them and names them in
+//! environment variables.
 
 use std::{env, path::PathBuf};
 
-/// The file or folder that an environment variable names.
+/// Returns the file or folder that an environment variable names.
 ///
 /// # Panics
-/// When it names none: the test cannot run, and must not pass.
+/// If the variable is not set: the test cannot run, and must not pass.
 pub fn named_by(variable: &str) -> PathBuf {
     let path = env::var_os(variable).map(PathBuf::from);
     let path = path

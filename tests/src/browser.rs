@@ -1,5 +1,5 @@
-//! A headless Chromium, as a user's browser: pages are opened, asked and pressed through its
-//! DevTools protocol, over two pipes.
+//! A headless Chromium in the place of a user's browser. Tests open a page, read it and press keys
+//! through its DevTools protocol, over two pipes.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufRead, BufReader, Write};
@@ -17,11 +17,11 @@ use tempfile::TempDir;
 
 use crate::artifact;
 
-/// How long an answer may take, and what a page is waited for: the emulator behind it runs at about
+/// The longest wait for an answer or for a page's state: the emulator behind the page runs at about
 /// a tenth of real time.
 const PATIENCE: Duration = Duration::from_secs(120);
 
-/// A browser with one page. Killed when it is dropped.
+/// A browser with one page; killed when it is dropped.
 pub struct Browser {
     process: Child,
     commands: File,
@@ -32,21 +32,21 @@ pub struct Browser {
 }
 
 impl Browser {
-    /// Starts the browser (`HIVTAC_CHROMIUM`) with a page of so many pixels.
+    /// Starts the browser (`HIVTAC_CHROMIUM`) with a page of this size in pixels.
     ///
     /// # Errors
-    /// When it does not start.
+    /// If it does not start.
     pub fn open(address: &str, [width, height]: [u32; 2]) -> Result<Browser> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
         let pipes = ["commands", "answers"].map(|name| folder.path().join(name));
         let made = Command::new("mkfifo").args(&pipes).status()?;
         ensure!(made.success(), "mkfifo failed");
-        // It reads its third file and writes its fourth.
+        // The browser reads its file descriptor 3 and writes its file descriptor 4.
         let process = Command::new("sh")
             .args(["-c", "exec \"$@\" 3<\"$COMMANDS\" 4>\"$ANSWERS\"", "sh"])
             .arg(artifact::named_by("HIVTAC_CHROMIUM"))
             .args(["--headless=new", "--remote-debugging-pipe"])
-            // The only page is our own, and root has no other way.
+            // The only page is our own, and root cannot use the sandbox.
             .args(["--no-sandbox", "--disable-gpu", "--hide-scrollbars"])
             .args(["--no-first-run", "--disable-background-networking"])
             .arg(std::format!("--window-size={width},{height}"))
@@ -79,7 +79,7 @@ impl Browser {
         Ok(())
     }
 
-    /// Has the browser do something, and gives its answer.
+    /// Calls a method of the browser, and returns its answer.
     fn call(&mut self, method: &str, parameters: Value) -> Result<Value> {
         self.last_id += 1;
         let id = self.last_id;
@@ -99,10 +99,10 @@ impl Browser {
         }
     }
 
-    /// The value of an expression in the page.
+    /// Returns the value of an expression in the page.
     ///
     /// # Errors
-    /// When it throws.
+    /// If the expression throws.
     pub fn value(&mut self, expression: &str) -> Result<Value> {
         let parameters = json!({ "expression": expression, "returnByValue": true });
         let answer = self.call("Runtime.evaluate", parameters)?;
@@ -113,11 +113,11 @@ impl Browser {
         Ok(answer["result"]["value"].clone())
     }
 
-    /// Waits until an expression in the page is something else than nothing, 0 or an empty text,
-    /// and gives its value.
+    /// Waits until an expression in the page is neither null, 0 nor an empty text, and returns its
+    /// value.
     ///
     /// # Errors
-    /// When it throws, or stays nothing.
+    /// If the expression throws, or keeps such a value for too long.
     pub fn until(&mut self, expression: &str) -> Result<Value> {
         let end = Instant::now() + PATIENCE;
         while Instant::now() < end {
@@ -132,10 +132,11 @@ impl Browser {
         bail!("{expression}: nothing within {PATIENCE:?}; the page: {page}")
     }
 
-    /// Presses a key and lets it go: its name, and its Windows key code, which browsers go by.
+    /// Presses a key and releases it. The key is given by its name, and by the Windows key code
+    /// that browsers use.
     ///
     /// # Errors
-    /// When the browser is gone.
+    /// If the browser is gone.
     pub fn key(&mut self, name: &str, code: u32) -> Result<()> {
         for kind in ["rawKeyDown", "keyUp"] {
             let key = json!({ "type": kind, "key": name, "windowsVirtualKeyCode": code });
@@ -144,10 +145,10 @@ impl Browser {
         Ok(())
     }
 
-    /// Shows the page as to somebody who likes it `light` or `dark`.
+    /// Sets the colour scheme that the user prefers, `light` or `dark`.
     ///
     /// # Errors
-    /// When the browser is gone.
+    /// If the browser is gone.
     pub fn colours(&mut self, scheme: &str) -> Result<()> {
         let feature = json!({ "name": "prefers-color-scheme", "value": scheme });
         self.call(
@@ -157,10 +158,10 @@ impl Browser {
         Ok(())
     }
 
-    /// Keeps what it shows as PNG.
+    /// Saves a screenshot as PNG.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// If the file cannot be written.
     pub fn keep(&mut self, file: &Path) -> Result<()> {
         let answer = self.call("Page.captureScreenshot", json!({ "format": "png" }))?;
         let data = answer["data"].as_str().context("no screenshot")?;
@@ -171,13 +172,13 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Fails only when it has ended already.
+        // Fails only if the browser has already ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// What the browser sends: JSON texts with a zero behind each.
+/// Receives the browser's messages: JSON texts, each followed by a zero byte.
 fn messages(pipe: File) -> Receiver<Value> {
     let (sender, receiver) = channel();
     thread::spawn(move || {

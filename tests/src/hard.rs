@@ -1,4 +1,4 @@
-//! The hard cases, as the pipeline sees them.
+//! Runs the pipeline on the hard cases, and collects the results.
 
 use std::collections::BTreeSet;
 use std::format;
@@ -15,7 +15,7 @@ use hivtac_twin::{Contact, Frame, Scene};
 
 use crate::tared::{Detection, View};
 
-/// What the pipeline made of the frames of one case.
+/// The results of the pipeline on the frames of one case.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The case.
@@ -24,11 +24,11 @@ pub struct Outcome {
     pub view: View,
     /// Frames shown.
     pub frames: usize,
-    /// Frames that would give a force.
+    /// Frames with a force.
     pub trusted: usize,
-    /// The largest error of a marker in these, px.
+    /// The largest error of a marker in frames with a force, px.
     pub worst_px: f64,
-    /// Why the others have no force.
+    /// The reasons of the frames without a force.
     pub reasons: BTreeSet<&'static str>,
 }
 
@@ -61,9 +61,9 @@ impl Outcome {
         }
     }
 
-    /// How far a marker may be from the truth here, px. Under four-fold noise 1. Beyond QVGA,
-    /// compression may move markers by 0.05 px more than usual: what it does to a pattern is no
-    /// more than what a press does. Limits are wider for a tip that sticks or slips: 0.15 px more.
+    /// Returns the largest allowed error of a marker, px; 1 under four-fold noise. Beyond QVGA,
+    /// compression may move markers by 0.05 px more than usual: its effect on a pattern is no
+    /// larger than that of a press. For a tip that sticks or slips the limit is 0.15 px wider.
     pub fn tolerance_px(&self) -> f64 {
         let width = self.view.size[0];
         let case = self.case.tolerance_px(width);
@@ -73,14 +73,14 @@ impl Outcome {
         (self.view.tolerance_px() + more(compressed, 0.05) + more(moves_along, 0.15)).max(case)
     }
 
-    /// Whether a frame's markers were wrong without anybody saying so.
+    /// Returns whether a frame had wrong markers without a status that reports it.
     pub fn is_silently_wrong(&self) -> bool {
         self.trusted > 0
             && (self.worst_px > self.tolerance_px() || self.case.expected == Expected::Rejected)
     }
 
-    /// Whether markers that are plain to see were refused in most frames. Dim ones are not in
-    /// YUV422, whose chroma fades with the light.
+    /// Returns whether plainly visible markers were refused in most frames. Dim markers do not
+    /// count as plainly visible in YUV422, whose chroma fades with the light.
     pub fn is_overlooked(&self) -> bool {
         let dim = ["gain-", "one-sided-"];
         let dim = dim.iter().any(|name| self.case.name.starts_with(name));
@@ -89,7 +89,7 @@ impl Outcome {
         plain && 2 * self.trusted < self.frames
     }
 
-    /// A row of the table: case, found, rejected, worst error, reasons.
+    /// Returns a row of the table: case, found, rejected, worst error, reasons.
     pub fn row(&self) -> String {
         let worst = match self.trusted {
             0 => "–".to_string(),
@@ -104,12 +104,12 @@ impl Outcome {
     }
 }
 
-/// Looks at every hard case that the views' camera can take, under every load of the catalogue,
-/// `repeats` frames each; at as many moments where things move. The views differ in nothing but
-/// their estimators, so that they see the same frames. Gives the outcomes of each.
+/// Runs every hard case that the views' camera can take, under every load of the catalogue, with
+/// `repeats` frames each. Moving cases have as many moments instead. The views differ only in their
+/// estimators, and therefore see the same frames. Returns the outcomes of each view.
 ///
 /// # Errors
-/// When the frame size is not one.
+/// If the frame size is not valid.
 pub fn detect_in_all(views: &[View], repeats: u64) -> Result<Vec<Vec<Outcome>>> {
     let mut all = vec![Vec::new(); views.len()];
     let Some(shown) = views.first() else {
@@ -137,7 +137,7 @@ pub fn detect_in_all(views: &[View], repeats: u64) -> Result<Vec<Vec<Outcome>>> 
     Ok(all)
 }
 
-/// The frames that show a case, in which something moves or loads press.
+/// Returns the frames of a case: moments of its motion, or presses of the catalogue's loads.
 fn frames(scene: &Scene, moves: bool, repeats: u64) -> Result<Vec<Frame>> {
     let loads = hard_loads();
     if moves {
@@ -154,7 +154,7 @@ fn frames(scene: &Scene, moves: bool, repeats: u64) -> Result<Vec<Frame>> {
     Ok(frames)
 }
 
-/// The Markdown table of one view's outcomes.
+/// Returns the Markdown table of one view's outcomes.
 pub fn table(view: View, outcomes: &[Outcome]) -> String {
     let preset = view.preset.name();
     let estimator = match view.estimator {

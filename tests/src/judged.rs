@@ -1,5 +1,5 @@
-//! Whether a force is right: within three of its stated standard uncertainties, or near enough for
-//! a hand.
+//! Judges whether a force is right: within three of its stated standard uncertainties, or close
+//! enough for practical use.
 
 use std::format;
 use std::string::String;
@@ -11,30 +11,30 @@ use hivtac_twin::{Load, SceneError, Truth};
 
 use crate::pictures::Random;
 
-/// Standard uncertainties that an error may have.
+/// Largest error in standard uncertainties.
 const SIGMAS: f64 = 3.0;
-/// Errors that are no fault, however certain a force is: of the direction, degrees, of |F|, mN, and
-/// of the place, mm.
+/// Errors up to these are never a fault, even beyond the stated uncertainty: of the direction,
+/// degrees, of |F|, mN, and of the place, mm.
 const NO_FAULT: [f64; 3] = [5.0, 5.0, 0.25];
-/// Below this a contact is none, mN: its direction and its place mean nothing.
+/// Below this |F|, mN, there is no contact: direction and place have no meaning.
 const LEAST_MN: f64 = 2.0;
 
-/// Which contacts are drawn.
+/// The range of random contacts.
 #[derive(Clone, Copy, Debug)]
 pub struct Contacts {
-    /// The least and the largest |F|, N.
+    /// The smallest and the largest |F|, N.
     pub force_n: [f64; 2],
-    /// The largest tangential force, in parts of the normal one.
+    /// The largest ratio of tangential to normal force.
     pub ratio: f64,
     /// The largest distance from the middle along x and y, mm.
     pub place_mm: f64,
 }
 
 impl Contacts {
-    /// A contact whose size, tilt, turn and place are uniform.
+    /// Returns a contact with uniform size, tilt, turn and place.
     ///
     /// # Errors
-    /// When these are no contacts.
+    /// If these ranges are impossible.
     pub fn draw(&self, random: &mut Random) -> Result<Load, SceneError> {
         let mut within = |from: f64, to: f64| {
             let part = random.between(0, 1 << 30) as f64 / f64::from(1 << 30);
@@ -50,19 +50,19 @@ impl Contacts {
     }
 }
 
-/// What was made of a frame.
+/// The judgement of a frame's result.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Judged {
     /// The force is right.
     Right,
-    /// There is no force, for these reasons.
+    /// There is no force, for this status's reasons.
     Refused(Status),
-    /// The force is wrong, and how.
+    /// The force is wrong; the text describes the error.
     Wrong(String),
 }
 
 impl Judged {
-    /// Of a measurement, by what the frame truly shows.
+    /// Judges a measurement by the frame's ground truth.
     pub fn of(seen: &Measurement, truth: &Truth) -> Judged {
         let Some(force) = &seen.force else {
             return Judged::Refused(seen.status);
@@ -90,7 +90,7 @@ impl Judged {
     }
 }
 
-/// How far a force is off: of the direction, degrees, of |F|, mN, and of the place, mm.
+/// Returns the errors of a force: of the direction, degrees, of |F|, mN, and of the place, mm.
 pub fn errors(force: &Force, truth: &Truth) -> [f64; 3] {
     let found = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let [size, true_size] = [found, truth.on_film_n].map(length);

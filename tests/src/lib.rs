@@ -1,8 +1,8 @@
-//! What the tests that cross rooms share.
+//! Shared code of the tests that cross folders.
 //!
-//! [`golden`] runs recorded cases through the sensing and prints what came out; the same code runs
-//! on the host and, in `tests/qemu`, on an emulated Cortex-M7. Everything else needs a host
-//! (feature `host`, on by default).
+//! [`golden`] runs recorded cases through the sensing and prints the results. The same code runs on
+//! the host and, in `tests/qemu`, on an emulated Cortex-M7. All other modules need a host (feature
+//! `host`, on by default).
 #![no_std]
 
 #[cfg(feature = "host")]

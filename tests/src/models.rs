@@ -18,12 +18,12 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
 
 use crate::pictures::Random;
 
-/// Where the weights of a layer come from.
+/// The source of a layer's weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weights {
     /// Any value from −127 to 127.
     Random,
-    /// All at one of the two ends, by the neuron: odd ones −127, even ones 127.
+    /// All at one of the two ends, by the neuron: −127 for odd ones, 127 for even ones.
     Extreme,
     /// Any int16 value that the proof of the sums allows, with activations of 12 bits.
     Wide,
@@ -40,10 +40,10 @@ impl Weights {
 /// Largest activation of a model with int16 weights.
 const WIDE_ACTIVATION: i64 = 4095;
 
-/// Pixels of a marker at rest, dilated, as the rendered sensor shows it.
+/// Area of a dilated marker at rest in pixels, as in the rendered sensor.
 const REST_AREA: u32 = 245;
 
-/// The rest position of the sensor with the default preset, in whole pixels.
+/// Returns the rest position of the sensor with the default preset, in whole pixels.
 pub fn rest() -> Features {
     let [left, right, top, bottom] = [99, 220, 59, 180].map(Px::from_int);
     let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
@@ -51,13 +51,13 @@ pub fn rest() -> Features {
     Features::of_markers(&corners.map(|(x, y)| Marker { x, y, area }))
 }
 
-/// The file of a model with these layer widths (first 11, last as many as there are outputs), for
-/// QVGA frames of the default preset.
+/// Returns the file of a model with these layer widths, for QVGA frames of the default preset. The
+/// first width is 11, the last the number of outputs.
 pub fn file(widths: &[u16], weights: Weights, output: OutputKind, seed: u64) -> Vec<u8> {
     encoded(&spec(qvga(), qvga_rest(), widths, weights, output, seed))
 }
 
-/// The same for weighted centroids, and for a pixel format with its usual threshold.
+/// As `file`, for weighted centroids, and for a pixel format with its usual threshold.
 pub fn weighted_file(
     format: PixelFormat,
     widths: &[u16],
@@ -71,8 +71,8 @@ pub fn weighted_file(
     encoded(&spec)
 }
 
-/// A model of int8 weights with these layer widths, for frames of another geometry and pixel
-/// format, with the rest position that they show to this estimator.
+/// Returns a model of int8 weights with these layer widths, for frames of another geometry and
+/// pixel format. Its rest position is what this estimator finds in such frames.
 pub fn file_for(
     geometry: Geometry,
     format: PixelFormat,
@@ -86,7 +86,8 @@ pub fn file_for(
     encoded(&spec)
 }
 
-/// A small model for frames that are looked at so, of which labels mean that; with these outputs.
+/// Returns a small model for frames with these settings, for this meaning of the labels and these
+/// outputs.
 pub fn file_read_so(
     settings: &Settings,
     rest: Rest,
@@ -107,8 +108,8 @@ pub fn file_read_so(
     encoded(&spec)
 }
 
-/// The committed model that tells forces and places anywhere, with so many steps from its network's
-/// answer.
+/// Returns the committed model that gives forces and places anywhere, with this number of steps
+/// from its network's answer.
 pub fn anywhere(steps: u8) -> Vec<u8> {
     let file = include_bytes!("../../calibration/models/default.hvtm");
     with_steps(file, steps).expect("the committed model takes steps")
@@ -229,7 +230,7 @@ fn layer(widths: &[u16], last: bool, weights: Weights, random: &mut Random) -> L
         multipliers: (0..neurons)
             .map(|_| random.between(1 << 26, 1 << 28) as u32)
             .collect(),
-        // Extreme sums meet every limit, and shifts on both sides of 32.
+        // Extreme sums reach every limit, and shifts on both sides of 32.
         shifts: (0..neurons)
             .map(|neuron| {
                 shift(first, last, largest, activation) - if extreme { neuron as u8 % 8 } else { 0 }
@@ -238,9 +239,9 @@ fn layer(widths: &[u16], last: bool, weights: Weights, random: &mut Random) -> L
     }
 }
 
-/// Keeps activations within their range and outputs within a newton for most inputs: a sum has
-/// about √inputs · 70 · 4096 as its size in the first layer, √inputs · 70 · 60 in others, and more
-/// with wider numbers.
+/// Keeps activations within their range and outputs within a newton for most inputs. The size of a
+/// sum is about √inputs · 70 · 4096 in the first layer, √inputs · 70 · 60 in others, and more with
+/// wider numbers.
 fn shift(first: bool, last: bool, largest_weight: i64, activation: i64) -> u8 {
     let usual = match (first, last) {
         (true, false) => 40,

@@ -1,4 +1,4 @@
-//! Pictures that strain the sensing: RGB565 with red in bits 15–11, row by row.
+//! Pictures that are hard for the sensing: RGB565 with red in bits 15–11, row by row.
 
 use std::vec::Vec;
 
@@ -7,7 +7,7 @@ pub const RED: u16 = 0xf800;
 /// A pixel that it rejects.
 pub const BLACK: u16 = 0;
 
-/// A picture by a rule: red where `red(x, y)`.
+/// Returns a picture that is red where `red(x, y)` is true.
 pub fn painted(width: u16, height: u16, red: impl Fn(u16, u16) -> bool) -> Vec<u16> {
     let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
     pixels
@@ -15,17 +15,17 @@ pub fn painted(width: u16, height: u16, red: impl Fn(u16, u16) -> bool) -> Vec<u
         .collect()
 }
 
-/// All one colour.
+/// Returns a picture of one colour.
 pub fn plain(width: u16, height: u16, pixel: u16) -> Vec<u16> {
     std::vec![pixel; usize::from(width) * usize::from(height)]
 }
 
-/// Every second pixel: the most runs that a row can have.
+/// Every second pixel is red: the largest possible number of runs in a row.
 pub fn checkerboard(width: u16, height: u16) -> Vec<u16> {
     painted(width, height, |x, y| (x + y) % 2 == 0)
 }
 
-/// Every second column: the most runs that stay apart.
+/// Every second column is red: the largest possible number of separate runs.
 pub fn stripes(width: u16, height: u16) -> Vec<u16> {
     painted(width, height, |x, _| x % 2 == 0)
 }
@@ -43,12 +43,12 @@ pub fn discs_on_borders(width: u16, height: u16, radius: i32) -> Vec<u16> {
     })
 }
 
-/// A comb whose teeth join only in the last row: many labels that become one.
+/// A comb whose teeth only join in the last row: many labels that become one.
 pub fn comb(width: u16, height: u16) -> Vec<u16> {
     painted(width, height, |x, y| x % 2 == 0 || y == height - 1)
 }
 
-/// Every pixel any value.
+/// Every pixel has a random value.
 pub fn noise(width: u16, height: u16, seed: u64) -> Vec<u16> {
     let mut random = Random::new(seed);
     (0..usize::from(width) * usize::from(height))
@@ -56,7 +56,7 @@ pub fn noise(width: u16, height: u16, seed: u64) -> Vec<u16> {
         .collect()
 }
 
-/// The picture with red in `percent` of its pixels.
+/// Returns the picture with red in `percent` of its pixels.
 pub fn salted(mut pixels: Vec<u16>, percent: u64, seed: u64) -> Vec<u16> {
     let mut random = Random::new(seed);
     for pixel in pixels.iter_mut() {
@@ -67,7 +67,7 @@ pub fn salted(mut pixels: Vec<u16>, percent: u64, seed: u64) -> Vec<u16> {
     pixels
 }
 
-/// The picture with so many single red pixels, none next to another.
+/// Returns the picture with this number of single red pixels, none next to another.
 pub fn specked(mut pixels: Vec<u16>, width: u16, specks: usize, seed: u64) -> Vec<u16> {
     let columns = usize::from(width) / 3;
     let cells = columns * (pixels.len() / usize::from(width) / 3);
@@ -82,17 +82,17 @@ pub fn specked(mut pixels: Vec<u16>, width: u16, specks: usize, seed: u64) -> Ve
     pixels
 }
 
-/// SplitMix64: small, and the same everywhere.
+/// SplitMix64: small, and the same on every machine.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// The numbers that belong to a seed.
+    /// Returns the numbers of a seed.
     pub fn new(seed: u64) -> Random {
         Random(seed)
     }
 
-    /// The next number.
+    /// Returns the next number.
     #[allow(clippy::should_implement_trait)]
     pub fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
@@ -101,7 +101,7 @@ impl Random {
         mixed ^ (mixed >> 31)
     }
 
-    /// A number from `low` to `high`, both included.
+    /// Returns a number from `low` to `high`, both included.
     pub fn between(&mut self, low: i64, high: i64) -> i64 {
         let span = (high - low) as u64 + 1;
         low + (self.next() % span) as i64

@@ -1,4 +1,4 @@
-//! The Cortex-M7 image under QEMU.
+//! Runs scripts in the Cortex-M7 image under QEMU, and on this computer.
 
 use std::path::Path;
 use std::process::Command;
@@ -11,10 +11,10 @@ use crate::artifact;
 use crate::golden::{Buffers, MAX_ROW_PIXELS, NO_USUAL_MODEL, Runner, TWO_BANDS_PIXELS};
 use crate::script::Script;
 
-/// Runs a script on the emulated Cortex-M7 (`HIVTAC_QEMU_IMAGE`) and gives the text it printed.
+/// Runs a script on the emulated Cortex-M7 (`HIVTAC_QEMU_IMAGE`) and returns the printed text.
 ///
 /// # Errors
-/// When QEMU cannot be started, or the image fails.
+/// If QEMU cannot be started, or the image fails.
 pub fn run(script: &Script) -> Result<String> {
     let folder = tempfile::tempdir().context("creating a temporary folder")?;
     let (input, output) = (folder.path().join("script"), folder.path().join("results"));
@@ -31,10 +31,10 @@ pub fn run(script: &Script) -> Result<String> {
     fs::read_to_string(&output).context("reading the results")
 }
 
-/// Runs a script on this computer and gives the text it printed.
+/// Runs a script on this computer and returns the printed text.
 ///
 /// # Errors
-/// When the script is not sound.
+/// If the script is invalid.
 pub fn run_on_host(script: &Script) -> Result<String> {
     let mut bands = std::vec![0; TWO_BANDS_PIXELS];
     let buffers = Buffers {
@@ -53,7 +53,7 @@ pub fn run_on_host(script: &Script) -> Result<String> {
     Ok(results)
 }
 
-/// QEMU with the image; `timeout` ends it when it hangs.
+/// Returns the command for QEMU with the image; `timeout` ends it if it hangs.
 fn command(image: &Path, input: &Path, output: &Path) -> Command {
     let (input, output) = (input.display(), output.display());
     let semihosting =
@@ -81,7 +81,8 @@ fn command(image: &Path, input: &Path, output: &Path) -> Command {
     command
 }
 
-/// The first line in which two results differ, for a message that can be read.
+/// Returns the first line in which two results differ, for a readable message; `None` if they are
+/// equal.
 pub fn first_difference(left: &str, right: &str) -> Option<String> {
     let (left, right): (Vec<&str>, Vec<&str>) = (left.lines().collect(), right.lines().collect());
     let line = (0..left.len().max(right.len())).find(|&i| left.get(i) != right.get(i))?;

@@ -1,4 +1,4 @@
-//! Writing scripts of golden cases.
+//! Writes scripts of golden cases.
 
 use std::vec::Vec;
 
@@ -19,7 +19,7 @@ pub struct Script {
 }
 
 impl Script {
-    /// An empty script; pixels are RGB565, `Native`, until a threshold says otherwise.
+    /// Returns an empty script. Pixels are RGB565, `Native`, until a threshold changes that.
     pub fn new() -> Script {
         Script {
             bytes: Vec::new(),
@@ -28,17 +28,17 @@ impl Script {
         }
     }
 
-    /// The script's bytes.
+    /// Returns the script's bytes.
     pub fn bytes(&self) -> &[u8] {
         &self.bytes
     }
 
-    /// Uses this model file from here on.
+    /// Uses this model file from now on.
     pub fn model(&mut self, file: &[u8]) -> &mut Script {
         self.model_at(0, file)
     }
 
-    /// Uses this model file, laid `offset` bytes after a multiple of four.
+    /// Uses this model file from now on, stored `offset` bytes after a multiple of four.
     pub fn model_at(&mut self, offset: u8, file: &[u8]) -> &mut Script {
         let length = u32::try_from(file.len()).expect("a model file is smaller than 4 GiB");
         self.bytes.extend([Kind::Model as u8, offset]);
@@ -47,12 +47,12 @@ impl Script {
         self
     }
 
-    /// Uses this threshold, its pixel format and this byte order of RGB565 from here on.
+    /// Uses this threshold, its pixel format and this byte order of RGB565 from now on.
     pub fn threshold(&mut self, threshold: impl Into<Threshold>, order: ByteOrder) -> &mut Script {
         self.push_threshold(threshold.into(), order, 0)
     }
 
-    /// The same; the instruction counter counts what the table of 64 KiB takes.
+    /// As [`Self::threshold`]; the instruction counter counts the work for the table of 64 KiB.
     pub fn counted_threshold(
         &mut self,
         threshold: impl Into<Threshold>,
@@ -61,8 +61,8 @@ impl Script {
         self.push_threshold(threshold.into(), order, 4)
     }
 
-    /// The same; from here on the pixels of scans are weighed, and so are those of frames sensed
-    /// without a model.
+    /// As [`Self::threshold`]; from now on the pixels of scans are weighed, and those of frames
+    /// sensed without a model as well.
     pub fn weighted_threshold(
         &mut self,
         threshold: impl Into<Threshold>,
@@ -81,8 +81,8 @@ impl Script {
         self
     }
 
-    /// Scans a frame of `width` columns into blobs. Pixels of RGB565 have red in bits 15–11,
-    /// whatever the byte order.
+    /// Scans a frame of `width` columns into blobs. Pixels of RGB565 have red in bits 15–11, for
+    /// every byte order.
     pub fn scan(&mut self, width: u16, pixels: &[u16], dilations: u8, min_area: u8) -> &mut Script {
         self.bytes.push(Kind::Scan as u8);
         self.put(&[width, self.rows(width, pixels)]);
@@ -91,7 +91,7 @@ impl Script {
         self
     }
 
-    /// Runs frames of one size, `width` columns each, through the whole pipeline. Pixels as in
+    /// Runs frames of one size, `width` columns each, through the whole pipeline. Pixels are as in
     /// [`scan`](Self::scan).
     pub fn sense(&mut self, width: u16, frames: &[&[u16]]) -> &mut Script {
         let height = frames.first().map_or(0, |pixels| self.rows(width, pixels));
@@ -146,7 +146,7 @@ impl Script {
     }
 
     fn frame(&mut self, pixels: &[u16]) {
-        // As they lie in memory: swapping is its own inverse. Other formats have one order.
+        // In the order in memory: swapping is its own inverse. Other formats have one order.
         let order = match self.format {
             PixelFormat::Rgb565 => self.order,
             PixelFormat::Yuv422 | PixelFormat::Mono => ByteOrder::Native,

@@ -1,5 +1,5 @@
-//! Rendered frames, measured by the pipeline with a model that knows nothing of forces: where it
-//! finds the markers, and whether it would trust them with a force.
+//! Measures rendered frames by the pipeline with a model that is not trained: it shows where the
+//! pipeline finds the markers, and whether it accepts them for a force.
 
 use std::boxed::Box;
 use std::vec::Vec;
@@ -20,52 +20,52 @@ use hivtac_twin::{Contact, Format, Frame, Load, Mechanics, Options, Preset, Scen
 
 use crate::models;
 
-/// Both ways to take a position from pixels.
+/// Both estimators of a marker's position from pixels.
 const ESTIMATORS: [CentroidEstimator; 2] = [
     CentroidEstimator::BinaryMask,
     CentroidEstimator::RednessWeighted,
 ];
 
-/// Frames that make a rest position, as many as `hivtac tare` takes at least.
+/// Number of frames for a rest position; `hivtac tare` uses at least as many.
 const TARE_FRAMES: u16 = 8;
 
-/// The camera and the pipeline behind it.
+/// The camera and the settings of its pipeline.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// Lens and camera.
     pub preset: Preset,
     /// Columns and rows of a frame.
     pub size: [u32; 2],
-    /// How the camera codes pixels.
+    /// The camera's pixel format.
     pub format: PixelFormat,
-    /// How positions are taken.
+    /// The estimator of positions.
     pub estimator: CentroidEstimator,
-    /// What presses, and the reading of the model.
+    /// The contact reading of the scene and of the model.
     pub contact: Contact,
 }
 
-/// What was made of a frame.
+/// The result of the pipeline on a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Detection {
-    /// A force would be given.
+    /// There is a force.
     Trusted {
-        /// The largest distance of a marker from its true place, px; infinite when there is no such
+        /// The largest distance of a marker from its true place, px; infinite if there is no such
         /// marker.
         worst_px: f64,
-        /// The distance of the markers' mean from the true one, px.
+        /// The distance of the markers' mean from the true mean, px.
         mean_px: f64,
     },
-    /// There is no force, for these reasons.
+    /// There is no force, for this status's reasons.
     Refused(Status),
 }
 
-/// A sensor that was tared on the nominal scene at rest. Its model is for such frames and such a
-/// contact.
+/// A sensor that was tared on the nominal scene at rest. Its model is for such frames and contacts.
 pub struct TaredSensor {
     sensor: Box<Sensor<'static>>,
 }
 
-/// RGB565 at these sizes, of both cameras: by both estimators, which see the same frames.
+/// Returns views in RGB565 at these sizes, of both cameras: each with both estimators, which see
+/// the same frames.
 pub fn views(contact: Contact, sizes: &[[u32; 2]]) -> Vec<[View; 2]> {
     let mut views = Vec::new();
     for &size in sizes {
@@ -92,9 +92,9 @@ impl View {
         contact: Contact::Force,
     };
 
-    /// How far a marker may be from the truth, px: 0.3 up to QVGA, 0.15 at 800×600, linear between
-    /// them. Binary centroids are themselves off by up to 0.35 px at QVGA and 0.25 px at 800×600 on
-    /// nominal frames, so that 0.15 px more are allowed to them.
+    /// Returns the largest allowed error of a marker, px: 0.3 up to QVGA, 0.15 at 800×600, linear
+    /// between them. Binary centroids have errors up to 0.35 px at QVGA and 0.25 px at 800×600 even
+    /// on nominal frames. They are allowed 0.15 px more.
     pub fn tolerance_px(&self) -> f64 {
         let part = (f64::from(self.size[0]) - 320.0) / (800.0 - 320.0);
         let weighted = 0.3 - 0.15 * part.clamp(0.0, 1.0);
@@ -104,21 +104,21 @@ impl View {
         }
     }
 
-    /// The nominal scene, pressed in this view's way.
+    /// Returns the nominal scene with this view's contact reading.
     ///
     /// # Errors
-    /// When the frame size is not one.
+    /// If the frame size is not valid.
     pub fn nominal(&self) -> Result<Scene> {
         let [width, height] = self.size;
         let scene = Scene::preset("rest", self.preset, width, height, 7)?;
         Ok(self.pressed(scene)?)
     }
 
-    /// A scene in which loads press in this view's way and whose camera sends this view's format; a
-    /// JPEG camera's pictures become RGB565, and are left as they are.
+    /// Returns a scene with this view's contact reading and pixel format. Pictures of a JPEG camera
+    /// become RGB565 and are not changed.
     ///
     /// # Errors
-    /// When the film cannot take the scene's own load so.
+    /// If the film cannot take the scene's own load in that reading.
     pub fn pressed(&self, scene: Scene) -> Result<Scene, SceneError> {
         let options = scene.options().clone();
         let film = Mechanics {
@@ -136,8 +136,8 @@ impl View {
         })
     }
 
-    /// Whether this view's camera can take the frames of a scene: of JPEG only where it sends
-    /// RGB565.
+    /// Returns whether this view's camera can take the frames of a scene. JPEG scenes need a view
+    /// in RGB565.
     pub fn takes(&self, scene: &Scene) -> bool {
         self.format == PixelFormat::Rgb565 || scene.options().format == self.sent()
     }
@@ -158,15 +158,15 @@ impl View {
         }
     }
 
-    /// A sensor for this view, with a model of presses in the middle.
+    /// Returns a sensor for this view, with a model of presses in the middle.
     ///
     /// # Errors
-    /// When the frame size is not one, or the nominal scene is not found.
+    /// If the frame size is not valid, or the nominal scene's markers are not found.
     pub fn sensor(&self) -> Result<TaredSensor> {
         self.sensor_with(OutputKind::ForceVector)
     }
 
-    /// The same with a model that tells places.
+    /// As [`Self::sensor`], with a model that gives places.
     ///
     /// # Errors
     /// As [`Self::sensor`].
@@ -188,7 +188,7 @@ impl View {
         let mut tared = TaredSensor { sensor };
         let rest = tared.rest(&self.nominal()?)?;
         let file = models::file_read_so(&settings, rest, self.reading(), output);
-        // A few hundred bytes that a test keeps to its end.
+        // Leaks a few hundred bytes, which a test keeps to its end.
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let configured = tared.sensor.configure(settings, Some(model));
         configured.map_err(|error| anyhow!("{error}"))?;
@@ -198,12 +198,12 @@ impl View {
 }
 
 impl TaredSensor {
-    /// A sensor with a committed model, tared on the nominal scene of its camera.
+    /// Returns a sensor with a committed model, tared on the nominal scene of its camera.
     ///
     /// # Errors
-    /// When the file is no model's, or the nominal scene is not found.
+    /// If the file is not a model, or the nominal scene's markers are not found.
     pub fn of_model(file: Vec<u8>) -> Result<TaredSensor> {
-        // Some tens of kilobytes that a test keeps to its end.
+        // Leaks some tens of kilobytes, which a test keeps to its end.
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let geometry = &model.conditions.geometry;
         let (width, height) = (geometry.width.into(), geometry.height.into());
@@ -218,17 +218,17 @@ impl TaredSensor {
         Ok(tared)
     }
 
-    /// Where the markers of a scene rest.
+    /// Returns the rest position of a scene's markers.
     fn rest(&mut self, scene: &Scene) -> Result<Rest> {
         let frames = (0..).map_while(|number| scene.render_load(&Load::REST, number).ok());
         let rest = self.tare(TARE_FRAMES, frames)?;
         rest.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))
     }
 
-    /// Tares on frames, of which so many are to be good, and keeps the rest position.
+    /// Tares on frames, of which a given number must be good, and keeps the rest position.
     ///
     /// # Errors
-    /// When the frames end before there is an outcome.
+    /// If the frames end before there is an outcome.
     pub fn tare(
         &mut self,
         wanted: u16,
@@ -245,29 +245,30 @@ impl TaredSensor {
         Err(anyhow!("too few frames that show markers"))
     }
 
-    /// Another unit: there is no rest position of it.
+    /// Removes the rest position, as for another unit.
     pub fn forget_tare(&mut self) {
         self.sensor.set_tare(None, Drift::NONE);
     }
 
-    /// What is known of gravity from now on.
+    /// Sets what is known of gravity from now on.
     pub fn set_down(&mut self, down: Down) {
         self.sensor.set_down(down);
     }
 
-    /// The rest position stays, but no frame has confirmed it.
+    /// Keeps the rest position, but marks it as confirmed by no frame.
     pub fn tared_at_another_time(&mut self) {
         let rest = self.sensor.tare().copied();
         self.sensor.set_tare(rest, Drift::UNSEEN);
     }
 
-    /// The whole pipeline on a frame that follows none, which it looks at again when it refuses it.
+    /// Runs the whole pipeline on a frame without a predecessor, with a second look if the frame is
+    /// refused.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
         self.sensor.forget_frame();
         self.sensor.measure_frame_closely(&frame.words())
     }
 
-    /// The same from bands of so many rows, of which two are in memory at a time, as on the
+    /// As [`Self::sense`], from bands of `rows` rows. Two bands are in memory at a time, as on the
     /// microcontroller.
     pub fn sense_in_bands(&mut self, frame: &Frame, rows: usize) -> Measurement {
         let (words, sensor) = (frame.words(), &mut self.sensor);
@@ -290,7 +291,7 @@ impl TaredSensor {
         sensor.finish_again(again)
     }
 
-    /// What the pipeline makes of a frame.
+    /// Returns the result of the pipeline on a frame.
     pub fn detect(&mut self, frame: &Frame) -> Detection {
         let seen = self.sense(frame);
         let markers = match seen.markers {
@@ -310,7 +311,7 @@ impl TaredSensor {
 }
 
 impl Detection {
-    /// The largest distance of a marker from its true place, px; `None` without a force.
+    /// Returns the largest distance of a marker from its true place, px; `None` without a force.
     pub fn worst_px(&self) -> Option<f64> {
         match self {
             Detection::Trusted { worst_px, .. } => Some(*worst_px),

@@ -1,4 +1,4 @@
-//! The project's workspaces, packages and committed files, for tests of documents.
+//! Lists the project's workspaces, packages and committed files, for tests of documents.
 
 use std::env;
 use std::fs;
@@ -9,16 +9,16 @@ use std::vec::Vec;
 
 use serde_json::Value;
 
-/// Folders of the project's workspaces, from its root.
+/// Folders of the project's workspaces, relative to its root.
 pub const WORKSPACES: [&str; 3] = ["", "tests/qemu", "xtask/instruction-counter"];
 
-/// The project's root folder.
+/// Returns the project's root folder.
 pub fn root() -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).into()
 }
 
-/// What a cargo command prints in a folder. Panics when it fails.
+/// Returns the output of a cargo command in a folder. Panics if the command fails.
 pub fn cargo(folder: &Path, arguments: &[&str]) -> String {
     let program = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let output = Command::new(program)
@@ -35,7 +35,7 @@ pub fn cargo(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The packages of all workspaces, as `cargo metadata` describes them. Panics when it fails.
+/// Returns the packages of all workspaces, as `cargo metadata` describes them. Panics if it fails.
 pub fn packages() -> Vec<Value> {
     let of = |workspace: &&str| {
         let arguments = ["metadata", "--no-deps", "--format-version", "1"];
@@ -46,7 +46,7 @@ pub fn packages() -> Vec<Value> {
     WORKSPACES.iter().flat_map(of).collect()
 }
 
-/// A path from the project's root. Panics when it is outside.
+/// Returns a path relative to the project's root. Panics if it is outside.
 pub fn from_root(path: &Path) -> String {
     let path = path.canonicalize().unwrap();
     let root = root().canonicalize().unwrap();
@@ -54,8 +54,8 @@ pub fn from_root(path: &Path) -> String {
     String::from(inside.to_str().unwrap())
 }
 
-/// Every file of the project whose name ends like this, from its root and sorted; what is built and
-/// hidden folders are left out. Panics when a folder cannot be read.
+/// Returns every file of the project whose name has this ending, relative to its root and sorted.
+/// Build output and hidden folders are left out. Panics if a folder cannot be read.
 pub fn files(ending: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut folders = Vec::from([root()]);
@@ -74,7 +74,7 @@ pub fn files(ending: &str) -> Vec<String> {
     found
 }
 
-/// The cells of every row of a Markdown text's tables, heads and rules among them.
+/// Returns the cells of every row of the tables in a Markdown text, including heads and rules.
 pub fn table_rows(text: &str) -> Vec<Vec<&str>> {
     text.lines().filter_map(cells).collect()
 }

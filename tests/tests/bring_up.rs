@@ -1,4 +1,4 @@
-//! `hivtac bring-up` with the firmware in the rig: a good board, and one with each fault.
+//! Tests of `hivtac bring-up` with the firmware in the rig: on a good board, and with each fault.
 
 use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, tool_waiting};
 use hivtac_tests::artifact;
@@ -11,12 +11,12 @@ use std::time::{Duration, Instant};
 /// Longest run.
 const PATIENCE: Duration = Duration::from_secs(240);
 
-/// Brings a rig with these options up; what the tool left, and its report.
+/// Brings up a rig with these options. Returns the tool's output and report.
 fn bring_up(options: &[&str]) -> (ToolOutput, Value) {
     bring_up_waiting(TIMEOUT_S, options)
 }
 
-/// The same with so many seconds to wait for an answer.
+/// As [`bring_up`], with this timeout in seconds for an answer.
 fn bring_up_waiting(timeout_s: u32, options: &[&str]) -> (ToolOutput, Value) {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("report.json");
@@ -31,7 +31,7 @@ fn report(file: &Path) -> Value {
     serde_json::from_str(&std::fs::read_to_string(file).unwrap()).unwrap()
 }
 
-/// The names of steps, right ones and others.
+/// Returns the names of the steps, each with whether it was right.
 fn steps(report: &Value) -> Vec<(&str, bool)> {
     let steps = report["steps"].as_array().unwrap();
     let name = |step: &'_ Value| step["step"].as_str().map(str::to_owned);
@@ -42,7 +42,8 @@ fn steps(report: &Value) -> Vec<(&str, bool)> {
         .collect()
 }
 
-/// Ends with `step`, which says all of these; the exit code is that of something wrong.
+/// Asserts that the report ends with `step`, whose text has all of these words, and that the exit
+/// code reports a fault.
 fn ends_wrong((output, report): (ToolOutput, Value), step: &str, words: &[&str]) {
     assert_eq!(output.code, Some(9), "{output:?}");
     let (last, before) = steps(&report)
@@ -57,7 +58,8 @@ fn ends_wrong((output, report): (ToolOutput, Value), step: &str, words: &[&str])
     }
 }
 
-/// All that needs no finger is right; interrupted while it waits for one, it leaves its report.
+/// All steps without a finger are right. The tool is interrupted while it waits for a finger, and
+/// leaves its report.
 #[test]
 fn a_good_board_is_right_up_to_the_press() {
     let folder = tempfile::tempdir().unwrap();
@@ -129,7 +131,7 @@ fn broken_frames_are_counted() {
     ends_wrong(bring_up_waiting(SILENCE_S, &options), "clocks", &words);
 }
 
-/// Something touches the film during the tare.
+/// The scene presses the film during the tare.
 #[test]
 fn a_press_during_the_tare_is_refused() {
     let (output, report) = bring_up(&["--scene", "static"]);

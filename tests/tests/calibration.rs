@@ -1,6 +1,6 @@
-//! A unit is calibrated against a gauge, from its first frame to its own model: the firmware in the
-//! rig, pressed by a scene, and a gauge with a clock of its own that shows what the scene's tip
-//! pressed.
+//! Tests the calibration of a unit against a gauge, from its first frame to its own model. The
+//! firmware runs in the rig under a scene's press. The gauge has its own clock and shows the press
+//! of the scene's tip.
 
 use std::fs;
 use std::io::Write;
@@ -10,7 +10,7 @@ use std::process::{Command, Stdio};
 use crate::rig::Rig;
 use hivtac_tests::artifact;
 
-/// |F| in N, α and β in degrees: one press in each run, held for 0.4 s.
+/// |F| in N, α and β in degrees: one press per run, held for 0.4 s.
 const PRESSES: [[f64; 3]; 5] = [
     [0.025, 8.0, 0.0],
     [0.060, 0.0, 8.0],
@@ -19,8 +19,8 @@ const PRESSES: [[f64; 3]; 5] = [
     [0.200, 6.0, 5.0],
 ];
 
-/// Runs `hivtac-calibrate` (`HIVTAC_CALIBRATE`) with lines on its standard input; its standard
-/// output.
+/// Runs `hivtac-calibrate` (`HIVTAC_CALIBRATE`) with lines on its standard input. Returns its
+/// standard output.
 fn calibrate(here: &Path, arguments: &[&str], lines: &str) -> String {
     let mut child = Command::new(artifact::named_by("HIVTAC_CALIBRATE"))
         .current_dir(here)
@@ -45,7 +45,8 @@ fn calibrate(here: &Path, arguments: &[&str], lines: &str) -> String {
     output
 }
 
-/// Records the untouched film and one press, and what the gauge saw of it. `number` counts from 0.
+/// Records the untouched film and one press, and the gauge's readings of it. `number` counts from
+/// 0.
 fn press(here: &Path, number: usize, [force_n, alpha, beta]: [f64; 3]) {
     let scene = here.join("press.toml");
     let text = format!(
@@ -71,7 +72,7 @@ fn press(here: &Path, number: usize, [force_n, alpha, beta]: [f64; 3]) {
         "--seconds",
         "1.3",
     ];
-    // The next pose of the list; the others are for the next runs.
+    // This run takes the next pose of the list; the others are for later runs.
     calibrate(here, &record, "\n\ndone\n");
     let (ahead, gauge) = (
         format!("{}", 7.3 * number as f64 - 11.9),
@@ -92,7 +93,7 @@ fn press(here: &Path, number: usize, [force_n, alpha, beta]: [f64; 3]) {
     rig.finish().unwrap();
 }
 
-/// The number that follows `words` in the part of `text` after `group`.
+/// Returns the number that follows `words` in the part of `text` after `group`.
 fn number(text: &str, group: &str, words: &str) -> f64 {
     let part = text
         .split(group)
@@ -125,7 +126,7 @@ fn a_unit_gets_a_model_of_its_own() {
         .iter()
         .for_each(|gauge| align.extend(["--gauge", gauge.as_str()]));
     let report = calibrate(here, &[&align[..], &["--out", "data.csv"]].concat(), "");
-    // Device time begins a little later than the rig's, the same in every run.
+    // Device time begins a little later than the rig's, by the same time in every run.
     let lag =
         |i: usize| number(&report, &format!("run {i}: "), "clock is") - (7.3 * i as f64 - 11.9);
     for i in 0..PRESSES.len() {

@@ -1,4 +1,5 @@
-//! The sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this computer.
+//! Tests that the sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this
+//! computer.
 
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
@@ -16,7 +17,7 @@ use hivtac_tests::qemu;
 use hivtac_tests::script::Script;
 use hivtac_twin::{Format, Load, Options, Preset, Scene};
 
-/// Runs a script on both and compares what they print, byte for byte. Gives the text for further
+/// Runs a script on both and compares their output, byte for byte. Returns the text for further
 /// checks.
 fn same_on_both(script: &Script) -> String {
     let host = qemu::run_on_host(script).unwrap();
@@ -147,7 +148,7 @@ fn blobs_of_extreme_pictures_are_the_same() {
         }
     }
     let text = same_on_both(&script);
-    // All red, 800 × 600, one dilation or none: Σx² is the largest of all moments.
+    // All pixels are red, 800 × 600, with one dilation or none: Σx² is the largest of all moments.
     let sum_xx: u64 = 600 * (0..800_u64).map(|x| x * x).sum::<u64>();
     assert!(text.contains(&format!("sum_xx: {sum_xx}")), "{text}");
 }
@@ -182,8 +183,8 @@ fn other_formats_pass_the_same_thresholds() {
                 .map(|(low, high)| Threshold::Mono(Mono { low, high })),
         );
     let mut script = Script::new();
-    // Every byte in every place of a word of pixels, then anything; rows with whole words of the
-    // mask and with parts.
+    // Every byte at every place of a word of pixels, then random words; rows with whole and partial
+    // words of the mask.
     let places = (0..4).flat_map(|place| (0..256_u32).map(move |byte| byte << (8 * place)));
     let every: Vec<u16> = places
         .chain((0..256).map(|byte| byte * 0x0101_0101))
@@ -232,7 +233,7 @@ fn frames_in_other_formats_give_the_same_forces() {
         script.model(&models::weighted_file(format, widths, weights, output, 3));
         script.threshold(Threshold::red(format), ByteOrder::Swapped);
         script.sense(320, &frames);
-        // A model of one format does not measure frames of another.
+        // A model of one format does not measure frames of another format.
         script.model(&models::file(widths, weights, output, 3));
         script.sense(320, &frames);
     }
@@ -252,7 +253,7 @@ fn networks_give_the_same_outputs() {
         &[11, 64, 64, 3],
         &[11, 1, 37, 3],
         &[11, 512, 512, 3],
-        // A block of columns, one less and one more, and groups of rows that are not full.
+        // A block of columns, one less and one more, and incomplete groups of rows.
         &[11, 31, 32, 33, 15, 16, 17, 3],
     ];
     let papers = &[11, 512, 512, 512, 3][..];
@@ -283,8 +284,8 @@ fn networks_give_the_same_outputs() {
     );
 }
 
-/// Every width that a layer can have, as its rows and as its columns: what is left over of blocks
-/// and of groups of rows, each number at its end.
+/// Every possible width of a layer, as its rows and as its columns: it covers the remainders of
+/// blocks and of groups of rows, with each number at its limit.
 #[test]
 fn layers_of_every_width_give_the_same_outputs() {
     let mut script = Script::new();
@@ -299,7 +300,7 @@ fn layers_of_every_width_give_the_same_outputs() {
     same_on_both(&script);
 }
 
-/// A model that kernels cannot read runs all the same.
+/// The kernels cannot read the file at this place, but the model still runs.
 #[test]
 fn networks_of_files_at_any_place_give_the_same_outputs() {
     let mut script = Script::new();
@@ -314,7 +315,7 @@ fn networks_of_files_at_any_place_give_the_same_outputs() {
     same_on_both(&script);
 }
 
-/// Single precision gives the same bits: markers as presses move them, and anywhere in a picture.
+/// Single precision gives the same bits: for markers moved by presses, and anywhere in a picture.
 #[test]
 fn steps_lead_to_the_same_forces() {
     let mut script = Script::new();
@@ -333,7 +334,7 @@ fn steps_lead_to_the_same_forces() {
     assert_eq!(count("Force {"), 3 * 5 * 6, "{text}");
 }
 
-/// Markers of any size that moved away from the middle, or anywhere.
+/// Returns markers of any size that moved away from the middle, or are anywhere.
 fn pressed(random: &mut Random, rest: &Rest, farthest: i64) -> [Marker; 4] {
     let outward = random.between(0, farthest);
     core::array::from_fn(|k| {
@@ -370,7 +371,7 @@ fn force_conversions_are_the_same() {
     same_on_both(&script);
 }
 
-/// Features that differ from the rest position by up to `distance`, in 1/65,536 px.
+/// Returns features that differ from the rest position by up to `distance`, in 1/65,536 px.
 fn moved(random: &mut Random, distance: i64) -> Features {
     let rest = models::rest().to_array();
     let limit = |bits: i64| bits.clamp(i64::from(i32::MIN), i64::from(i32::MAX));

@@ -1,15 +1,16 @@
-//! Faults of the rig, seen through the host tool: each ends in its documented status or counter,
+//! Tests of the rig's faults through the host tool: each leads to its documented status or counter,
 //! and passes.
 
 use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, json_lines, tool_waiting};
 use serde_json::Value;
 
-/// A run with faults, watched by `monitor --json`: its output, its lines, and the rig's counters.
+/// Watches a run with faults by `monitor --json`. Returns the tool's output, its lines, and the
+/// rig's counters.
 fn watch(faults: &[&str], options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
     watch_waiting(TIMEOUT_S, faults, options)
 }
 
-/// The same with a cable that is pulled, after which nothing comes.
+/// As [`watch`], with a cable that is pulled, after which no sample comes.
 fn watch_pulled(options: &[&str]) -> (ToolOutput, Vec<Value>, Value) {
     watch_waiting(SILENCE_S, &["cable-pulled@300-700"], options)
 }
@@ -37,7 +38,7 @@ fn has_status(line: &Value, name: &str) -> bool {
         .is_some_and(|names| names.iter().any(|n| n == name))
 }
 
-/// The number before which the summary says `what`, as in `overrun 3`.
+/// Returns the number after `what` in the summary, as in `overrun 3`.
 fn counter(output: &ToolOutput, what: &str) -> u64 {
     let rest = output
         .err
@@ -48,7 +49,7 @@ fn counter(output: &ToolOutput, what: &str) -> u64 {
     number.unwrap_or_else(|| panic!("no {what} in the summary: {}", output.err))
 }
 
-/// The last frames have forces again.
+/// Checks that the last frames have forces again.
 fn check_recovery(output: &ToolOutput, lines: &[Value]) {
     assert_eq!(output.code, Some(0), "{output:?}");
     let last = lines.last().expect("at least one line");
@@ -83,7 +84,8 @@ fn an_overrun_costs_its_frame_and_no_more() {
 
 #[test]
 fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
-    // Longer than the device's own buffers, shorter than the silence after which the monitor asks.
+    // Longer than the device's own buffers last, shorter than the silence after which the monitor
+    // asks.
     let (output, lines, _) = watch(&["host-not-reading@300-700"], &["--frames", "90"]);
     check_recovery(&output, &lines);
     assert!(counter(&output, "USB") > 0, "{}", output.err);

@@ -1,5 +1,5 @@
-//! The firmware in the rig gives, through the host tool, the very forces that the sensing gives on
-//! this computer for the frames that the camera has shown.
+//! Tests that the firmware in the rig, through the host tool, gives the same forces as the sensing
+//! on this computer for the camera's frames.
 
 use std::collections::HashMap;
 use std::fs;
@@ -17,25 +17,24 @@ use serde_json::{Value, json};
 
 const SEED: u64 = 5;
 
-/// The frame before one.
+/// The frame before a frame.
 #[derive(Clone, Copy)]
 enum Before<'a> {
-    /// None in this pixel format.
+    /// No frame in this pixel format.
     Nothing,
-    /// The first one: no motion is known of it, so that it may be looked at again.
+    /// The first frame: its motion is unknown, and for that reason it may get a second look.
     First(&'a [u16]),
-    /// One after others.
+    /// A frame that follows others.
     Frame(&'a [u16]),
 }
 
-/// The sensing on this computer, with the model that the firmware carries: of a frame after the one
-/// before it.
+/// Measures a frame after the one before it on this computer, with the firmware's model.
 fn on_this_computer(model: &[u8], before: Before<'_>, pixels: &[u16]) -> Measurement {
     let model = Model::parse(model).unwrap();
     let mut sensor = Box::new(Sensor::<64>::new());
     let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(model)).unwrap();
-    // An OV7725 has 278 lines.
+    // A frame of the OV7725 has 278 lines.
     sensor.set_motion(Motion::rolling(278));
     match before {
         Before::Nothing => {}
@@ -50,7 +49,7 @@ fn model_file(name: &str) -> Vec<u8> {
     fs::read(root.join("calibration/models").join(name)).unwrap()
 }
 
-/// What `monitor --json` must say of a measurement, in the integers that the force is made of.
+/// Returns the expected values in `monitor --json` for a measurement, in the integers of the force.
 fn expected(measurement: &Measurement) -> Value {
     let force = measurement.force.map(|force| {
         let [x, y, z] = force.cartesian.map(|component| component.0);
@@ -74,7 +73,7 @@ fn expected(measurement: &Measurement) -> Value {
     json!({ "force": force, "contact": contact, "status": status })
 }
 
-/// The same of a line that it said.
+/// Returns the same values from a line of the tool.
 fn said(line: &Value) -> Value {
     let force = &line["force"];
     let integer = |key: &str, unit: f64| match force[key].as_f64() {
@@ -96,13 +95,13 @@ fn said(line: &Value) -> Value {
             integer("place_sigma_mm", 1e3),
         ])
     });
-    // Whether a contact slips is no matter of one frame.
+    // Slip does not follow from one frame alone.
     let names = line["status"].as_array().unwrap().iter();
     let status: Vec<_> = names.filter(|name| *name != "slip").collect();
     json!({ "force": force, "contact": line["contact"], "status": status })
 }
 
-/// What the host tool shows of the next frames of a rig.
+/// Returns the host tool's lines for the next frames of a rig.
 fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
     let output = tool(rig, "monitor", &["--json", "--frames", &frames.to_string()]).unwrap();
     assert_eq!(output.code, Some(0), "{output:?}");
@@ -111,7 +110,7 @@ fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
     lines
 }
 
-/// The pixels of an exposure, by its line in the truth log.
+/// Returns the pixels of an exposure, from its line in the truth log.
 fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
     let number = |key: &str| line[key].as_f64().unwrap();
     let shutter = Shutter {
@@ -122,7 +121,7 @@ fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
     scene.frame_by(&shutter, exposure, number("time_s")).pixels
 }
 
-/// Holds every line of the host tool against the sensing here.
+/// Compares every line of the host tool with the sensing on this computer.
 fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
     let truth = rig.truth().unwrap();
     let shown: HashMap<u64, &Value> = truth
@@ -134,7 +133,7 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
         let [before, now] = [frame - 1, frame].map(|frame| exposed(scene, shown[&frame]));
         let measured = |before| expected(&on_this_computer(model, before, &now));
         let is = |before| follows(&said(line), &measured(before)) == Ok(());
-        // The first line may be of the first frame after power-on or a change of format.
+        // The first line may belong to the first frame after power-on or a change of format.
         let first = nth == 0 && is(Before::Nothing);
         let second = nth <= 1 && is(Before::First(&before));
         if first || second {
@@ -148,8 +147,8 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
     }
 }
 
-/// Whether a sample is that of a frame by itself, its uncertainties no smaller: the device adds
-/// what the film may remember of the frames before.
+/// Checks that a sample has the values of its frame alone, with uncertainties that are not smaller:
+/// the device adds what the film may remember of earlier frames.
 fn follows(said: &Value, measured: &Value) -> Result<(), String> {
     const SIGMAS: [usize; 3] = [6, 7, 10];
     let told = |value: &Value| {
@@ -168,7 +167,8 @@ fn follows(said: &Value, measured: &Value) -> Result<(), String> {
     }
 }
 
-/// Runs a scene and holds every line of the host tool against the sensing here. Gives the lines.
+/// Runs a scene and compares every line of the host tool with the sensing on this computer. Returns
+/// the lines.
 fn compare(name: &str, preset: Preset, frames: usize) -> Vec<Value> {
     let seed = SEED.to_string();
     let options = ["--scene", name, "--seed", &seed, "--preset", preset.name()];
@@ -181,13 +181,13 @@ fn compare(name: &str, preset: Preset, frames: usize) -> Vec<Value> {
     lines
 }
 
-/// Nothing was lost: sequence, frame and time go on without a gap.
+/// Checks that nothing was lost: sequence, frame and time continue without a gap.
 fn check_counting(lines: &[Value]) {
     let number = |line: &Value, key: &str| line[key].as_u64().unwrap();
     for pair in lines.windows(2) {
         let step = |key| number(&pair[1], key) - number(&pair[0], key);
         assert_eq!((step("seq"), step("frame")), (1, 1), "{pair:?}");
-        // 156.12 frames a second; an edge is stamped within 50 µs.
+        // 156.12 frames a second; the error of an edge's time stamp is less than 50 µs.
         assert!(step("time_us").abs_diff(6_405) < 50, "{pair:?}");
     }
 }
@@ -195,7 +195,7 @@ fn check_counting(lines: &[Value]) {
 #[test]
 fn a_moving_tip_gives_the_same_forces() {
     let lines = compare("demo", Preset::Ov7725, 16);
-    // Before the first frame there may have been none, so that it is measured as it is seen.
+    // The first frame may have no predecessor; it is then measured as it is seen.
     let sizes = lines[1..].iter().map(|line| {
         let size = line["force"]["magnitude_n"].as_f64();
         size.unwrap_or_else(|| panic!("every frame of the demo has a force: {line}"))
@@ -208,7 +208,7 @@ fn a_moving_tip_gives_the_same_forces() {
 
 #[test]
 fn another_camera_geometry_gives_the_same_results() {
-    // The markers of this geometry are smaller and nearer to each other than the model's.
+    // The markers of this geometry are smaller and closer to each other than the model's.
     compare("static", Preset::Paper, 4);
 }
 
@@ -219,7 +219,7 @@ fn set_threshold(rig: &Rig, options: &[&str]) -> ToolOutput {
     output
 }
 
-/// How many lines have a force, and how many say that the model was made for something else.
+/// Returns the number of lines with a force, and of those with a model made for other conditions.
 fn forces_and_mismatches(lines: &[Value]) -> (usize, usize) {
     let mismatch = json!("model_mismatch");
     let says_so = |line: &&Value| line["status"].as_array().unwrap().contains(&mismatch);
@@ -230,15 +230,15 @@ fn forces_and_mismatches(lines: &[Value]) -> (usize, usize) {
     )
 }
 
-/// Whether all lines have forces by their own model but the first, of which nobody knows how fast
-/// the markers moved while it was exposed.
+/// Returns whether all lines except the first have forces by their own model. For the first, the
+/// markers' speed during its exposure is unknown.
 fn forces_but_one(lines: &[Value]) -> bool {
     let (forces, mismatches) = forces_and_mismatches(lines);
     mismatches == 0 && lines[1..].iter().all(|line| line["force"].is_object()) && forces > 0
 }
 
-/// Firmware with a model for YUV422 begins in that format, leaves it for RGB565 on command, and
-/// comes back to it.
+/// Firmware with a model for YUV422 begins in that format, changes to RGB565 on command, and
+/// returns to it.
 #[test]
 fn the_pixel_format_is_chosen_while_frames_are_measured() {
     const FRAMES: usize = 5;
@@ -264,7 +264,7 @@ fn the_pixel_format_is_chosen_while_frames_are_measured() {
     let output = set_threshold(&rig, &["--cr", "162"]);
     assert_eq!(output.out, "threshold set: yuv422, Cr 162–255\n");
     let mut last = monitor(&rig, FRAMES);
-    // The frames that passed while the camera was set are no matter of the sensing.
+    // Frames that passed during the camera's set-up are not part of the sensing.
     for line in &mut last {
         let status = line["status"].as_array_mut().unwrap();
         status.retain(|name| name != "frame_dropped");

@@ -1,4 +1,4 @@
-//! Markers in frames of the scene's other pixel formats.
+//! Tests of markers in frames of the scene's other pixel formats.
 
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::Pixels;
@@ -15,7 +15,7 @@ fn frame(format: Format, load: &Load) -> Frame {
     scene.render_load(load, 3).unwrap()
 }
 
-/// The worst error of the four weighted centroids, px.
+/// Returns the largest error of the four weighted centroids, px.
 fn worst_error(pixels: &impl Pixels, rows: &[u16], frame: &Frame) -> f64 {
     let mut scanner = Box::new(Scanner::<64>::new());
     let settings = ScanSettings {

@@ -1,5 +1,5 @@
-//! Correct or rejected, never silently wrong: the scene's hard cases; and no honest frame refused
-//! for it.
+//! Tests of the scene's hard cases: each is correct or rejected, never silently wrong. Honest
+//! frames must not be refused for that.
 
 use std::fmt::Debug;
 
@@ -8,8 +8,8 @@ use hivtac_tests::tared::{Detection, View, views};
 use hivtac_twin::film::{MAX_FORCE_N, MAX_LABEL_N};
 use hivtac_twin::{Contact, Load};
 
-/// Every case is right or refused; what is plain to see is found in half of the frames at least.
-/// The views see the same frames.
+/// Checks that every case is right or refused, and that plainly visible markers are found in at
+/// least half of the frames. The views see the same frames.
 fn hold(views: &[View], repeats: u64) {
     let mut wrong = Vec::new();
     for outcome in detect_in_all(views, repeats).unwrap().concat() {
@@ -44,7 +44,7 @@ fn hard_cases_are_right_or_refused_at_every_size() {
     hold_at(&[[320, 240], [800, 600]], 4);
 }
 
-/// Presses over the whole range in a sequence that fills it evenly: |F| to 0.25 N, or the largest
+/// Returns a press in a sequence that fills the whole range evenly: |F| to 0.25 N, or the largest
 /// label of a stage, α to ±12°, β to ±10°, the tip up to 0.25 mm off the middle.
 fn honest_load(contact: Contact, index: usize) -> Load {
     let most_n = match contact {
@@ -64,11 +64,11 @@ fn honest_load(contact: Contact, index: usize) -> Load {
         .unwrap()
 }
 
-/// Of nominal frames, which the views share.
+/// Results on nominal frames, which the views share.
 #[derive(Clone, Default)]
 struct Honest {
     refused: usize,
-    /// The largest error of a marker in the others, px.
+    /// The largest error of a marker in the accepted frames, px.
     worst_px: f64,
 }
 
@@ -84,8 +84,8 @@ impl Honest {
     }
 }
 
-/// Of so many frames, which the views share, one of a thousand may be refused; no accepted one may
-/// be off.
+/// Checks nominal frames, which the views share: at most one in a thousand is refused, and none
+/// that is accepted has a larger error than allowed.
 fn hardly_any_is_refused(views: &[View], frames: usize) {
     let mut sensors: Vec<_> = views.iter().map(|view| view.sensor().unwrap()).collect();
     let mut found = vec![Honest::default(); views.len()];

@@ -1,5 +1,5 @@
-//! Right or refused, never silently wrong, with contacts anywhere and the committed model that
-//! tells places: the scene's hard cases; and no honest frame refused for it.
+//! Tests of the scene's hard cases under contacts anywhere, with the committed model that gives
+//! places. Each is right or refused, never silently wrong, and honest frames are not refused.
 
 use std::collections::BTreeMap;
 
@@ -11,14 +11,14 @@ use hivtac_tests::tared::TaredSensor;
 use hivtac_twin::Preset;
 use hivtac_twin::hard_cases::{Expected, HardCase, hard_cases};
 
-/// What presses hard cases: within the calibrated range.
+/// Presses on hard cases: within the calibrated range.
 const PRESSES: Contacts = Contacts {
     force_n: [0.02, 0.2],
     ratio: 0.14,
     place_mm: 4.0,
 };
 
-/// What presses honest frames.
+/// Presses on honest frames.
 const HONEST: Contacts = Contacts {
     force_n: [0.002, 0.2],
     ratio: 0.8,
@@ -29,7 +29,7 @@ fn sensor() -> TaredSensor {
     TaredSensor::of_model(models::anywhere(1)).unwrap()
 }
 
-/// What was made of the frames of a case.
+/// The results on the frames of a case.
 #[derive(Default)]
 struct Outcome {
     right: u32,
@@ -54,8 +54,8 @@ fn outcome(sensor: &mut TaredSensor, case: &HardCase, presses: u64) -> Outcome {
 }
 
 impl Outcome {
-    /// Wrong forces; any force where the frame does not show where the markers are; most frames
-    /// refused where it plainly does.
+    /// Returns the faults of a case: wrong forces, any force if the frame does not show the
+    /// markers' places, or most frames refused although they are plainly visible.
     fn faults(self, case: &HardCase) -> Vec<String> {
         let mut faults = self.wrong;
         match case.expected {
@@ -75,7 +75,7 @@ impl Outcome {
     }
 }
 
-/// Cases in which things move are about one frame's time: what moves there is the force.
+/// Moving cases are left out: they are about one frame's time, and their force itself moves.
 fn hold(presses: u64) {
     let mut sensor = sensor();
     let mut wrong = Vec::new();
@@ -104,8 +104,8 @@ fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
     hold(150);
 }
 
-/// Of so many honest frames, in which no marker reaches the picture's border, one in a thousand may
-/// be refused, and none wrong.
+/// Checks honest frames in which no marker reaches the picture's border: at most one in a thousand
+/// is refused, and none is wrong.
 fn hardly_any_is_refused(frames: u64) {
     let mut sensor = sensor();
     let scene = hivtac_twin::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();

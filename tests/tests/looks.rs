@@ -1,5 +1,5 @@
-//! Frames that are looked at again: disturbed ones keep their force, within what it states; what
-//! hides too much of a marker stays refused; good frames are looked at once.
+//! Tests of second looks. Disturbed frames keep their force within its stated uncertainty, too much
+//! cover over a marker stays refused, and good frames get one look.
 
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::{Contacts, Judged};
@@ -15,7 +15,8 @@ const PRESSES: Contacts = Contacts {
 };
 const FRAMES: u64 = 60;
 
-/// How many frames have a force, and how many of these by the second look; none is wrong.
+/// Returns the number of frames with a force, and of those by the second look. Asserts that no
+/// force is wrong.
 fn kept(options: Options) -> (u32, u32) {
     let mut sensor = TaredSensor::of_model(models::anywhere(1)).unwrap();
     let mut in_bands = TaredSensor::of_model(models::anywhere(1)).unwrap();

@@ -1,5 +1,5 @@
-//! Tests that cross rooms. One program, so that its tests run side by side whatever they are about,
-//! and are linked once; `cargo test -p hivtac-tests hard_cases::` runs one file's.
+//! Tests that cross folders. They are one program, to run in parallel and to be linked once. `cargo
+//! test -p hivtac-tests hard_cases::` runs the tests of one file.
 
 mod bring_up;
 mod calibration;

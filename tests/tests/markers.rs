@@ -1,20 +1,20 @@
-//! What the marker rules let through on rendered frames: every honest frame, and no false one
-//! beyond a bound.
+//! Tests of the marker rules on rendered frames: every honest frame passes, and no false one has an
+//! error beyond a bound.
 
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_tests::tared::{Detection, TaredSensor, View, views};
 use hivtac_twin::{Contact, Frame, Load, Options, Paint, Patch, Preset, Scene};
 
-/// The worst errors that remain of a marker that is partly covered, px: by up to 0.2 mm of a small
-/// spot on its edge.
+/// Largest remaining errors of a partly covered marker, px: a small spot covers up to 0.2 mm of its
+/// edge.
 const COVERED_WEIGHTED: f64 = 0.3;
 const COVERED_BINARY: f64 = 0.6;
-/// Of one on which something red grows: a disc of its own size beneath.
+/// Largest remaining errors of a marker with red added, px: a disc of its own size beneath it.
 const GROWN_WEIGHTED: f64 = 0.3;
 const GROWN_BINARY: f64 = 0.85;
 
-/// Identity of the marker that the tests spoil, and where it is on the film, mm.
+/// Identity of the marker that the tests damage, and its place on the film, mm.
 const SPOILT: usize = 1;
 const SPOILT_MM: [f64; 2] = [3.717, -3.717];
 
@@ -40,8 +40,8 @@ fn press(newtons: f64) -> Load {
     Load::from_vector([0.0, 0.0, -newtons]).unwrap()
 }
 
-/// How far the markers are off, px: the worst of them, and their mean. `None` when there may be no
-/// force.
+/// Returns the markers' errors, px: the largest of them, and their mean. Returns `None` if there
+/// may be no force.
 fn trusted(sensor: &mut TaredSensor, frame: &Frame) -> Option<(f64, f64)> {
     match sensor.detect(frame) {
         Detection::Trusted { worst_px, mean_px } => Some((worst_px, mean_px)),
@@ -49,7 +49,8 @@ fn trusted(sensor: &mut TaredSensor, frame: &Frame) -> Option<(f64, f64)> {
     }
 }
 
-/// The worst error of the accepted frames of a sweep, px, and how many were accepted.
+/// Returns the largest error in the accepted frames of a sweep, px, and the number of accepted
+/// frames.
 fn sweep(view: View, load: &Load, options: impl IntoIterator<Item = Options>) -> (f64, usize) {
     let mut sensor = view.sensor().unwrap();
     let (mut worst, mut accepted) = (0.0f64, 0);
@@ -74,7 +75,7 @@ fn red_patch(centre_mm: [f64; 2], radius_mm: f64) -> Patch {
     }
 }
 
-/// Directions around a marker.
+/// Iterates over directions around a marker.
 fn around(count: u32) -> impl Iterator<Item = (f64, f64)> {
     (0..count).map(move |step| {
         let (sin, cos) = (f64::from(step) / f64::from(count) * std::f64::consts::TAU).sin_cos();
@@ -109,7 +110,8 @@ fn every_honest_press_is_trusted() {
     }
 }
 
-/// Light on all or on one side so low that the value threshold bites.
+/// Iterates over options with light, everywhere or on one side, below what the value threshold
+/// needs.
 fn dim() -> impl Iterator<Item = Options> {
     let gains = [0.6, 0.45, 0.36, 0.32, 0.3, 0.28, 0.24];
     let gradients = [0.15, 0.4, 0.9];
@@ -134,7 +136,8 @@ fn light_that_eats_edges_is_refused_before_it_moves_markers() {
     }
 }
 
-/// Patches of a paint that reach so far into the spoilt marker from all sides.
+/// Returns options with patches of a paint that reach this far into the damaged marker from all
+/// sides.
 fn reaching_in(paint: Paint, depths_mm: &[f64]) -> Vec<Options> {
     let mut all = Vec::new();
     for radius_mm in [0.1, 0.3, 1.0] {
@@ -192,7 +195,8 @@ fn red_that_grows_on_a_marker_is_refused_before_it_moves() {
     assert!(worst < GROWN_BINARY, "{worst} px");
 }
 
-/// A red disc in place of a hidden marker, and how far it is from where that was, mm.
+/// Returns options with a red disc in place of a hidden marker, and the disc's distance from the
+/// marker's place, mm.
 fn stand_ins() -> Vec<(Options, f64)> {
     let mut missing = [false; 4];
     missing[SPOILT] = true;

@@ -1,4 +1,5 @@
-//! Forces that change under a rolling shutter: what moving the markers to one common time is worth.
+//! Tests of changing forces under a rolling shutter: shows the benefit of moving the markers to one
+//! common time.
 //!
 //! `cargo test --release -p hivtac-tests moving:: -- --nocapture` prints the table of
 //! `docs/firmware.md`.
@@ -12,17 +13,17 @@ use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_twin::{Motion, Preset, Scene, Shutter, Vibration};
 
-/// Lines of an OV7725's frame, of which 240 are rows.
+/// Number of lines of an OV7725's frame; 240 of them are rows.
 const LINES: u16 = 278;
 /// The camera's rates, frames a second.
 const RATES: [f64; 3] = [156.12, 78.06, 39.03];
-/// How long each row is exposed, s.
+/// Exposure time of each row, s.
 const EXPOSURE_S: f64 = 0.004;
-/// Frames of each run.
+/// Number of frames per run.
 const FRAMES: u64 = 60;
-/// |F| from which a direction counts, N.
+/// The smallest |F| for which the direction counts, N.
 const FLOOR_N: f64 = 0.05;
-/// 0.13 ± 0.08 N at 10 Hz: up to 5 N/s.
+/// Returns a motion of 0.13 ± 0.08 N at 10 Hz: up to 5 N/s.
 fn fast() -> Motion {
     Motion::Vibration(Vibration {
         force_n: 0.13,
@@ -39,9 +40,9 @@ fn fast() -> Motion {
 struct Errors {
     /// Mean angle to the true force, degrees.
     mean_deg: f64,
-    /// Largest, degrees.
+    /// Largest angle, degrees.
     most_deg: f64,
-    /// Root mean square of |F|'s, mN.
+    /// Root mean square error of |F|, mN.
     magnitude_mn: f64,
     /// Frames without a force.
     refused: usize,
@@ -56,7 +57,7 @@ fn sensor(model: &[u8], motion: motion::Motion) -> Box<Sensor<'_>> {
     sensor
 }
 
-/// Of a scene at a rate, with markers as they are seen and at one time.
+/// Returns the errors for a scene at a rate, with markers as seen and moved to one time.
 fn errors(model: &[u8], scene: &Scene, rate_hz: f64) -> [Errors; 2] {
     let shutter = Shutter {
         exposure_s: EXPOSURE_S,
@@ -71,7 +72,7 @@ fn errors(model: &[u8], scene: &Scene, rate_hz: f64) -> [Errors; 2] {
         for (nth, sensor) in sensors.iter_mut().enumerate() {
             let force = sensor.measure_frame(&frame.pixels).force;
             let truth = frame.truth.force;
-            // The first frame has none before it.
+            // The first frame has no predecessor.
             if number == 0 || truth.magnitude_n() < FLOOR_N {
                 continue;
             }
@@ -140,11 +141,11 @@ fn a_force_that_changes_is_measured_as_one_that_stays() {
                 text(moved)
             );
             let worth = match *name {
-                // Two frames' noise instead of one's.
+                // Two frames' noise instead of one frame's.
                 "0" => moved.mean_deg < 1.25 * seen.mean_deg,
-                // As seen, no one contact explains markers that moved one after the other.
+                // As seen, no single contact explains markers that moved one after the other.
                 "0.6" => moved.mean_deg < 0.4 && 10 * moved.refused.max(1) <= seen.refused,
-                // Four frames a period do not tell a velocity.
+                // Four frames per period are too few to give a velocity.
                 _ => rate_hz < 40.0 || moved.refused < seen.refused,
             };
             assert!(worth, "{name} N/s at {rate_hz} Hz: {seen:?} {moved:?}");

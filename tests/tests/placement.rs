@@ -1,5 +1,5 @@
-//! Where the firmware's code and data lie, read from the very ELF that is flashed: what `memory.x`
-//! promises.
+//! Tests where the firmware's code and data lie, from the very ELF that is flashed: at the places
+//! that `memory.x` promises.
 
 use std::fs;
 use std::ops::Range;
@@ -26,7 +26,7 @@ impl Symbol {
     }
 }
 
-/// Functions and variables of the firmware, under their mangled names.
+/// Returns the firmware's functions and variables, under their mangled names.
 fn symbols() -> Vec<Symbol> {
     let bytes = fs::read(artifact::named_by("HIVTAC_ELF")).unwrap();
     let file = object::File::parse(&*bytes).unwrap();
@@ -34,7 +34,7 @@ fn symbols() -> Vec<Symbol> {
     symbols
         .map(|symbol| Symbol {
             name: symbol.name().unwrap().to_owned(),
-            // Bit 0 of a function's address says that it is Thumb code.
+            // Bit 0 of a function's address marks Thumb code.
             address: symbol.address() & !1,
             size: symbol.size(),
             is_code: symbol.kind() == SymbolKind::Text,
@@ -42,7 +42,7 @@ fn symbols() -> Vec<Symbol> {
         .collect()
 }
 
-/// Those variables whose name has all of these words.
+/// Returns the variables whose names contain all of these words.
 fn variables<'a>(symbols: &'a [Symbol], words: &[&str]) -> Vec<&'a Symbol> {
     let named = |symbol: &&Symbol| words.iter().all(|word| symbol.name.contains(word));
     let found: Vec<_> = symbols
@@ -58,16 +58,16 @@ fn variables<'a>(symbols: &'a [Symbol], words: &[&str]) -> Vec<&'a Symbol> {
 fn the_sensing_runs_from_itcm() {
     let symbols = symbols();
     let code = symbols.iter().filter(|symbol| symbol.is_code);
-    // Bridges of the linker between the memories are no code of the project.
+    // The linker's bridges between the memories are not code of the project.
     let code = code.filter(|symbol| !symbol.name.contains("Thunk"));
     let is_sensing = |symbol: &&Symbol| {
         let packages = ["hivtac_terms", "hivtac_sensor"];
         packages.iter().any(|package| symbol.name.contains(package))
             || symbol.name.starts_with("hivtac_")
     };
-    // What runs for a model, a setting, a tare or a message, and what follows a force once it is
-    // there, or stands for one without a film: no loop over pixels or weights. And what only
-    // another look at a refused frame needs.
+    // Code that rarely runs: for a model, a setting, a tare or a message, after a force or in place
+    // of one without a film, and for a second look at a refused frame. It has no loop over pixels
+    // or weights.
     let seldom = [
         "hivtac_sensor5force5model",
         "hivtac_sensor..force..model",

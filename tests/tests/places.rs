@@ -1,5 +1,5 @@
-//! Honest contacts anywhere get a force from a model that tells places, and few of them from one
-//! that does not.
+//! Tests that honest contacts anywhere get a force from a model that gives places, and that few of
+//! them get one from a model that does not.
 
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::Contacts;
@@ -7,23 +7,23 @@ use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::{Detection, View, views};
 use hivtac_twin::{Contact, Frame};
 
-/// Frames of each view.
+/// Number of frames per view.
 const FRAMES: u64 = 2_400;
-/// What presses.
+/// The contacts.
 const CONTACTS: Contacts = Contacts {
     force_n: [0.005, 0.25],
     ratio: 0.8,
     place_mm: 4.0,
 };
 
-/// What became of the frames.
+/// The results by kind.
 #[derive(Clone, Copy, Debug, Default)]
 struct Counts {
-    /// The picture's border hides or cuts a marker.
+    /// Frames in which the picture's border hides or cuts a marker.
     cut: u64,
-    /// All markers are in the picture, and there is no force.
+    /// Frames with all markers in the picture, and without a force.
     refused: u64,
-    /// There is a force.
+    /// Frames with a force.
     trusted: u64,
 }
 
@@ -34,7 +34,8 @@ impl Counts {
         };
         match detection {
             Detection::Trusted { .. } => self.trusted += 1,
-            // A marker whose edge is at the border, but for what the threshold adds, is cut, too.
+            // A marker also counts as cut if only the threshold's margin separates its edge from
+            // the border.
             Detection::Refused(status)
                 if status.contains(Status::MARKERS_MISSING)
                     || !frame.truth.markers.iter().all(inside) =>
@@ -46,7 +47,7 @@ impl Counts {
     }
 }
 
-/// The same frames, by a model of presses in the middle and by one that tells places.
+/// Compares a model of presses in the middle with one that gives places, on the same frames.
 fn compare(views: [View; 2]) {
     let scene = views[0].nominal().unwrap();
     let sensors = |view: View| [view.sensor().unwrap(), view.sensor_anywhere().unwrap()];
@@ -63,10 +64,11 @@ fn compare(views: [View; 2]) {
     }
     for (view, [middle, anywhere]) in views.iter().zip(counts) {
         println!("{view:?}: of {FRAMES} frames, in the middle {middle:?}, anywhere {anywhere:?}");
-        // Nine in ten are whole, and of these no more are refused than the finder finds too wide.
+        // Nine in ten frames are whole. Of these, only those are refused that the finder finds too
+        // wide.
         assert!(anywhere.cut * 10 < FRAMES, "{view:?}: {anywhere:?}");
         assert!(anywhere.refused * 200 <= FRAMES, "{view:?}: {anywhere:?}");
-        // A model of presses in the middle has no honest answer to most of these.
+        // For most of these frames, a model of presses in the middle has no honest answer.
         assert!(middle.refused * 3 > FRAMES, "{view:?}: {middle:?}");
     }
 }

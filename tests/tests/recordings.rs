@@ -1,5 +1,5 @@
-//! A recording of the firmware on the rig: what PyPI's readers find in it, and what is played of
-//! it.
+//! Tests of a recording of the firmware on the rig: readers from PyPI can read it, and it can be
+//! played.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::rig::{Rig, json_lines, tool};
 use hivtac_tests::artifact;
 use serde_json::Value;
 
-/// Records so many seconds of this computer's time; the rig's pass more slowly.
+/// Duration of a recording in seconds of this computer; the rig's seconds pass more slowly.
 const SECONDS: &str = "12";
 
 fn record(file: &Path) -> Rig {
@@ -24,7 +24,7 @@ fn record(file: &Path) -> Rig {
     rig
 }
 
-/// The JSON lines of `monitor` on a recording that is played.
+/// Returns the JSON lines of `monitor` on a recording that is played.
 fn played(file: &Path, frames: usize) -> Vec<Value> {
     let mut replay = Command::new(artifact::named_by("HIVTAC_TOOL"))
         .args(["replay", "--fast", file.to_str().unwrap()])
@@ -84,7 +84,7 @@ fn a_recording_is_read_by_pypis_readers_and_played_as_it_was() {
         .unwrap();
     assert!(samples > 10 && wrenches as usize + 5 > samples, "{read}");
     assert_eq!(read["summary"]["samples_lost_on_the_way"], "0");
-    // Cut anywhere, what is before the cut is read.
+    // A recording that is cut anywhere can be read up to the cut.
     let cut: Vec<u64> = serde_json::from_value(read["cut"].clone()).unwrap();
     assert!(cut.is_sorted() && cut[9] > 0, "{cut:?}");
 
@@ -104,7 +104,7 @@ fn a_recording_is_read_by_pypis_readers_and_played_as_it_was() {
     }
 }
 
-/// The firmware's own rate, held against limits: the virtual board has no loss.
+/// Checks the firmware's own rate against limits: the virtual board has no loss.
 #[test]
 fn the_firmware_passes_a_check_and_an_impossible_one_fails() {
     let rig = Rig::start(&["--scene", "demo"]).unwrap();

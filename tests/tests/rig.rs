@@ -1,7 +1,7 @@
-//! The rig with the firmware, and the host tool as a user runs it.
+//! Runs the rig with the firmware, and the host tool as a user runs it.
 //!
-//! The rig is not a program of its own here: so what one run translated of the firmware serves the
-//! next. The tests of `twin/rig/` and those in Python have it as a program.
+//! The rig runs inside the test program: the translation of the firmware from one run serves the
+//! next. The tests of `twin/rig/` and those in Python run the rig as a separate program.
 
 use std::ffi::OsString;
 use std::fs;
@@ -20,15 +20,15 @@ use hivtac_tests::artifact;
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// How long the host tool may take here: the emulator runs at about a tenth of real time, and tests
-/// share the processors.
+/// The longest duration of the host tool: the emulator runs at about a tenth of real time, and
+/// tests share the processors.
 const PATIENCE: Duration = Duration::from_secs(240);
-/// How long the host tool waits for an answer, s: the emulated board boots slower than a real one.
+/// Timeout of the host tool for an answer, s: the emulated board boots slower than a real one.
 pub const TIMEOUT_S: u32 = 40;
-/// The same where a silence is meant: all the while the rig runs on.
+/// The same for an intended silence, during which the rig runs on.
 pub const SILENCE_S: u32 = 20;
 
-/// A running rig with its logs. Ended when it is dropped.
+/// A running rig with its logs; it ends when it is dropped.
 pub struct Rig {
     running: Option<JoinHandle<Result<()>>>,
     interrupt: Arc<AtomicBool>,
@@ -41,15 +41,15 @@ impl Rig {
     /// holds its port.
     ///
     /// # Errors
-    /// When it does not get ready.
+    /// If it does not become ready.
     pub fn start(options: &[&str]) -> Result<Rig> {
         Rig::start_with(&artifact::named_by("HIVTAC_ELF"), options)
     }
 
-    /// The same with another firmware.
+    /// As [`Rig::start`], with another firmware.
     ///
     /// # Errors
-    /// When it does not get ready.
+    /// If it does not become ready.
     pub fn start_with(elf: &Path, options: &[&str]) -> Result<Rig> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
         let [truth, stats] = ["truth", "stats"].map(|name| folder.path().join(name));
@@ -66,7 +66,7 @@ impl Rig {
         let port = port.context("it has a terminal")?.to_owned();
         let running = thread::spawn(move || {
             let outcome = run(run_options).and_then(|outcome| arguments.leave(&outcome));
-            // Told at once, as the host tool only sees that its port is silent.
+            // Printed at once, because the host tool only sees that its port is silent.
             outcome.inspect_err(|error| eprintln!("the rig failed: {error:#}"))
         });
         Ok(Rig {
@@ -77,37 +77,37 @@ impl Rig {
         })
     }
 
-    /// The pseudo-terminal that is its serial port.
+    /// Returns the path of the pseudo-terminal that is its serial port.
     pub fn port(&self) -> &str {
         &self.port
     }
 
-    /// Where it logs what is true of every exposure.
+    /// Returns the path of its log of every exposure's truth.
     pub fn truth_file(&self) -> PathBuf {
         self.file("truth")
     }
 
-    /// What is true of every exposure so far, without a line that is being written.
+    /// Returns the truth of every exposure until now, without an incomplete last line.
     ///
     /// # Errors
-    /// When the log cannot be read.
+    /// If the log cannot be read.
     pub fn truth(&self) -> Result<Vec<Value>> {
         let text = fs::read_to_string(self.truth_file()).context("reading the truth log")?;
         let whole = text.rfind('\n').map_or("", |end| &text[..end]);
         json_lines(whole)
     }
 
-    /// Ends it, and gives its counters.
+    /// Ends the rig, and returns its counters.
     ///
     /// # Errors
-    /// When it failed.
+    /// If the rig failed.
     pub fn finish(mut self) -> Result<Value> {
         self.end()?;
         let text = fs::read_to_string(self.file("stats")).context("reading the counters")?;
         serde_json::from_str(&text).context("the counters are not JSON")
     }
 
-    /// Has it end, which it does within a millisecond of its own time.
+    /// Makes the rig end, which takes it less than a millisecond of its own time.
     fn end(&mut self) -> Result<()> {
         self.interrupt.store(true, Ordering::Relaxed);
         let ended = self.running.take().map(JoinHandle::join);
@@ -124,12 +124,12 @@ impl Rig {
 
 impl Drop for Rig {
     fn drop(&mut self) {
-        // Fails when it was ended already, and is of no interest in a test that fails.
+        // Fails if the rig has already ended; a failing test does not need this error.
         let _ = self.end();
     }
 }
 
-/// What the host tool left.
+/// The results of the host tool.
 #[derive(Clone, Debug)]
 pub struct ToolOutput {
     /// Its exit code.
@@ -144,12 +144,12 @@ pub struct ToolOutput {
 /// it ends. It waits up to [`TIMEOUT_S`] for an answer.
 ///
 /// # Errors
-/// When it cannot be started, or does not end.
+/// If it cannot be started, or does not end.
 pub fn tool(rig: &Rig, command: &str, options: &[&str]) -> Result<ToolOutput> {
     tool_waiting(rig, TIMEOUT_S, command, options)
 }
 
-/// The same with so many seconds to wait.
+/// As [`tool`], with this timeout in seconds.
 ///
 /// # Errors
 /// As [`tool`].
@@ -180,10 +180,10 @@ pub fn tool_waiting(
     Ok(result)
 }
 
-/// One JSON value a line.
+/// Reads one JSON value per line.
 ///
 /// # Errors
-/// Names the line that is none.
+/// If a line is not JSON; the error names the line.
 pub fn json_lines(text: &str) -> Result<Vec<Value>> {
     let parse = |line| serde_json::from_str(line).with_context(|| format!("no JSON: {line}"));
     text.lines().map(parse).collect()

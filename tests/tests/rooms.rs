@@ -1,4 +1,4 @@
-//! Each of the project's packages depends only on those that the table of folders in
+//! Tests that each of the project's packages depends only on those that the table of folders in
 //! `docs/architecture.md` allows.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,14 +7,14 @@ use std::path::Path;
 
 use hivtac_tests::workspaces::{self, cargo, from_root, root};
 
-/// A row of the table: a folder, its package, and the folders it may use; `None` for everything.
+/// A row of the table: a folder, its package, and the folders it may use; `None` means all.
 struct Room {
     folder: String,
     package: String,
     may_use: Option<BTreeSet<String>>,
 }
 
-/// The words of a cell that are set as code.
+/// Returns the words of a cell that are formatted as code.
 fn code_words(cell: &str) -> Vec<String> {
     cell.split('`')
         .skip(1)
@@ -40,14 +40,14 @@ fn room(line: &str) -> Option<Room> {
     })
 }
 
-/// The project's packages: name, folder from the root, and the folders of the project that it
-/// depends on.
+/// Returns the project's packages: name, folder relative to the root, and the project's folders on
+/// which it depends.
 fn packages() -> BTreeMap<String, (String, BTreeSet<String>)> {
     let mut packages = BTreeMap::new();
     for package in workspaces::packages() {
         let manifest = Path::new(package["manifest_path"].as_str().unwrap());
         let uses = package["dependencies"].as_array().unwrap().iter();
-        // What only a package's own tests use goes into nothing that is built from it.
+        // Dependencies of a package's own tests are not part of anything built from it.
         let uses = uses.filter(|dependency| dependency["kind"] != "dev");
         let uses = uses.filter_map(|dependency| dependency["path"].as_str());
         let uses = uses.map(|path| from_root(Path::new(path))).collect();
@@ -94,7 +94,7 @@ fn every_package_has_a_room() {
     }
 }
 
-/// What building a package builds, a line each.
+/// Returns the packages that a package's build includes, one per line.
 fn tree_of(package: &str, features: &str) -> String {
     let arguments = [
         "tree",

@@ -1,5 +1,5 @@
-//! A snapshot of the firmware in the rig, through the host tool: what the tool's own sensing finds
-//! in it is what the device found, bit for bit.
+//! Tests of snapshots from the firmware in the rig, through the host tool: the tool's own sensing
+//! finds in them what the device found, bit for bit.
 
 use crate::rig::{Rig, ToolOutput, json_lines, tool};
 use hivtac_tests::artifact;
@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::Command;
 use std::string::String;
 
-/// Runs a rig with these options, and takes a raw snapshot.
+/// Takes a raw snapshot of a rig.
 fn take(rig: &Rig, raw: &Path) -> Value {
     let raw = raw.to_str().unwrap();
     let output = tool(rig, "snapshot", &["--json", "--raw", raw]).unwrap();
@@ -16,7 +16,7 @@ fn take(rig: &Rig, raw: &Path) -> Value {
     json_lines(&output.out).unwrap().remove(0)
 }
 
-/// What `hivtac sense` finds in a file.
+/// Returns the results of `hivtac sense` on a file.
 fn sense(options: &[&str]) -> Value {
     let output = Command::new(artifact::named_by("HIVTAC_TOOL"))
         .args(["sense", "--json"])
@@ -44,7 +44,7 @@ fn sense_finds_the_devices_own_markers_in_its_snapshot() {
     );
 }
 
-/// In YUV422 too, by the raw frame and the model for it.
+/// In YUV422 as well, by the raw frame and the model for it.
 #[test]
 fn so_it_does_in_yuv422() {
     let folder = tempfile::tempdir().unwrap();
@@ -60,7 +60,7 @@ fn so_it_does_in_yuv422() {
     assert_eq!(told["markers"], found["markers"]);
 }
 
-/// The nominal sensor at rest: `focus` ends with its first picture.
+/// With the nominal sensor at rest, `focus` ends with its first picture.
 #[test]
 fn focus_finds_the_nominal_sensor_right() {
     let rig = Rig::start(&["--scene", "rest"]).unwrap();
@@ -73,8 +73,8 @@ fn focus_finds_the_nominal_sensor_right() {
     assert_eq!(checks.len(), 23, "{checks:?}");
 }
 
-/// A threshold with which no marker is seen: `threshold auto` finds one with which the device has
-/// forces again.
+/// The device begins with a threshold that finds no marker. `threshold auto` finds one with which
+/// the device has forces again.
 #[test]
 fn a_wrong_threshold_is_mended() {
     let rig = Rig::start(&["--scene", "static", "--seed", "5"]).unwrap();
@@ -115,7 +115,7 @@ fn a_wrong_threshold_is_mended() {
     rig.finish().unwrap();
 }
 
-/// A camera that sends nothing: the tool says so, and nothing is written.
+/// The camera sends nothing: the tool reports it, and writes no file.
 #[test]
 fn without_a_camera_it_says_why() {
     let folder = tempfile::tempdir().unwrap();

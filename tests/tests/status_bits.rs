@@ -1,4 +1,4 @@
-//! The status bits have one meaning in `hivtac-terms` and `docs/wire.md`.
+//! Tests that the status bits have the same meaning in `hivtac-terms` and `docs/wire.md`.
 
 use hivtac_terms::status::Status;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ fn named_bits() -> BTreeMap<u32, &'static str> {
         .collect()
 }
 
-/// Rows of the document's table: bit, name, whether it says "no force".
+/// Returns the rows of the document's table: bit, name, whether it means "no force".
 fn documented_bits() -> Vec<(u32, String, bool)> {
     let section = DOCUMENT
         .split("### Status bits")

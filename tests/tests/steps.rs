@@ -1,5 +1,5 @@
-//! The film run forwards, by the committed model: it finds the contact that moves the markers so,
-//! refuses what none does, and survives anything.
+//! Tests of the film run forwards, by the committed model: it finds the contact that explains the
+//! markers' motion, refuses markers that no contact explains, and survives any input.
 
 use hivtac_sensor::force::forward::{Forward, Markers, Pose, STEPS_AT_MOST};
 use hivtac_sensor::force::model::encode::FORWARD_OFFSET;
@@ -13,7 +13,7 @@ use hivtac_terms::units::Px;
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 
-/// Markers that an exact camera sees under a contact.
+/// Returns the markers that an exact camera sees under a contact.
 fn seen(forward: &Forward<'_>, rest: &Rest, pose: &Pose) -> [Marker; 4] {
     let beside = Markers::default();
     let moved = forward.tables.predict(pose, &forward.limits, &beside).moved;
@@ -46,7 +46,7 @@ fn answer(model: &Model<'_>, markers: &[Marker; 4], guess: [i32; 5]) -> (Force, 
     resting.force(forward, &model.range, markers, &output)
 }
 
-/// From guesses that are a millimetre and a fifth of the force off, and from the middle of the
+/// The guesses have errors of a millimetre and a fifth of the force, or are in the middle of the
 /// film.
 #[test]
 fn the_contact_is_found_from_bad_guesses() {
@@ -83,8 +83,8 @@ fn the_contact_is_found_from_bad_guesses() {
     }
 }
 
-/// Contacts as steep as the tables hold, on markers that are seen a little off: what noise makes
-/// steeper still is found on the tables' border.
+/// Contacts are as steep as the tables allow, on markers with small errors. If noise makes a
+/// contact even steeper, it is found on the tables' border.
 #[test]
 fn the_steepest_contacts_are_found() {
     let file = models::anywhere(1);
@@ -102,7 +102,7 @@ fn the_steepest_contacts_are_found() {
         };
         let mut markers = seen(forward, &model.rest, &pose);
         for marker in &mut markers {
-            // To 0.012 px.
+            // Errors up to 0.012 px.
             marker.x.0 += random.between(-800, 800) as i32;
             marker.y.0 += random.between(-800, 800) as i32;
         }
@@ -115,8 +115,8 @@ fn the_steepest_contacts_are_found() {
     }
 }
 
-/// From a right guess as many steps as the model asks for; from a bad one more, and for what no
-/// contact explains as many as there may be, from the film's middle, too.
+/// A right guess takes the model's number of steps, a bad one more. If no contact explains the
+/// markers, the largest number of steps is taken, also from the film's middle.
 #[test]
 fn a_bad_guess_takes_more_steps() {
     let pose = Pose {
@@ -150,8 +150,8 @@ fn a_bad_guess_takes_more_steps() {
     }
 }
 
-/// One marker half a pixel off is no contact; half of that under the tip may be one, and then it is
-/// said how uncertain it is.
+/// One marker half a pixel off cannot be a contact. Half of that under the tip can be one, and its
+/// uncertainty is stated.
 #[test]
 fn a_marker_that_is_off_is_refused() {
     let file = models::anywhere(1);
@@ -174,7 +174,7 @@ fn a_marker_that_is_off_is_refused() {
     assert_eq!(refused, 12);
 }
 
-/// Markers and guesses from anywhere: no panic, and no number beyond its range.
+/// Markers and guesses are anywhere: there is no panic, and no number beyond its range.
 #[test]
 fn anything_is_survived() {
     let file = models::anywhere(3);
@@ -213,20 +213,20 @@ fn anything_is_survived() {
     }
 }
 
-/// A section cut or damaged anywhere is refused or read, and what is read survives use.
+/// A section that is cut or damaged anywhere is refused or read, and one that is read can be used.
 #[test]
 fn damaged_sections_do_no_harm() {
     let file = models::anywhere(1);
     let section = &file[FORWARD_OFFSET..file.len() - 4];
     assert!(Forward::parse(section).is_ok());
-    // The layers follow it.
+    // The layers follow the section.
     let whole = (0..section.len()).find(|length| Forward::parse(&section[..*length]).is_ok());
     assert!(whole.is_some_and(|whole| whole > 40_000), "{whole:?}");
     let mut random = Random::new(11);
     let mut read = 0;
     for _ in 0..4_000 {
         let mut damaged = section.to_vec();
-        // Half of the damage in what is neither a table's steps nor a covariance.
+        // Half of the damage is outside of a table's steps and of the covariance.
         let at = match random.next() % 4 {
             0 => random.next() as usize % 148,
             1 => 148 + random.next() as usize % 5_000,
@@ -257,7 +257,7 @@ fn damaged_sections_do_no_harm() {
     assert!(read > 1_000);
 }
 
-/// A section says how many markers it is for, and which parts it has.
+/// A section states the number of its markers, and which parts it has.
 #[test]
 fn a_section_of_other_markers_is_refused() {
     let file = models::anywhere(1);

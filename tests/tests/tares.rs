@@ -1,4 +1,4 @@
-//! A tare of bad markers is refused, or harmless; honest units are tared.
+//! Tests of tares: a tare of bad markers is refused, or harmless; honest units are tared.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -12,14 +12,14 @@ use hivtac_twin::{Frame, Lens, Load, MARKERS, Mounting, Options, Paint, Patch, P
 
 const FRAMES: u16 = 16;
 
-/// What presses the film after a tare.
+/// The presses after a tare.
 const PRESSES: Contacts = Contacts {
     force_n: [0.05, 0.2],
     ratio: 0.14,
     place_mm: 4.0,
 };
 
-/// Presses after each tare.
+/// Number of presses after each tare.
 const PRESSED: usize = 12;
 
 fn sensor() -> TaredSensor {
@@ -31,7 +31,7 @@ fn scene(options: &Options, seed: u64) -> Scene {
     scene.with_options(options.clone()).unwrap()
 }
 
-/// The untouched film of a scene.
+/// Iterates over frames of a scene's untouched film.
 fn at_rest(scene: &Scene) -> impl Iterator<Item = Frame> {
     (0..4 * u64::from(FRAMES)).map(|number| scene.render_load(&Load::REST, number).unwrap())
 }
@@ -40,13 +40,14 @@ fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.between(0, 1 << 30) as f64 / f64::from(1 << 30)
 }
 
-/// The sum of twelve uniform numbers is nearly normal; limited to 2.5 standard deviations.
+/// Returns the sum of twelve uniform numbers, which is nearly normal, limited to 2.5 standard
+/// deviations.
 fn normal(random: &mut Random, sigma: f64) -> f64 {
     let sum: f64 = (0..12).map(|_| between(random, -0.5, 0.5)).sum();
     sigma * sum.clamp(-2.5, 2.5)
 }
 
-/// A unit as people build them, in light that is not even.
+/// Returns a unit as people build it, in uneven light.
 fn built(random: &mut Random) -> Options {
     let longer = 1.0 + normal(random, 0.02);
     Options {
@@ -66,7 +67,7 @@ fn built(random: &mut Random) -> Options {
     }
 }
 
-/// Each is tared twice, the second time in other light; the refusals.
+/// Tares each unit twice, the second time in different light. Returns the refusals.
 fn refused_tares(units: u64) -> Vec<String> {
     let mut sensor = sensor();
     let mut random = Random::new(3);
@@ -99,7 +100,8 @@ fn of_ten_thousand_tares_of_untouched_films_one_in_a_thousand_may_be_refused() {
     assert!(refused.len() <= 10, "{}", refused.join("\n"));
 }
 
-/// A disc that covers each of these markers so far from one side, or grows on it.
+/// Returns options with a disc that covers each of these markers from one side up to this depth, or
+/// adds to it.
 fn painted(random: &mut Random, markers: &[usize], depth_mm: f64, paint: Paint) -> Options {
     let (sin, cos) = between(random, 0.0, TAU).sin_cos();
     let radius_mm = [0.3, 0.5, 1.0, 3.0][random.between(0, 3) as usize];
@@ -124,7 +126,7 @@ fn painted(random: &mut Random, markers: &[usize], depth_mm: f64, paint: Paint) 
     }
 }
 
-/// The forces after a tare, of the scene that was tared and of the clean one.
+/// Returns the wrong forces after a tare, in the tared scene and in the clean one.
 fn wrong_after(sensor: &mut TaredSensor, tared: &Scene, random: &mut Random) -> Vec<String> {
     let clean = scene(&Options::default(), 1);
     let mut wrong = Vec::new();
@@ -140,8 +142,8 @@ fn wrong_after(sensor: &mut TaredSensor, tared: &Scene, random: &mut Random) -> 
     wrong
 }
 
-/// Tares of markers that are covered from one side, glare or have red grown on them: how many were
-/// taken, and which forces after those were wrong.
+/// Tares on markers that are covered from one side, have glare, or have red added. Returns the
+/// number of accepted tares, and the wrong forces after them.
 fn painted_tares(tares: u64) -> (usize, Vec<String>) {
     let mut sensor = sensor();
     let mut random = Random::new(5);
@@ -151,7 +153,7 @@ fn painted_tares(tares: u64) -> (usize, Vec<String>) {
         let markers: &[usize] = if number % 2 == 0 { &[0, 1, 2, 3] } else { &[1] };
         let depth_mm = between(&mut random, 0.02, 0.4);
         let painted = scene(&painted(&mut random, markers, depth_mm, paint), number);
-        // Markers that are not found at all give no tare.
+        // Markers that are not found give no tare.
         match sensor.tare(FRAMES, at_rest(&painted)) {
             Ok(Ok(_)) => taken += 1,
             Ok(Err(refusal)) => {
@@ -184,14 +186,14 @@ fn a_tare_of_painted_markers_is_refused_or_harmless() {
 fn of_thousands_of_tares_of_painted_markers_few_do_harm() {
     let (taken, wrong) = painted_tares(3_000);
     let forces = taken * 2 * PRESSED;
-    // Paint on less than a tenth of a millimetre can be too little to be seen in a marker's shape.
+    // Paint on less than a tenth of a millimetre can be too small to show in a marker's shape.
     let share = wrong.len() as f64 / forces as f64;
     println!("{} of {forces} forces are wrong", wrong.len());
     assert!(share <= 2e-3, "{}", wrong.join("\n"));
 }
 
-/// Film colour over a quarter of a millimetre of every marker, all from the same side: the four
-/// markers move alike, so that nothing in their pattern shows it.
+/// Film colour covers a quarter of a millimetre of every marker, all from the same side. The four
+/// markers shift together, and their pattern does not show it.
 #[test]
 fn markers_that_are_all_covered_from_the_same_side_are_refused() {
     let mut sensor = sensor();
@@ -211,7 +213,7 @@ fn markers_that_are_all_covered_from_the_same_side_are_refused() {
                 patches: MARKERS.iter().map(patch).collect(),
                 ..Options::default()
             };
-            // Too few frames come of markers that are not even found.
+            // Markers that are not found give too few frames.
             if let Ok(outcome) = sensor.tare(FRAMES, at_rest(&scene(&options, 7))) {
                 let refused = Err(Refusal::MarkersImplausible);
                 assert_eq!(outcome, refused, "{depth_mm} mm, {direction}/8");
@@ -222,7 +224,7 @@ fn markers_that_are_all_covered_from_the_same_side_are_refused() {
     assert!(found >= 16, "{found} of 32");
 }
 
-/// A finger that trembles on the film, and one that lies still on it.
+/// A finger trembles on the film, or lies still on it.
 #[test]
 fn a_film_that_moves_or_is_pressed_is_refused() {
     let mut sensor = sensor();
@@ -241,8 +243,8 @@ fn a_film_that_moves_or_is_pressed_is_refused() {
     assert!(tare(|_| 0.0).is_ok());
 }
 
-/// Silicone that has not recovered still presses: from 0.5 mN on, wherever, that is no rest. A
-/// camera that moved is.
+/// Silicone that has not recovered still presses: from 0.5 mN on, at any place, the film is not at
+/// rest. After a shift of the camera it is at rest.
 #[test]
 fn what_still_presses_is_refused_and_a_camera_that_moved_is_tared() {
     let nominal = scene(&Options::default(), 1);
@@ -286,9 +288,8 @@ fn what_still_presses_is_refused_and_a_camera_that_moved_is_tared() {
     }
 }
 
-/// Of units that nothing is known of, pressed by so much when they are tared: how many were
-/// refused, how many forces after the tares that were taken are right, and which are beyond what is
-/// stated.
+/// Tares unknown units under a press of this force. Returns the number of refused tares, the number
+/// of right forces after accepted ones, and the forces with errors beyond their stated uncertainty.
 fn first_tares(units: u64, force_n: f64) -> (u64, usize, Vec<String>) {
     let mut sensor = sensor();
     let mut random = Random::new(11);
@@ -318,7 +319,7 @@ fn first_tares(units: u64, force_n: f64) -> (u64, usize, Vec<String>) {
     (refused, told, wrong)
 }
 
-/// As far as gluing, lens and camera leave it to be seen.
+/// The limits follow from what gluing, lens and camera allow to be seen.
 #[test]
 fn a_first_tare_of_a_pressed_film_is_refused_or_within_what_is_stated() {
     for (force_n, least) in [(0.002, 0), (0.005, 30), (0.01, 54)] {
@@ -327,14 +328,14 @@ fn a_first_tare_of_a_pressed_film_is_refused_or_within_what_is_stated() {
             refused >= least,
             "{force_n} N: {refused} of 60 were refused"
         );
-        // The place of some is a tenth farther off than what is stated.
+        // A few places have errors a tenth larger than stated.
         let most = (told + wrong.len()) / 25;
         assert!(wrong.len() <= most, "{force_n} N: {}", wrong.join("\n"));
     }
 }
 
-/// A rest position that no frame has confirmed, of a camera that shifted since: what is stated
-/// covers that.
+/// No frame has confirmed the rest position, and the camera has shifted since. The stated
+/// uncertainty covers that.
 #[test]
 fn a_shift_since_the_tare_is_within_what_is_stated() {
     let mut sensor = sensor();

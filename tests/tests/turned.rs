@@ -1,4 +1,4 @@
-//! A sensor that is turned over: its film hangs the other way.
+//! Tests of a sensor that is turned over: its film hangs in the other direction.
 
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::Refusal;
@@ -17,8 +17,8 @@ const PRESSES: Contacts = Contacts {
     place_mm: 4.0,
 };
 const PRESSED: usize = 120;
-/// Gravity along the film, where it hangs as one without weight does to a tenth of a pixel: the
-/// default model takes it for its own unit, whose forces it knows best.
+/// Gravity along the film, under which the film hangs like a weightless one, within a tenth of a
+/// pixel. The default model takes it for its own unit, whose forces it knows best.
 const ALONG: [f64; 3] = [1.0, 0.0, 0.0];
 const TOWARDS: [f64; 3] = [0.0, 0.0, -1.0];
 const AWAY: [f64; 3] = [0.0, 0.0, 1.0];
@@ -45,7 +45,7 @@ fn at_rest(scene: &Scene) -> impl Iterator<Item = Frame> {
     (0..4 * u64::from(FRAMES)).map(|number| scene.render_load(&Load::REST, number).unwrap())
 }
 
-/// A sensor that was tared so, when this was known of gravity.
+/// Returns a sensor that was tared in this orientation, with this knowledge of gravity.
 fn tared(down: [f64; 3], known: Down) -> TaredSensor {
     let mut sensor = TaredSensor::of_model(models::anywhere(1)).unwrap();
     sensor.forget_tare();
@@ -54,15 +54,15 @@ fn tared(down: [f64; 3], known: Down) -> TaredSensor {
     sensor
 }
 
-/// What became of presses.
+/// The results of presses.
 #[derive(Debug, Default)]
 struct Pressed {
     right: usize,
     refused: usize,
     wrong: Vec<String>,
-    /// Root mean squares: of the direction, degrees, of |F|, mN, and of the place, mm.
+    /// Root mean square errors: of the direction, degrees, of |F|, mN, and of the place, mm.
     off: [f64; 3],
-    /// Forces of which one of the three is more than three standard uncertainties off.
+    /// Forces with one of the three errors above three standard uncertainties.
     beyond: usize,
 }
 
@@ -102,7 +102,7 @@ fn press(sensor: &mut TaredSensor, scene: &Scene) -> Pressed {
     all
 }
 
-/// Turned over, and every other way.
+/// Presses the sensor turned over, and in every other orientation.
 fn turned_every_way(sensor: &mut TaredSensor, known: impl Fn([f64; 3]) -> Down) -> Vec<Pressed> {
     let ways = [TOWARDS, AWAY].into_iter().chain(BETWEEN);
     let turned = ways.map(|way| {
@@ -114,14 +114,15 @@ fn turned_every_way(sensor: &mut TaredSensor, known: impl Fn([f64; 3]) -> Down) 
     turned.collect()
 }
 
-/// How a sensor that is turned so sees its untouched film.
+/// Measures the untouched film of a sensor in an orientation.
 fn untouched(sensor: &mut TaredSensor, way: [f64; 3]) -> Measurement {
     sensor.sense(&held(way).render_load(&Load::REST, 1).unwrap())
 }
 
 #[test]
 fn a_sensor_that_is_told_how_it_is_held_measures_as_one_that_stays() {
-    // The film that hangs is another unit's to the default model, its own where it does not.
+    // For the default model a film that hangs belongs to another unit; one that does not is its
+    // own.
     for (before, most) in [(TOWARDS, [0.7, 1.0, 0.035]), (ALONG, [0.5, 0.2, 0.015])] {
         let mut sensor = tared(before, told(before));
         let stays = press(&mut sensor, &held(before));
@@ -150,14 +151,15 @@ fn an_untouched_film_that_is_turned_reads_no_contact_and_can_be_tared() {
         assert!(seen.force.unwrap().magnitude.0 < 1_000, "{way:?}: {seen:?}");
         sensor.tare(FRAMES, at_rest(&held(way))).unwrap().unwrap();
     }
-    // Nobody tells that it was turned: the film looks touched.
+    // The host did not report that the sensor was turned: the film looks touched.
     sensor.set_down(told(AWAY));
     sensor.tare(FRAMES, at_rest(&held(AWAY))).unwrap().unwrap();
     let refused = sensor.tare(FRAMES, at_rest(&held(TOWARDS))).unwrap();
     assert!(matches!(refused, Err(Refusal::Touched(_))));
 }
 
-/// What is not told is in the standard uncertainties, and a sensor that stays is not punished.
+/// Unreported turns are within the standard uncertainties, without a penalty for a sensor that
+/// stays.
 #[test]
 fn a_sensor_that_may_be_turned_says_how_little_it_knows() {
     let mut sensor = tared(ALONG, Down::Fixed);
@@ -181,8 +183,8 @@ fn a_sensor_that_may_be_turned_says_how_little_it_knows() {
     }
 }
 
-/// A rest position of which nobody knows which way the sensor was held tells nothing to one that
-/// does know now, until a tare is taken.
+/// The orientation at the tare is unknown. Later knowledge of the orientation has no effect until a
+/// new tare is taken.
 #[test]
 fn a_tare_that_is_older_than_what_is_told_counts_as_any_way() {
     let mut sensor = tared(TOWARDS, Down::Fixed);

@@ -1,5 +1,5 @@
-//! The page of `hivtac view`, and that of a recording, in a real browser, before the firmware in
-//! the rig.
+//! Tests of the page of `hivtac view`, and of the page of a recording, in a real browser, with the
+//! firmware in the rig.
 
 use std::env;
 use std::fs;
@@ -13,23 +13,23 @@ use hivtac_tests::browser::Browser;
 use serde_json::Value;
 
 const PAGE: [u32; 2] = [1280, 1000];
-/// How the page looks at the film to begin with, radians: turned about z, and from above.
+/// The page's initial view of the film, radians: turned about z, and from above.
 const YAW: f64 = -0.5;
 const PITCH: f64 = 0.5;
 
-/// A press that stays, where and how hard: a place in the first row but one, the last column but
-/// one, and the last range of forces.
+/// A press that stays: its place is in the second row and the last column but one, its force in the
+/// last range of forces.
 const STAYS: &str = "[film]\noffset_mm = [2.2, -1.5]\n[load]\nmotion = \"press\"\n[load.press]\n\
                      force_n = 0.18\nstart_s = 1.2\nrise_s = 0.3\nhold_s = 60.0\n";
 
-/// A tool that serves its page. Killed when it is dropped.
+/// A tool that serves its page; killed when it is dropped.
 struct View {
     process: Child,
     address: String,
 }
 
 impl View {
-    /// Of the port `sensor` in a folder.
+    /// Serves the page of the port `sensor` in a folder.
     fn of(folder: &Path) -> View {
         let mut process = Command::new(artifact::named_by("HIVTAC_TOOL"))
             .args([
@@ -55,7 +55,8 @@ impl View {
 }
 
 impl View {
-    /// Of a recording of presses anywhere from the port `sensor` in a folder.
+    /// Records presses anywhere from the port `sensor` in a folder, and serves the recording's
+    /// page.
     fn of_recording(folder: &Path) -> View {
         let record = ["collect", "record", "--into", "unit", "--port", "sensor"];
         let mut process = Command::new(artifact::named_by("HIVTAC_CALIBRATE"))
@@ -73,7 +74,7 @@ impl View {
             let (_, address) = line.split_once("in a browser: ")?;
             Some(address.to_owned())
         });
-        // What it says later is read by nobody, and shall not stop it.
+        // The tool's later output is not used; it is drained to keep the tool running.
         std::thread::spawn(move || said.for_each(drop));
         let mut stdin = process.stdin.take().unwrap();
         stdin.write_all(b"\n\n").unwrap();
@@ -86,7 +87,7 @@ impl View {
 
 impl Drop for View {
     fn drop(&mut self) {
-        // Fails only when it has ended already.
+        // Fails only if the tool has already ended.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
@@ -97,17 +98,17 @@ fn rig(link: &Path) -> Rig {
     Rig::start(&["--scene", "demo", "--seed", "5", "--pty-link", link]).unwrap()
 }
 
-/// Where screenshots go when they are asked for.
+/// Returns the folder for screenshots; `None` if none are wanted.
 fn screenshots() -> Option<PathBuf> {
     env::var_os("HIVTAC_SCREENSHOTS").map(PathBuf::from)
 }
 
-/// A part of the page, as an expression.
+/// Returns a part of the page, as an expression.
 fn part(name: &str) -> String {
     format!("document.querySelector('[data-is=\"{name}\"]')")
 }
 
-/// The angle of a vector of the film on the screen, y down.
+/// Returns the angle on the screen of a vector of the film, y down.
 fn on_screen([x, y, z]: [f64; 3]) -> f64 {
     let right = x * YAW.cos() - y * YAW.sin();
     let away = x * YAW.sin() + y * YAW.cos();
@@ -119,7 +120,7 @@ fn numbers(value: &Value) -> Vec<f64> {
     numbers.map(|number| number.as_f64().unwrap()).collect()
 }
 
-/// The arrow's vector, and its ends on the screen, are those of the true force of its frame.
+/// Checks that the arrow's vector and its ends on the screen are those of its frame's true force.
 fn check_arrow(browser: &mut Browser, rig: &Rig) {
     let shown = format!("{}?.dataset.shown", part("arrow"));
     let shown = browser.until(&shown).unwrap();
@@ -131,7 +132,7 @@ fn check_arrow(browser: &mut Browser, rig: &Rig) {
     let [vector, from, to] = ["vector", "from", "to"].map(|name| numbers(&shown[name]));
     let size = force.iter().map(|part| part * part).sum::<f64>().sqrt();
     for (part, (own, true_part)) in vector.iter().zip(force).enumerate() {
-        // A few tenths of a degree, and a force that changes while it is exposed.
+        // A few tenths of a degree, and the change of the force during its exposure.
         let most = 1.0 + 0.03 * size;
         assert!((own - true_part).abs() < most, "{part}: {shown} {truth}");
     }
@@ -142,7 +143,8 @@ fn check_arrow(browser: &mut Browser, rig: &Rig) {
     assert!(off.to_degrees().abs() < 6.0, "{off}: {shown} {truth}");
 }
 
-/// Waits for a picture that was read with this lowest saturation; gives how many pixels passed.
+/// Waits for a picture that was read with this lowest saturation. Returns the number of accepted
+/// pixels.
 fn passed_at(browser: &mut Browser, saturation: u32) -> u64 {
     let picture = part("picture");
     let passed = format!(
@@ -155,7 +157,7 @@ fn passed_at(browser: &mut Browser, saturation: u32) -> u64 {
 fn check_sliders(browser: &mut Browser) {
     let before = passed_at(browser, 100);
     assert!((400..3000).contains(&before), "four dots: {before}");
-    // By keyboard: chosen, and moved to its end.
+    // By keyboard: the slider is focused, and moved to its end.
     let slider = "document.querySelector('[data-limit=\"lowest saturation\"]')";
     browser.value(&format!("{slider}.focus()")).unwrap();
     browser.key("End", 35).unwrap();
@@ -180,7 +182,7 @@ fn check_lost_and_back(browser: &mut Browser, first: Rig, link: &Path) {
             .unwrap(),
         "–"
     );
-    // The link is left behind by what was killed.
+    // The killed tool leaves its link behind.
     let _ = std::fs::remove_file(link);
     let second = rig(link);
     browser.until(&format!("{connection} === 'good'")).unwrap();
@@ -196,7 +198,7 @@ fn the_page_shows_the_truth_and_does_what_it_is_told() {
     let view = View::of(folder.path());
     let mut browser = Browser::open(&view.address, PAGE).unwrap();
     (0..5).for_each(|_| check_arrow(&mut browser, &first));
-    // A dash until frames came for long enough.
+    // The page shows a dash until frames have come for long enough.
     let rate = format!("{}.textContent.startsWith('156.')", part("rate"));
     browser.until(&rate).unwrap();
     check_sliders(&mut browser);
@@ -212,7 +214,7 @@ fn the_page_shows_the_truth_and_does_what_it_is_told() {
         let is_dark = back == "rgb(22, 22, 21)";
         assert_eq!(is_dark, scheme == "dark", "{back}");
         if let Some(folder) = screenshots() {
-            // With the next drawing in these colours.
+            // The next drawing is in these colours.
             std::thread::sleep(std::time::Duration::from_millis(300));
             browser
                 .keep(&folder.join(format!("view-{scheme}.png")))

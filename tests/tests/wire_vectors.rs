@@ -1,6 +1,6 @@
-//! Golden vectors of the wire format: `tests/vectors/wire.json`, made by an implementation that
-//! shares nothing with the Rust one, equals what `hivtac-wire` writes and reads, and what
-//! `docs/wire.md` quotes.
+//! Tests of the wire format's golden vectors, `tests/vectors/wire.json`. An implementation that
+//! shares no code with the Rust one made them. They equal what `hivtac-wire` writes and reads, and
+//! what `docs/wire.md` quotes.
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
@@ -31,7 +31,7 @@ fn vectors() -> Value {
     serde_json::from_str(VECTORS).expect("tests/vectors/wire.json is JSON")
 }
 
-/// The bytes of hexadecimal text, `#` comments skipped.
+/// Returns the bytes of hexadecimal text without its `#` comments.
 fn bytes_of(text: &str) -> Vec<u8> {
     let codes = text
         .lines()
@@ -45,7 +45,7 @@ fn hex(value: &Value) -> Vec<u8> {
     bytes_of(value.as_str().expect("a string of hexadecimal bytes"))
 }
 
-/// The frames of one section of the vectors by name.
+/// Returns the frames of one section of the vectors by name.
 fn frames(section: &str) -> BTreeMap<String, Vec<u8>> {
     let all = vectors();
     let section = all[section].as_object().expect("a section");
@@ -254,7 +254,7 @@ fn rest() -> RestPosition {
     }
 }
 
-/// Where gravity pulls.
+/// Direction of gravity.
 const DOWN: Direction = Direction([0, 600, -800]);
 
 const NAME_AND_TARE: Selection = Selection {
@@ -314,7 +314,7 @@ fn health() -> DeviceMessage {
     })
 }
 
-/// Of a camera that moved: 0.2 px to the right and 0.1 px up, by 12 m° and 0.3 %.
+/// A camera that moved: 0.2 px to the right and 0.1 px up, by 12 m° and 0.3 %.
 const MOVED: Moved = Moved {
     farthest: Px(20_316),
     shift: (Px(13_107), Px(-6_554)),
@@ -499,7 +499,7 @@ fn decode<M: Message>(bytes: &[u8]) -> (Vec<Received<M>>, Rejected) {
     (messages, decoder.rejected())
 }
 
-/// Every message gives its vector and every vector its message.
+/// Checks that every message gives its vector, and every vector its message.
 fn check_both_ways<M: Message + Clone + PartialEq + std::fmt::Debug>(
     messages: BTreeMap<String, M>,
     frames: BTreeMap<String, Vec<u8>>,
@@ -550,7 +550,8 @@ fn every_kind_of_message_has_a_vector() {
     assert_eq!(requests.len(), 23);
 }
 
-/// Of an earlier version and of a later one: both sides read who speaks, and nothing else.
+/// The hellos are of an earlier and of a later version: both sides read the sender's version, and
+/// nothing else.
 #[test]
 fn foreign_hellos_are_named() {
     let of_version_1 = (1, 0xe67e_c004_10f1_123b);
@@ -572,7 +573,8 @@ fn foreign_hellos_are_named() {
     }
 }
 
-/// What every other version reads of this one's: 0, version, schema, each byte as it always lies.
+/// The bytes of this version's hello that every other version reads: 0, version, schema, at fixed
+/// places.
 #[test]
 fn both_hellos_begin_as_in_every_version() {
     let mut start = vec![0, PROTOCOL_VERSION as u8];
@@ -664,7 +666,7 @@ fn the_document_states_the_limits_of_the_code() {
     }
 }
 
-/// Blocks of the document that open with "```text KIND NAME": name and bytes.
+/// Returns the blocks of the document that open with "```text KIND NAME": name and bytes.
 fn quoted(kind: &str) -> Vec<(&'static str, Vec<u8>)> {
     let opening = format!("text {kind} ");
     let blocks = DOCUMENT.split("```").skip(1).step_by(2);
@@ -677,7 +679,7 @@ fn quoted(kind: &str) -> Vec<(&'static str, Vec<u8>)> {
         .collect()
 }
 
-/// Every frame of the vectors that should decode, or not.
+/// Returns every frame of the vectors, valid ones and invalid ones.
 fn all_frames() -> BTreeMap<String, Vec<u8>> {
     let all = vectors();
     let rejected = all["rejected"].as_object().unwrap().clone();
@@ -716,7 +718,7 @@ fn the_documents_field_by_field_bytes_are_the_contents_of_the_frames() {
     }
 }
 
-/// The content of a good frame, closing zero included in what is given.
+/// Returns the content of a good frame, which is given with its closing zero.
 fn remove_cobs(frame: &[u8]) -> Vec<u8> {
     let mut content = Vec::new();
     let mut rest = frame.strip_suffix(&[0]).expect("a closing zero");

@@ -22,16 +22,16 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | [`film`] | where the film goes under a load, by tables |
+//! | [`film`] | the film's displacement under a load, by tables |
 //! | `camera` | presets, equidistant fisheye |
 //! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |
-//! | `options` | what makes a frame hard, and its ranges |
-//! | `light`, `patch`, `lens` | light and colours; what lies on the film; projection, focus, mounting and shutter |
-//! | `exposure` | where a disc is while its rows are exposed |
+//! | `options` | the conditions that make a frame harder or easier, and their ranges |
+//! | `light`, `patch`, `lens` | light and colours; things on the film; projection, focus, mounting, shutter |
+//! | `exposure` | the place of a disc while its rows are exposed |
 //! | `noise` | seeded sensor noise |
 //! | `format`, `jpeg`, `frame` | RGB565, YUV422, mono and JPEG; the frame and the truth |
 //! | `mechanics`, `surface` | the film as it is, or simplified |
-//! | `creep` | what the film remembers of its loads |
+//! | `creep` | the film's memory of earlier loads |
 //! | `motion`, `scene` | loads in time; the scene itself |
 //! | `file` | scenes from TOML files |
 //! | `hard_cases` | scenes in which markers are hard to find (feature `jpeg`) |

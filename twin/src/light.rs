@@ -83,7 +83,7 @@ impl Light {
         self.film.clone()
     }
 
-    /// Returns the colour of a pixel of which `paint` covers a part (0 to 1).
+    /// Returns the colour of a pixel that `paint` covers by a part (0 to 1).
     pub(crate) fn painted(
         &self,
         pixel: usize,

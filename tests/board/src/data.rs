@@ -1,20 +1,20 @@
-//! The frames and models that are measured, as `benchmark-cases` (in `tests`) wrote them.
+//! The measured frames and models, as `benchmark-cases` (in `tests`) wrote them.
 
 use hivtac_sensor::force::model::AlignedFile;
 
-/// A frame and the model that is for it.
+/// A frame and the model for it.
 pub struct Frame {
     /// Columns and rows.
     pub size: [u16; 2],
-    /// What is special about it; empty for the usual one.
+    /// The frame's special property; empty for the usual one.
     pub special: &'static str,
-    /// RGB565 as the camera's interface leaves it in memory.
+    /// RGB565 in the order in which the camera interface stores it in memory.
     pub pixels: &'static [u8],
     /// A model file.
     pub model: &'static [u8],
 }
 
-/// A model by itself.
+/// A model that is measured alone.
 pub struct Network {
     /// Its layers: `11-64-64-3`.
     pub name: &'static str,
@@ -22,7 +22,7 @@ pub struct Network {
     pub model: &'static [u8],
 }
 
-// `FRAMES` and `NETWORKS`.
+// This file defines `FRAMES` and `NETWORKS`.
 include!(concat!(
     env!(
         "HIVTAC_BOARD_DATA",

@@ -1,10 +1,10 @@
 //! Measures the sensing on an STM32H743 with the core's own cycle counter, and prints
 //! `item|frame|format|cycles` by a debug probe, one line each: the items of `cargo xtask bench`.
 //!
-//! The core runs at 480 MHz from its internal oscillator, so that any board with this chip will do.
-//! Placement is the firmware's (`memory.x`): the sensing's code in ITCM, what it works on in DTCM,
+//! The core runs at 480 MHz from its internal oscillator: any board with this chip works. The
+//! placement is the firmware's (`memory.x`): the sensing's code in ITCM, its working data in DTCM,
 //! the scanner's state in SRAM. Rows are copied to DTCM before they are timed, as is a model that
-//! is measured by itself and fits; other models are read from flash through the data cache.
+//! is measured alone and fits. Other models are read from flash through the data cache.
 #![no_std]
 #![no_main]
 

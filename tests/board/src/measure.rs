@@ -1,4 +1,4 @@
-//! What is timed.
+//! The timed work: the parts of a frame, and an inference.
 
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
@@ -12,29 +12,29 @@ use crate::data::{Frame, Network};
 use crate::dtcm_table::Sensor;
 use crate::meter::Meter;
 
-/// As in the firmware.
+/// The same type as in the firmware.
 
 /// Widest row, in pixels.
 const ROW: usize = MAX_WIDTH as usize;
-/// Rows that arrive at once: those of the firmware's bands.
+/// Rows that arrive together: those of the firmware's bands.
 const BAND_ROWS: usize = 8;
 /// Room for a model in DTCM.
 const MODEL: usize = 16 * 1024;
-/// The first time caches are cold.
+/// Number of repetitions; in the first one caches are cold.
 const REPETITIONS: usize = 2;
 
-/// A model file where the kernels can read whole words.
+/// A model file, aligned so that the kernels can read whole words.
 #[repr(align(8))]
 struct ModelFile([u8; MODEL]);
 
-/// What is too large for DTCM beside the table: as in the firmware.
+/// The parts that do not fit into DTCM together with the table, as in the firmware.
 pub struct Scanners {
     sensor: Sensor,
     scanner: Scanner<64>,
 }
 
 impl Scanners {
-    /// Ready for the first frame.
+    /// Returns them ready for the first frame.
     pub const fn new() -> Scanners {
         Scanners {
             sensor: Sensor::new(),
@@ -43,7 +43,7 @@ impl Scanners {
     }
 }
 
-/// Everything else that is worked on, in DTCM as all statics are.
+/// All other working data, in DTCM as all statics.
 pub struct Workplace {
     inference: Inference,
     row: [u16; ROW],
@@ -51,7 +51,7 @@ pub struct Workplace {
 }
 
 impl Workplace {
-    /// Ready for the first frame.
+    /// Returns it ready for the first frame.
     pub const fn new() -> Workplace {
         Workplace {
             inference: Inference::new(),
@@ -106,7 +106,7 @@ pub fn network(place: &mut Workplace, network: &Network, meter: &Meter) {
     defmt::println!("network {}|320x240|rgb565|{}", network.name, cycles);
 }
 
-/// Cycles of a frame from its first row to the force, and from its last band on.
+/// Returns the cycles of a frame from its first row to the force, and from its last band on.
 fn sense(sensor: &mut Sensor, buffer: &mut [u16; ROW], frame: &Frame, meter: &Meter) -> (u32, u32) {
     let model = parse(frame.model);
     let settings = model.conditions.settings(ByteOrder::Swapped);
@@ -127,14 +127,14 @@ fn sense(sensor: &mut Sensor, buffer: &mut [u16; ROW], frame: &Frame, meter: &Me
     (whole + finish, last_band + finish)
 }
 
-/// Where a frame enters the scanner.
+/// The point at which a frame enters the scanner.
 #[derive(Clone, Copy)]
 enum Entry {
     Pixels,
     Mask,
 }
 
-/// Cycles of the scanner alone, which reads pixels as the sensor was configured to.
+/// Returns the cycles of the scanner alone, which reads pixels by the sensor's configuration.
 fn scan(
     Scanners { sensor, scanner }: &mut Scanners,
     buffer: &mut [u16; ROW],
@@ -171,7 +171,7 @@ fn scan(
     cycles + meter.time(|| scanner.finish(pixels).blobs.len()).1
 }
 
-/// Row `y` in DTCM.
+/// Copies row `y` to DTCM.
 fn copy_row<'r>(row: &'r mut [u16; ROW], frame: &Frame, y: usize) -> &'r [u16] {
     let width = usize::from(frame.size[0]);
     let bytes = frame.pixels.chunks_exact(2 * width).nth(y).unwrap_or(&[]);
@@ -181,7 +181,7 @@ fn copy_row<'r>(row: &'r mut [u16; ROW], frame: &Frame, y: usize) -> &'r [u16] {
     &row[..width]
 }
 
-/// The model, in DTCM where it fits.
+/// Returns the model, in DTCM if it fits.
 fn load<'m>(room: &'m mut ModelFile, file: &'static [u8]) -> Model<'m> {
     match room.0.get_mut(..file.len()) {
         Some(room) => {

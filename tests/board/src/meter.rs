@@ -1,10 +1,10 @@
-//! The core's cycle counter.
+//! A meter that times work by the core's cycle counter.
 
 use cortex_m::peripheral::{DCB, DWT};
 
-/// Times work. Interrupts are off meanwhile.
+/// Times work with interrupts disabled.
 pub struct Meter {
-    /// Cycles of timing nothing.
+    /// Cycles of an empty measurement.
     overhead: u32,
 }
 
@@ -15,7 +15,7 @@ impl Meter {
         DWT::unlock();
         dwt.enable_cycle_counter();
         let mut meter = Meter { overhead: 0 };
-        // The first time it is not in the instruction cache.
+        // The first measurement is not yet in the instruction cache.
         for _ in 0..2 {
             meter.overhead = 0;
             meter.overhead = meter.time(|| ()).1;
@@ -23,7 +23,7 @@ impl Meter {
         meter
     }
 
-    /// Does the work, and says how many cycles it took; at most 2³², 8.9 s.
+    /// Does the work, and returns its result and its cycles; at most 2³², 8.9 s.
     pub fn time<T>(&self, work: impl FnOnce() -> T) -> (T, u32) {
         cortex_m::interrupt::free(|_| {
             let start = DWT::cycle_count();

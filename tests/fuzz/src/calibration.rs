@@ -1,4 +1,5 @@
-//! What calibration reads: data sets, recordings of a unit and a gauge, networks.
+//! Attacks on the files that calibration reads: data sets, recordings of a unit and a gauge,
+//! networks.
 
 use hivtac_calibration::data::collect::assemble::{Gauge, How, assemble};
 use hivtac_calibration::data::collect::folder::Recording;
@@ -9,12 +10,12 @@ use hivtac_calibration::quantize;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
 
-/// Ends one of several files in an input.
+/// The end of one of several files in an input.
 const END: char = '\0';
-/// Sessions of a data set that is looked at further.
+/// Number of sessions up to which a data set is examined further.
 const SESSIONS: usize = 8;
 
-/// A data set is refused, or comes back as it was written and can be worked with.
+/// A data set is refused, or it is the same after it was written and read, and it can be used.
 pub fn dataset(input: &[u8]) -> bool {
     let Some(dataset) = text(input).and_then(|text| Dataset::parse(text).ok()) else {
         return false;
@@ -31,9 +32,9 @@ pub fn dataset(input: &[u8]) -> bool {
     true
 }
 
-/// The files of a recording's folder, one of a gauge and how the sensor was held, with zeros
-/// between them: refused, or made into a data set that can be read, or refused with the reason
-/// then.
+/// The files of a recording's folder, one of a gauge and the sensor's orientation, separated by
+/// zeros. They are refused, or made into a data set that can be read, or refused at that later step
+/// with a reason.
 pub fn recording(input: &[u8]) -> bool {
     let Some(recorded) = text(input) else {
         return false;
@@ -69,8 +70,8 @@ pub fn recording(input: &[u8]) -> bool {
     true
 }
 
-/// Weights, or a network trained elsewhere: refused, or made into a model file that is accepted, or
-/// refused with the reason then.
+/// Weights, or a network trained elsewhere. They are refused, or made into a model file that is
+/// accepted, or refused at that later step with a reason.
 pub fn network(input: &[u8]) -> bool {
     let imported = import::parse(input).is_ok();
     let weights = text(input).and_then(|text| Weights::parse(text).ok());

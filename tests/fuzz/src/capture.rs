@@ -1,5 +1,5 @@
-//! Tracker and follower before a camera interface that says anything at any time: what is delivered
-//! was scanned whole and in order, and every frame is accounted for exactly once.
+//! Attacks on tracker and follower by a camera interface that reports anything at any time. Each
+//! delivered frame was scanned whole and in order, and every frame is counted exactly once.
 
 use std::collections::VecDeque;
 
@@ -9,10 +9,10 @@ use hivtac_capture::{
 };
 
 const SHAPE: Shape = Shape::new(3, 8);
-/// Most steps of one attack.
+/// The largest number of steps of one attack.
 const STEPS: usize = 256;
 
-/// An interface whose every answer is whatever was said last.
+/// An interface whose answers are the values that the attack set last.
 #[derive(Default)]
 struct Chip {
     finished: bool,
@@ -55,21 +55,21 @@ struct World {
     tracker: Tracker,
     follower: Follower,
     events: VecDeque<Event>,
-    /// Where the camera was stopped.
+    /// Number of the frame at which the camera was stopped.
     stopped_at: Option<u32>,
-    /// Frames that the set-up accounts for.
+    /// Frames that the set-up counts.
     elsewhere: u64,
     counted: u64,
-    /// Frames that there were.
+    /// Total number of frames.
     newest: u64,
-    /// Bands of the frame under way that were scanned.
+    /// Scanned bands of the present frame.
     scanned: Vec<Band>,
-    /// The frame delivered last, or the newest one when years had passed.
+    /// The last delivered frame, or the newest one after years have passed.
     newest_delivered: u32,
     delivered: usize,
 }
 
-/// Attacks with the steps that the input says.
+/// Attacks with the steps that the input describes.
 pub fn attack(input: &[u8]) -> bool {
     let mut world = World::new();
     // The end of the input ends the attack.
@@ -113,7 +113,7 @@ impl World {
         match input.int_in_range(0..=9)? {
             0 => self.next_edge(input.int_in_range(1..=3)?),
             1 => self.years_pass(),
-            // The usual: the next band, in the target whose turn it is.
+            // The usual step: the next band, in the other target.
             2 | 3 => {
                 (self.chip.finished, self.chip.second) = (true, !self.chip.second);
                 self.tracker.band_finished(&mut self.chip, tell);
@@ -144,7 +144,8 @@ impl World {
         };
     }
 
-    /// Long enough that numbers begin again after some of these. All is followed before and after.
+    /// Lets enough time pass for the frame numbers to wrap around after several such steps. All
+    /// events are followed before and after it.
     fn years_pass(&mut self) {
         if self.stopped_at.is_some() {
             self.set_up(false);
@@ -155,7 +156,7 @@ impl World {
         self.newest_delivered = self.chip.edge.number;
     }
 
-    /// Stops the camera, or starts a stopped one and accounts for its frames meanwhile.
+    /// Stops the camera, or starts a stopped one and counts the frames of the time between.
     fn set_up(&mut self, restart: bool) {
         let newest = self.chip.edge.number;
         let Some(from) = self.stopped_at.take() else {
@@ -172,7 +173,7 @@ impl World {
         });
     }
 
-    /// The follower takes some events, and says of each band whether it stayed whole.
+    /// Lets the follower take some events; the input decides for each band whether it stayed whole.
     fn follow(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
         for _ in 0..input.int_in_range(1..=8)? {
             let Some(event) = self.events.pop_front() else {
@@ -208,7 +209,8 @@ impl World {
         }
     }
 
-    /// What is delivered was scanned whole, band after band, and is newer than what was before.
+    /// Checks that a delivered frame was scanned whole, band after band, and is newer than the one
+    /// before.
     fn check(&mut self, delivery: &Delivery) {
         let number = delivery.edge.number;
         assert!(number.wrapping_sub(self.newest_delivered).cast_signed() > 0);
@@ -234,7 +236,7 @@ impl World {
         self.counted += all.iter().sum::<u64>();
     }
 
-    /// Once all was followed, the frames that were counted are those that there were.
+    /// Checks, after all events were followed, that the counted frames are all frames.
     fn end(&mut self) {
         if self.stopped_at.is_some() {
             self.set_up(false);
@@ -243,7 +245,7 @@ impl World {
         assert_eq!(self.counted + self.elsewhere, self.newest);
     }
 
-    /// Follows all that came, and passes over what is under way.
+    /// Follows all events, and skips the present frame.
     fn catch_up(&mut self) {
         while let Some(event) = self.events.pop_front() {
             self.take(event, true);

@@ -1,4 +1,5 @@
-//! The corpus of each attack: inputs that came far, and those that once found something.
+//! Tests with the corpus of each attack: inputs that reached deep, and those that once found a
+//! fault.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::ATTACKS;
 
-/// Most bytes of all of it.
+/// The largest size of a corpus in bytes.
 const LARGEST: usize = 64 << 10;
 
 fn here() -> &'static Path {

@@ -1,5 +1,5 @@
-//! Frames of any pixels under any settings: however the rows come, the same is measured; what has
-//! no force says why.
+//! Attacks with frames of any pixels under any settings. The measurement does not depend on how the
+//! rows arrive, and a missing force has a reason.
 
 use arbitrary::{Result, Unstructured};
 use hivtac_sensor::force::forward::Drift;
@@ -17,16 +17,16 @@ use hivtac_terms::units::{Micrometres, Px};
 static DEFAULT: &AlignedFile<[u8]> =
     &AlignedFile(*include_bytes!("../../../calibration/models/default.hvtm"));
 
-/// Most frames of one attack.
+/// The largest number of frames of one attack.
 const FRAMES: usize = 3;
 
-/// A way of giving a sensor the rows of a frame.
+/// A way of passing the rows of a frame to a sensor.
 type Way = fn(&mut Sensor<'_>, &[u16], &mut Unstructured<'_>) -> Result<()>;
 
-/// A painted disc: column, row, radius (px), and what its pixels are.
+/// A painted disc: column, row, radius (px), and the value of its pixels.
 type Disc = (u16, u16, u8, u16);
 
-/// Measures the frames that the input paints under the settings that it says.
+/// Measures the frames that the input paints, under the settings that the input describes.
 pub fn attack(input: &[u8]) -> bool {
     let mut input = Unstructured::new(input);
     // The end of the input ends the attack.
@@ -63,7 +63,7 @@ fn any_settings(input: &mut Unstructured<'_>) -> Result<Settings> {
         false => input.arbitrary(),
     };
     let (width, height) = (side(input)?, side(input)?);
-    // A preset is made for what a frame can be.
+    // A preset is defined only for valid frame sizes.
     let mut geometry = Geometry::preset(preset, width.min(800), height.min(800));
     (geometry.width, geometry.height) = (width, height);
     if input.ratio(1, 4)? {
@@ -87,8 +87,8 @@ fn any_settings(input: &mut Unstructured<'_>) -> Result<Settings> {
     })
 }
 
-/// A frame of one colour with some discs in it, and noise at its beginning; sometimes of a wrong
-/// length.
+/// Returns a frame of one colour with some discs in it, and noise at its beginning. Sometimes its
+/// length is wrong.
 fn paint(settings: &Settings, input: &mut Unstructured<'_>) -> Result<Vec<u16>> {
     let Geometry { width, height, .. } = settings.geometry;
     let columns = settings.threshold.format().row_length(width);
@@ -120,8 +120,8 @@ fn disc(frame: &mut [u16], columns: usize, (x, y, radius, pixel): Disc) {
     }
 }
 
-/// Measures a frame as a whole and in another way of giving its rows, takes it as a rest position,
-/// and measures it against that. Whether there were markers.
+/// Measures a frame as a whole and by another way of passing its rows. Then takes it as a rest
+/// position and measures it against that. Returns whether there were markers.
 fn measure(sensor: &mut Sensor<'_>, frame: &[u16], input: &mut Unstructured<'_>) -> Result<bool> {
     let mut other = Box::new(sensor.clone());
     let whole = sensor.measure_frame(frame);
@@ -130,7 +130,8 @@ fn measure(sensor: &mut Sensor<'_>, frame: &[u16], input: &mut Unstructured<'_>)
     other.begin_frame();
     way(&mut other, frame, input)?;
     assert_eq!(other.finish_frame(), whole);
-    // What an incomplete frame shows last is weighed as far as its pixels are still there.
+    // The weight of the last blobs in an incomplete frame depends on which of its pixels are still
+    // there.
     if !whole.status.intersects(Status::FRAME_INCOMPLETE) {
         assert_eq!(other.blobs(), sensor.blobs());
     }

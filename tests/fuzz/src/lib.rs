@@ -1,12 +1,12 @@
-//! Attacks on everything that reads what others wrote, guided by coverage: one function for each,
-//! which takes any bytes. It panics when something is wrong, and tells otherwise whether the bytes
-//! came as far as what is attacked.
+//! Attacks on everything that reads foreign data, guided by coverage. Each attack is a function
+//! that takes any bytes. It panics if it finds a fault; otherwise it returns whether the bytes
+//! reached the code under attack.
 //!
-//! `cargo xtask test --all attacks` runs each for some seconds where there is a C++ compiler; its
-//! corpus is run by the tests here without. [`ATTACKS`] is the list.
+//! `cargo xtask test --all attacks` runs each for some seconds if there is a C++ compiler. The
+//! tests here run its corpus without one. [`ATTACKS`] is the list.
 //!
-//! To attack longer (`-help=1` has libFuzzer's options; cargo-fuzz can run the targets, too), and
-//! to try an input that was found:
+//! To attack longer (`-help=1` shows libFuzzer's options; cargo-fuzz can run the targets as well),
+//! and to try an input that an attack found:
 //!
 //! ```sh
 //! cd target/xtask/fuzz
@@ -28,10 +28,11 @@ mod scene_file;
 mod storage;
 mod wire;
 
-/// An attack: whether the input came as far as what is attacked.
+/// An attack: returns whether the input reached the code under attack.
 pub type Attack = fn(&[u8]) -> bool;
 
-/// Every attack by the name of its target, which is that of its folder in `tests/fuzz/corpus`, too.
+/// Every attack by the name of its target, which is also the name of its folder in
+/// `tests/fuzz/corpus`.
 pub const ATTACKS: [(&str, Attack); 11] = [
     ("from_device", wire::from_device),
     ("from_host", wire::from_host),
@@ -46,20 +47,20 @@ pub const ATTACKS: [(&str, Attack); 11] = [
     ("network", calibration::network),
 ];
 
-/// The attack of that name.
+/// Returns the attack of that name.
 ///
 /// # Panics
-/// When there is none: a target without its entry in [`ATTACKS`].
+/// If there is no such attack: a target without its entry in [`ATTACKS`].
 pub fn attack(name: &str) -> Attack {
     let found = ATTACKS.iter().find(|(known, _)| *known == name);
     found.expect("every target is listed").1
 }
 
-/// Runs an attack on the files that the command line names; without libFuzzer that is all that a
-/// target does.
+/// Runs an attack on the files that the command line names. Without libFuzzer a target does nothing
+/// else.
 ///
 /// # Panics
-/// When a file cannot be read, and when the attack succeeds.
+/// If a file cannot be read, or the attack finds a fault.
 pub fn replay(name: &str) {
     for path in std::env::args_os().skip(1) {
         let input = std::fs::read(&path).expect("the file can be read");
@@ -68,7 +69,7 @@ pub fn replay(name: &str) {
     }
 }
 
-/// The whole of a fuzz target.
+/// The complete code of a fuzz target.
 #[macro_export]
 macro_rules! target {
     ($name:literal) => {

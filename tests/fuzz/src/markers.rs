@@ -1,4 +1,4 @@
-//! Markers and their rest position, as frames may show them.
+//! Markers and rest positions for attacks, with values that frames may show.
 
 use arbitrary::{Result, Unstructured};
 use hivtac_sensor::force::rest::Rest;
@@ -8,7 +8,7 @@ use hivtac_terms::units::Px;
 /// The longest side of a frame, px.
 const SIDE: i32 = 800;
 
-/// Four markers anywhere on the largest frame.
+/// Returns four markers anywhere on the largest frame.
 pub fn anywhere(input: &mut Unstructured<'_>) -> Result<[Marker; 4]> {
     let mut markers = [Marker {
         x: Px(0),
@@ -27,12 +27,12 @@ pub fn anywhere(input: &mut Unstructured<'_>) -> Result<[Marker; 4]> {
     Ok(markers)
 }
 
-/// Four markers near those of a rest position.
+/// Returns four markers near those of a rest position.
 pub fn near(rest: &Rest, input: &mut Unstructured<'_>) -> Result<[Marker; 4]> {
     let mut markers = rest.markers();
     for marker in &mut markers {
         for Px(coordinate) in [&mut marker.x, &mut marker.y] {
-            // Up to eight pixels.
+            // The shift is up to eight pixels.
             let moved = *coordinate + 16 * i32::from(input.arbitrary::<i16>()?);
             *coordinate = moved.clamp(0, (SIDE << Px::FRACTION_BITS) - 1);
         }

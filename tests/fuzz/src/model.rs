@@ -1,4 +1,4 @@
-//! Model files, and forces by the models that are accepted.
+//! Attacks with model files, and with forces from the models that are accepted.
 
 use arbitrary::{Result, Unstructured};
 use hivtac_sensor::force::features::Features;
@@ -18,8 +18,8 @@ const DEFAULT: &[u8] = include_bytes!("../../../calibration/models/default.hvtm"
 /// Bytes of the checksum at a file's end.
 const CRC_BYTES: usize = 4;
 
-/// The first byte says what file it is: the rest of the input, or one that is right, in which the
-/// input changes some bytes.
+/// The first byte decides the file: the rest of the input, or a valid file in which the input
+/// changes some bytes.
 pub fn attack(input: &[u8]) -> bool {
     let mut input = Unstructured::new(input);
     let file = file(&mut input).unwrap_or_default();
@@ -58,14 +58,14 @@ fn file(input: &mut Unstructured<'_>) -> Result<Vec<u8>> {
     Ok(file)
 }
 
-/// Gives a file the checksum that it should have: no random bytes would.
+/// Gives a file its right checksum, which random bytes would not have.
 fn repair(file: &mut [u8]) {
     if let Some((body, sum)) = file.split_last_chunk_mut::<CRC_BYTES>() {
         *sum = CRC32.checksum(body).to_le_bytes();
     }
 }
 
-/// Whatever an accepted model says, forces are numbers within their ranges.
+/// Checks that the forces of an accepted model are numbers within their ranges.
 fn gives_forces(model: &Model<'_>, input: &mut Unstructured<'_>) -> Result<()> {
     assert!(!model.layers().is_empty() && !model.name().is_empty());
     let settings = model.conditions.settings(ByteOrder::Native);

@@ -1,4 +1,5 @@
-//! Pictures in files: an error names the file, or there are all pixels of a frame.
+//! Attacks with picture files: the result is an error that names the file, or all pixels of a
+//! frame.
 
 use hivtac_host::picture::Picture;
 use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};

@@ -1,8 +1,9 @@
-//! Scene files: an error names what is wrong, or there is a scene that gives frames.
+//! Attacks with scene files: the result is an error that names the cause, or a scene that renders
+//! frames.
 
 use hivtac_twin::Scene;
 
-/// Most pixels of a frame that is rendered.
+/// The largest number of pixels of a frame that is rendered.
 const PIXELS: usize = 80 * 80;
 
 /// Reads the input as a scene file.

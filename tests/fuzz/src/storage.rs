@@ -1,5 +1,5 @@
-//! A log in flash whose words were overwritten, torn or worn in any way: it opens, and what is
-//! saved is there at the next start.
+//! Attacks on a log in flash whose words were overwritten, torn or worn in any way. The log opens,
+//! and saved data are there at the next start.
 
 use core::pin::pin;
 use core::task::{Context, Poll, Waker};
@@ -10,21 +10,21 @@ use hivtac_storage::{Log, PAYLOAD_LIMIT};
 
 const SECTOR_WORDS: u32 = 24;
 const WORDS: usize = 2 * SECTOR_WORDS as usize;
-/// Most steps of one attack.
+/// The largest number of steps of one attack.
 const STEPS: usize = 64;
 
-/// What programming does to a word.
+/// The effect of programming on a word.
 #[derive(Clone, Copy, PartialEq, Eq, arbitrary::Arbitrary)]
 enum Wear {
-    /// It reads as it was programmed.
+    /// The word has the programmed value.
     Good,
-    /// It cannot be read afterwards.
+    /// The word cannot be read afterwards.
     Torn,
-    /// Nothing.
+    /// The word does not change.
     Deaf,
 }
 
-/// Two sectors: what each word reads as, if it can be read, and how worn it is.
+/// Two sectors: each word's value, if it can be read, and its wear.
 struct Cells {
     words: [std::result::Result<Word, Unreadable>; WORDS],
     wear: [Wear; WORDS],
@@ -62,14 +62,14 @@ impl Flash for Mock<'_> {
     }
 }
 
-/// What a device has at its start.
+/// Returns the payload of a device at its start; `None` if its log is empty.
 fn kept(cells: &mut Cells) -> Option<Vec<u8>> {
     let mut payload = [0; PAYLOAD_LIMIT];
     let (_, length) = Log::open(Mock(cells), &mut payload);
     length.map(|length| payload[..length].to_vec())
 }
 
-/// Opens the log and saves something; whether that went well.
+/// Opens the log and saves a payload. Returns whether that succeeded.
 fn save(cells: &mut Cells, payload: &[u8]) -> bool {
     let (mut log, _) = Log::open(Mock(cells), &mut [0; PAYLOAD_LIMIT]);
     let mut context = Context::from_waker(Waker::noop());
@@ -79,7 +79,7 @@ fn save(cells: &mut Cells, payload: &[u8]) -> bool {
     }
 }
 
-/// Attacks with the steps that the input says.
+/// Attacks with the steps that the input describes.
 pub fn attack(input: &[u8]) -> bool {
     let mut cells = Cells {
         words: [Ok(BLANK); WORDS],
@@ -117,19 +117,20 @@ fn step(cells: &mut Cells, input: &mut Unstructured<'_>) -> Result<bool> {
             return Ok(saved_is_kept(cells, payload));
         }
     }
-    // Whatever it is: the same at the next start, too.
+    // The payload, whatever it is, is the same at the next start.
     assert_eq!(kept(cells), kept(cells));
     Ok(false)
 }
 
-/// A word that was programmed reads as another one, but never as if it had not been.
+/// Overwrites a programmed word: it gets a different value, but never a blank one.
 fn overwrite(cell: &mut std::result::Result<Word, Unreadable>, word: Word) {
     if *cell != Ok(BLANK) && word != BLANK {
         *cell = Ok(word);
     }
 }
 
-/// What was saved is there at the next start, and what was not leaves what was before.
+/// Checks that a saved payload is there at the next start, and that a failed save leaves the one
+/// before.
 fn saved_is_kept(cells: &mut Cells, payload: &[u8]) -> bool {
     let before = kept(cells);
     let went_well = save(cells, payload);

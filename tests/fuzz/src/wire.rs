@@ -1,21 +1,22 @@
-//! Both directions of the wire: whatever the stream, messages are whole or counted as thrown away.
+//! Attacks on both directions of the wire: for any stream, messages are whole or counted as
+//! rejected.
 
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{CRC32, DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, Message, encode};
 use hivtac_wire::message::{DeviceMessage, HostMessage};
 
-/// What a host hears.
+/// Attacks the host's receiver.
 pub fn from_device(input: &[u8]) -> bool {
     attack::<DeviceMessage, DEVICE_FRAME_LIMIT>(input)
 }
 
-/// What a device hears.
+/// Attacks the device's receiver.
 pub fn from_host(input: &[u8]) -> bool {
     attack::<HostMessage, HOST_FRAME_LIMIT>(input)
 }
 
-/// Of an input whose first byte is even the rest is the stream as it comes, otherwise the body of a
-/// frame that has what belongs around it: no random bytes have a right checksum.
+/// If the first byte of an input is even, the rest is the raw stream. Otherwise the rest is the
+/// body of a frame with the right framing, because random bytes never have a right checksum.
 fn attack<M: Message, const N: usize>(input: &[u8]) -> bool {
     let Some((kind, rest)) = input.split_first() else {
         return false;
@@ -43,7 +44,7 @@ fn framed(body: &[u8]) -> Vec<u8> {
     frame
 }
 
-/// The messages of a stream as their own frames, and what was thrown away.
+/// Returns the messages of a stream as frames, and the count of rejected data.
 fn at_once<M: Message, const N: usize>(mut stream: &[u8]) -> (Vec<Vec<u8>>, Rejected) {
     let mut decoder = Decoder::<N>::new();
     let mut messages = Vec::new();
@@ -62,7 +63,8 @@ fn byte_by_byte<M: Message, const N: usize>(stream: &[u8]) -> (Vec<Vec<u8>>, Rej
     (messages, decoder.rejected())
 }
 
-/// The frame of a message of ours, which fits what is announced; of a foreign hello none.
+/// Returns the frame of one of our messages, which fits the announced limit; `None` for a foreign
+/// hello.
 fn frame_of<M: Message>(received: &Received<M>) -> Option<Vec<u8>> {
     let Received::Message(message) = received else {
         return None;

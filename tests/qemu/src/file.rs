@@ -1,4 +1,4 @@
-//! Files of the host, through semihosting.
+//! Files of the host, read and written through semihosting.
 
 use core::fmt;
 
@@ -9,16 +9,16 @@ use hivtac_tests::golden::Source;
 const READ_BINARY: usize = 1;
 /// `fopen` mode "wb".
 const WRITE_BINARY: usize = 5;
-/// What semihosting gives when something failed.
+/// Semihosting's result after a failure.
 const FAILED: usize = usize::MAX;
 
 const CHUNK: usize = 4096;
 
-/// A file of the host that is read.
+/// A file of the host that is open for reading.
 pub struct Reader {
     handle: usize,
     buffer: [u8; CHUNK],
-    /// What is left in the buffer.
+    /// The range of unread bytes in the buffer.
     start: usize,
     end: usize,
 }
@@ -63,7 +63,7 @@ impl Source for Reader {
     }
 }
 
-/// A file of the host that is written.
+/// A file of the host that is open for writing.
 pub struct Writer {
     handle: usize,
     buffer: [u8; CHUNK],
@@ -81,7 +81,7 @@ impl Writer {
         })
     }
 
-    /// Writes what is still held.
+    /// Writes the buffered bytes.
     pub fn flush(&mut self) -> Result<(), &'static str> {
         // SAFETY: the buffer is valid for as many bytes as are written.
         let missing = unsafe { syscall!(WRITE, self.handle, self.buffer.as_ptr(), self.length) };
@@ -107,7 +107,7 @@ impl fmt::Write for Writer {
     }
 }
 
-/// The program's name and arguments, separated by blanks.
+/// Returns the program's name and arguments, separated by blanks.
 pub fn command_line(buffer: &mut [u8]) -> Result<&str, &'static str> {
     let mut block = [buffer.as_mut_ptr() as usize, buffer.len()];
     // SAFETY: the block holds the address of the buffer and its length, which the host replaces by

@@ -51,8 +51,8 @@ fn run() -> Result<(), &'static str> {
     })
 }
 
-/// Storage in the memories that the benchmark tells apart (`memory.x`), which QEMU fills with
-/// zeros.
+/// Returns storage in the memories that the benchmark distinguishes (`memory.x`). QEMU fills them
+/// with zeros.
 fn buffers() -> Result<Buffers<'static>, &'static str> {
     let model = cortex_m::singleton!(
         #[unsafe(link_section = ".weights")]

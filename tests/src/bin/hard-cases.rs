@@ -1,16 +1,16 @@
-//! Prints what the sensing makes of the scene's hard cases, as Markdown: `cargo run --release -p
-//! hivtac-tests --bin hard-cases -- [REPEATS [CONTACT]]`.
+//! Prints the results of the sensing on the scene's hard cases, as Markdown: `cargo run --release
+//! -p hivtac-tests --bin hard-cases -- [REPEATS [CONTACT]]`.
 
 use anyhow::{Context, Result};
 use hivtac_tests::hard::{detect_in_all, table};
 use hivtac_tests::tared::{View, views};
 use hivtac_twin::Contact;
 
-/// Frames for each case and load.
+/// Number of frames for each case and load.
 const REPEATS: u64 = 4;
 
 fn main() -> Result<()> {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     let repeats = match std::env::args().nth(1) {
         None => REPEATS,

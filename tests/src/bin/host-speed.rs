@@ -1,8 +1,8 @@
-//! `host-speed FOLDER`: writes the frames that `cargo xtask bench --peers` compares on, times the
-//! sensing on each of them on this computer, and prints one JSON object a line:
+//! `host-speed FOLDER`: writes the frames on which `cargo xtask bench --peers` compares, times the
+//! sensing on each of them on this computer, and prints one JSON object per line:
 //! `{"name":…,"file":…,"size":[columns,rows],"microseconds":…,"markers":…}`.
 //!
-//! What is timed is everything from RGB565 to markers and features, on one thread; the figure is
+//! The timed work is everything from RGB565 to markers and features, on one thread. The result is
 //! the fastest of many repetitions, which a busy computer disturbs least.
 
 use std::path::{Path, PathBuf};
@@ -21,11 +21,11 @@ use serde_json::json;
 
 /// Columns and rows of the frames.
 const SIZES: [[u16; 2]; 4] = [[160, 120], [320, 240], [640, 480], [800, 600]];
-/// How long each frame is repeated.
+/// Time for which each frame is repeated.
 const DURATION: Duration = Duration::from_millis(400);
 
 fn main() -> Result<()> {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
     let folder = folder.context("usage: host-speed FOLDER")?;

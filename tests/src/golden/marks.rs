@@ -1,20 +1,21 @@
-//! Calls that the instruction counter (`xtask/instruction-counter`) knows by their names.
+//! Marker functions for the instruction counter (`xtask/instruction-counter`), which knows their
+//! names.
 
-/// Tells the instruction counter, which knows this function by its name, to count from here on.
+/// Makes the instruction counter, which knows this function by its name, count from here on.
 #[unsafe(no_mangle)]
 #[inline(never)]
 pub(super) extern "C" fn counting_begins() {
     core::hint::black_box(1);
 }
 
-/// Tells the instruction counter to count no longer.
+/// Makes the instruction counter stop.
 #[unsafe(no_mangle)]
 #[inline(never)]
 pub(super) extern "C" fn counting_ends() {
     core::hint::black_box(2);
 }
 
-/// Tells the instruction counter that what comes is done after the frame's last pixel has arrived.
+/// Marks the work after this for the instruction counter as done after the frame's last pixel.
 #[unsafe(no_mangle)]
 #[inline(never)]
 pub(super) extern "C" fn last_band_begins() {

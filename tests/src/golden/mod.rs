@@ -1,9 +1,9 @@
-//! Golden cases: a script of frames and numbers goes in, a text that says every bit of the results
-//! comes out.
+//! Runs golden cases: the input is a script of frames and numbers, the output a text with every bit
+//! of the results.
 //!
-//! A script is a sequence of records, each a kind in one byte and what [`Kind`] says,
-//! little-endian, until its end. Every result is one line, printed by `Debug`: all numbers are
-//! integers, so equal text means equal bits.
+//! A script is a sequence of records until its end. Each is a kind in one byte and the fields that
+//! [`Kind`] lists, little-endian. Every result is one line, printed by `Debug`. All numbers are
+//! integers: equal text means equal bits.
 
 mod marks;
 mod record;
@@ -32,38 +32,38 @@ use marks::{counting_begins, counting_ends, last_band_begins};
 pub use record::{Kind, ScriptError, Source};
 use record::{bytes, fill, number};
 
-/// Room for a model of 11-512-512-512-3 with int16 weights.
+/// Bytes of a model of 11-512-512-512-3 with int16 weights.
 pub const MAX_MODEL_BYTES: usize = 1088 * 1024;
-/// Room for one of int8 weights, which is enough where nothing is counted.
+/// Bytes of such a model with int8 weights, which is enough if no instructions are counted.
 const USUAL_MODEL_BYTES: usize = 600 * 1024;
-/// Storage for that. A constant: a value would cross the stack twice.
+/// Storage for that. It is a constant, because a value would cross the stack twice.
 pub const NO_USUAL_MODEL: AlignedFile<[u8; USUAL_MODEL_BYTES]> =
     AlignedFile([0; USUAL_MODEL_BYTES]);
-/// Storage for a model file, at a multiple of four.
+/// Storage for a model file, at an address that is a multiple of four.
 pub type ModelBuffer = AlignedFile<[u8; MAX_MODEL_BYTES]>;
 /// Storage without a model.
 pub const NO_MODEL: ModelBuffer = AlignedFile([0; MAX_MODEL_BYTES]);
 /// Room for the widest row of pixels.
 pub const MAX_ROW_PIXELS: usize = MAX_WIDTH as usize;
-/// Rows that arrive at once: those of the firmware's bands.
+/// Rows that arrive together: those of the firmware's bands.
 pub const BAND_ROWS: u16 = 8;
 /// Room for two bands of the widest rows.
 pub const TWO_BANDS_PIXELS: usize = 2 * BAND_ROWS as usize * MAX_ROW_PIXELS;
-/// Blobs that a scan keeps.
+/// Number of blobs that a scan keeps.
 pub const BLOBS: usize = 64;
 
-/// Storage for what comes from a script. It is handed in, so that a microcontroller decides which
-/// memory it lies in.
+/// Storage for a script's data. The caller provides it: a microcontroller decides in which memory
+/// it lies.
 pub struct Buffers<'b> {
     /// The model file.
     pub model: &'b mut AlignedFile<[u8]>,
-    /// The row of pixels that is pushed.
+    /// The present row of pixels.
     pub row: &'b mut [u16; MAX_ROW_PIXELS],
-    /// The band that is pushed, and the one above it.
+    /// The present band and the one above it.
     pub bands: &'b mut [u16; TWO_BANDS_PIXELS],
 }
 
-/// Which pixels later frames have, and how they are taken.
+/// The pixel format of later frames, and how their pixels are used.
 #[derive(Clone, Copy)]
 struct PixelSettings {
     order: ByteOrder,
@@ -71,10 +71,10 @@ struct PixelSettings {
     weighted: bool,
 }
 
-/// Everything that runs cases. Large: on a microcontroller it lives in a `static`.
+/// The state for running cases. It is large: on a microcontroller it lives in a `static`.
 pub struct Runner<'b> {
     buffers: Buffers<'b>,
-    /// Where in its buffer the model file lies.
+    /// The range of the model file in its buffer.
     model_place: Range<usize>,
     sent: PixelSettings,
     pixels: Formats<ByteTable>,
@@ -83,7 +83,7 @@ pub struct Runner<'b> {
 }
 
 impl<'b> Runner<'b> {
-    /// Without a model, and with a threshold that accepts nothing.
+    /// Returns a runner without a model, and with a threshold that accepts no pixel.
     pub const fn new(buffers: Buffers<'b>) -> Runner<'b> {
         Runner {
             buffers,
@@ -356,7 +356,7 @@ fn sense_frame(
     Ok(measurement)
 }
 
-/// Reads `height` rows of `length` words one after the other into `row`, and hands out each.
+/// Reads `height` rows of `length` words in turn into `row`, and passes each on.
 fn for_each_row(
     source: &mut impl Source,
     row: &mut [u16],

@@ -1,4 +1,4 @@
-//! What a script is made of, and why it may not run.
+//! The records of a script, and the errors of running it.
 
 use core::fmt;
 
@@ -7,29 +7,29 @@ use hivtac_sensor::markers::scanner::ScanError;
 use hivtac_sensor::markers::settings::SettingsError;
 use hivtac_terms::threshold::ThresholdError;
 
-/// What a record holds.
+/// The kind of a record, with its fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
-    /// Where to lay it, from a multiple of four (u8), length (u32), then the bytes of the model
-    /// file that later records use.
+    /// Offset from a multiple of four at which the model file is stored (u8), length (u32), then
+    /// the bytes of the model file that later records use.
     Model = 1,
-    /// Flags (u8: 1 swaps the bytes, 2 weighs the pixels of a scan, 4 counts what the table takes;
-    /// above them the number of the pixel format), then the threshold (6 × u8) for later frames, as
-    /// a model file has it.
+    /// Flags (u8), then the threshold (6 × u8) for later frames, as in a model file. Flag 1 swaps
+    /// the bytes, 2 weighs the pixels of a scan, 4 counts the instructions for the table. The bits
+    /// above them are the pixel format's number.
     Threshold = 2,
     /// Width, height (u16), dilations, minimum area (u8), then the pixels (u16 each, or for two of
-    /// mono): blobs.
+    /// mono). Result: blobs.
     Scan = 3,
-    /// Width, height, number of frames (u16), then their pixels: the whole pipeline, blobs
+    /// Width, height, number of frames (u16), then their pixels. Result: the whole pipeline, blobs
     /// included.
     Sense = 4,
-    /// Eleven features, then eleven of the rest position (i64): network outputs.
+    /// Eleven features, then eleven of the rest position (i64). Result: network outputs.
     Network = 5,
-    /// Three numbers (i32), taken as a force vector in µN and as α, β in m° and |F| in µN.
+    /// Three numbers (i32). Result: them as a force vector in µN, and as α, β in m° and |F| in µN.
     Force = 6,
     /// x, y (i32) and area (u32) of markers 0–3, then eleven features (i64) and four areas (u32) of
-    /// the rest position: the network and the steps from its answer.
+    /// the rest position. Result: the network and the steps from its answer.
     Press = 7,
 }
 
@@ -45,10 +45,10 @@ impl Kind {
     ];
 }
 
-/// Where a script comes from.
+/// The source of a script.
 pub trait Source {
-    /// Fills as much of the buffer as there is, and says how much: less than all only at the end of
-    /// the script.
+    /// Fills as much of the buffer as possible, and returns the number of bytes. It is less than
+    /// the buffer's length only at the end of the script.
     fn read(&mut self, buffer: &mut [u8]) -> usize;
 }
 
@@ -62,32 +62,32 @@ impl Source for &[u8] {
     }
 }
 
-/// Why a script cannot be run.
+/// The reasons why a script cannot be run.
 #[derive(Debug)]
 pub enum ScriptError {
-    /// It ends inside a record.
+    /// The script ends inside a record.
     Cut,
     /// No record begins with this byte.
     UnknownKind(u8),
-    /// Rows of so many words are longer than the longest.
+    /// Rows of this many words are longer than the longest possible.
     TooWide(usize),
-    /// So many rows of so many words are more than there is room for.
+    /// This number of rows with this many words does not fit into memory.
     TooLarge([usize; 2]),
-    /// A model needs more room than there is.
+    /// The model is larger than its buffer.
     ModelTooLarge(usize),
-    /// A record needs a model, and none came before.
+    /// A record needs a model, but there was none before.
     NoModel,
     /// A record needs a model that takes steps.
     NoSteps,
-    /// The model is not sound.
+    /// The model is invalid.
     Model(ModelError),
     /// No pixel format has this number.
     Format(u8),
-    /// The threshold means nothing.
+    /// The threshold is invalid.
     Threshold(ThresholdError),
     /// The frame cannot be scanned.
     Scan(ScanError),
-    /// The sensor cannot be set so.
+    /// The sensor does not accept these settings.
     Settings(SettingsError),
     /// The results could not be written.
     Output(fmt::Error),

@@ -1,4 +1,4 @@
-//! `docs/dependencies.md` names every package that this project takes from elsewhere.
+//! Tests that `docs/dependencies.md` names every external package of this project.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -6,7 +6,7 @@ use std::path::Path;
 
 use hivtac_tests::workspaces::{files, from_root, packages, root, table_rows};
 
-/// Names of the packages that manifests name without a path, of whatever kind or target.
+/// Returns the names of the dependencies without a path in the manifests, of every kind and target.
 fn used() -> BTreeSet<String> {
     let packages = packages();
     let all = packages
@@ -18,7 +18,7 @@ fn used() -> BTreeSet<String> {
         .collect()
 }
 
-/// The rows of the document that name a package: its name, why it is there, what else there is.
+/// Returns the document's rows that name a package: its name, its purpose, the alternatives.
 fn rows(text: &str) -> Vec<[&str; 3]> {
     let rows = table_rows(text).into_iter();
     let rows = rows.map(|cells| <[&str; 3]>::try_from(cells).expect("a row has three cells"));
@@ -60,7 +60,7 @@ fn every_manifest_belongs_to_a_known_workspace() {
         .iter()
         .map(|package| from_root(Path::new(package["manifest_path"].as_str().unwrap())))
         .collect();
-    // The root's own names packages for its members alone.
+    // The root's manifest only names packages for its members.
     known.insert("Cargo.toml".to_owned());
     let manifests: BTreeSet<String> = files("Cargo.toml").into_iter().collect();
     let unknown: Vec<_> = manifests.difference(&known).collect();

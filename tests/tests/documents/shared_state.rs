@@ -1,11 +1,12 @@
-//! `docs/shared-state.md` lists every static of the firmware with its file.
+//! Tests that `docs/shared-state.md` lists every static of the firmware with its file.
 
 use std::collections::BTreeSet;
 use std::fs;
 
 use hivtac_tests::workspaces::{files, root, table_rows};
 
-/// The name of the static that a line of source declares. Those of the linker are lower case.
+/// Returns the name of the static that a line of source declares; `None` for other lines and for
+/// the linker's statics, which are lower case.
 fn declared(line: &str) -> Option<&str> {
     let line = line.strip_prefix("pub ").unwrap_or(line);
     let rest = line.strip_prefix("static ")?;

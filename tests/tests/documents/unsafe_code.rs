@@ -1,4 +1,4 @@
-//! `docs/unsafe.md` lists every file that says `unsafe`, and how often.
+//! Tests that `docs/unsafe.md` lists every file that contains `unsafe`, with the count.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,7 +6,7 @@ use std::fs;
 use hivtac_tests::workspaces::{files, root, table_rows};
 use proc_macro2::{TokenStream, TokenTree};
 
-/// How often the keyword stands in these tokens, comments and strings aside: blocks, functions,
+/// Counts the keyword in these tokens, without comments and strings: blocks, functions,
 /// implementations, foreign functions and attributes.
 fn count(tokens: TokenStream) -> usize {
     let one = |token: TokenTree| match token {
@@ -23,7 +23,7 @@ fn in_source(name: &str) -> usize {
     count(tokens.unwrap_or_else(|error| panic!("{name}: {error}")))
 }
 
-/// The sources that hold the keyword, with how often.
+/// Returns the sources that contain the keyword, with the count.
 fn in_sources() -> BTreeMap<String, usize> {
     let all = files(".rs").into_iter();
     let counted = all.map(|name| (in_source(&name), name));
@@ -31,7 +31,7 @@ fn in_sources() -> BTreeMap<String, usize> {
     with.map(|(count, name)| (name, count)).collect()
 }
 
-/// The rows of the document that name a file: file, count, reason.
+/// Returns the document's rows that name a file: file, count, reason.
 fn listed(text: &str) -> BTreeMap<String, (usize, &str)> {
     let rows = table_rows(text).into_iter();
     let rows = rows.filter(|cells| cells[0].starts_with('`'));

@@ -1,5 +1,5 @@
-//! Who branches to whom in an ELF for the Cortex-M7: the Thumb code of its functions, read without
-//! a disassembler.
+//! Finds the branches between the functions of an ELF for the Cortex-M7. It decodes the Thumb code
+//! without a disassembler.
 
 use std::collections::BTreeMap;
 
@@ -9,25 +9,26 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind, SymbolKind};
 /// A branch from one function to the start of another, by their mangled names.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Branch {
-    /// Where it is.
+    /// Address of the branch.
     pub address: u64,
-    /// The function that it is in.
+    /// The function that contains it.
     pub from: String,
-    /// The functions that begin where it leads: several names may share their code.
+    /// The functions at the branch's target: several names may share their code.
     pub to: Vec<String>,
 }
 
 /// The functions of an ELF: names and size by address.
 type Functions = BTreeMap<u64, (Vec<String>, u64)>;
 
-/// Every call and every jump from one function to another. Those through registers are not seen.
+/// Returns every call and every jump from one function to another. Branches through registers are
+/// not found.
 ///
 /// # Errors
-/// When the file is no ELF, or has no symbols.
+/// If the file is not an ELF, or has no symbols.
 pub fn branches(elf: &[u8]) -> Result<Vec<Branch>> {
     let file = object::File::parse(elf)?;
     let mut functions = Functions::new();
-    // `$t` begins code and `$d` data.
+    // The symbol `$t` begins code and `$d` begins data.
     let mut is_code = BTreeMap::new();
     for symbol in file.symbols() {
         let (name, address) = (symbol.name()?, symbol.address());
@@ -35,7 +36,7 @@ pub fn branches(elf: &[u8]) -> Result<Vec<Branch>> {
             Some("$t") => drop(is_code.insert(address, true)),
             Some("$d") => drop(is_code.insert(address, false)),
             _ if symbol.kind() == SymbolKind::Text && symbol.size() > 0 => {
-                // Bit 0 of a function's address says that it is Thumb code.
+                // Bit 0 of a function's address marks Thumb code.
                 let entry = functions.entry(address & !1).or_default();
                 entry.0.push(name.to_owned());
                 entry.1 = symbol.size();
@@ -68,7 +69,7 @@ pub fn branches(elf: &[u8]) -> Result<Vec<Branch>> {
     Ok(found)
 }
 
-/// Where the branches of a function are and lead.
+/// Returns the addresses and targets of a function's branches.
 fn targets(code: &[u8], start: u64, is_code: &BTreeMap<u64, bool>) -> Vec<(u64, u64)> {
     let half = |at: usize| {
         Some(u32::from(u16::from_le_bytes([
@@ -84,7 +85,7 @@ fn targets(code: &[u8], start: u64, is_code: &BTreeMap<u64, bool>) -> Vec<(u64, 
             at += 2;
             continue;
         }
-        // 11101, 11110 and 11111 begin instructions of two halves.
+        // 11101, 11110 and 11111 begin instructions of two halfwords.
         let (offset, length) = match first >> 11 {
             0b11101..=0b11111 => (half(at + 2).and_then(|second| wide(first, second)), 4),
             _ => (narrow(first), 2),
@@ -95,7 +96,8 @@ fn targets(code: &[u8], start: u64, is_code: &BTreeMap<u64, bool>) -> Vec<(u64, 
     found
 }
 
-/// The offset of a branch of one half: conditional (T1), or not (T2).
+/// Returns the offset of a branch of one halfword: conditional (T1), or not (T2). Returns `None` if
+/// it is not a branch.
 fn narrow(half: u32) -> Option<i64> {
     match (half >> 12, half >> 8 & 0xF) {
         (0b1101, 0..=13) => Some(signed(half & 0xFF, 8) << 1),
@@ -104,7 +106,8 @@ fn narrow(half: u32) -> Option<i64> {
     }
 }
 
-/// The offset of a branch of two halves: conditional (T3), B.W (T4), or BL.
+/// Returns the offset of a branch of two halfwords: conditional (T3), B.W (T4), or BL. Returns
+/// `None` if it is not a branch.
 fn wide(first: u32, second: u32) -> Option<i64> {
     if first >> 11 != 0b11110 || second >> 15 != 1 {
         return None;
@@ -125,7 +128,7 @@ fn wide(first: u32, second: u32) -> Option<i64> {
     }
 }
 
-/// A number of so many bits with a sign.
+/// Returns a signed number of this many bits.
 fn signed(bits: u32, count: u32) -> i64 {
     i64::from((bits << (32 - count)) as i32 >> (32 - count))
 }
@@ -139,7 +142,7 @@ mod tests {
         targets(&code, 0x1000, &BTreeMap::new())
     }
 
-    /// By the encodings that `llvm-mc` gives.
+    /// The expected encodings are those of `llvm-mc`.
     #[test]
     fn branches_lead_where_they_do() {
         assert_eq!(led_to(&[0xE7FE]), [(0x1000, 0x1000)], "b .");

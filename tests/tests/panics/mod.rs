@@ -1,5 +1,5 @@
-//! What in the firmware could panic, read from the very ELF that is flashed: nothing of the
-//! sensing and of the capture, and of the rest what this list has with its reasons.
+//! Tests which functions of the firmware could panic, from the very ELF that is flashed. Sensing
+//! and capture must have none; the rest must be in this list, with reasons.
 
 mod branches;
 
@@ -8,7 +8,7 @@ use std::fs;
 use branches::{Branch, branches};
 use hivtac_tests::artifact;
 
-/// Parts of the mangled names of what panics.
+/// Parts of the mangled names of panicking functions.
 const PANICS: [&str; 9] = [
     "9panicking",
     "unwrap_failed",
@@ -148,7 +148,8 @@ fn panics(names: &[String]) -> bool {
     names.iter().any(panics)
 }
 
-/// Calls of what panics, but for those in it, and the linker's bridges to it.
+/// Returns the calls of panicking functions, except those within them and the linker's bridges to
+/// them.
 fn sites() -> Vec<Branch> {
     let bytes = fs::read(artifact::named_by("HIVTAC_ELF")).unwrap();
     let branches = branches(&bytes).unwrap();

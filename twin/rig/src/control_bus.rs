@@ -1,8 +1,8 @@
 //! Faults of the camera's control bus: a device that holds a line, and a false bus error.
 //!
 //! While a line is held, I²C1 sees a busy bus and no transfer moves: [`HeldBus`] answers in its
-//! place, and the pins are low. A camera that was interrupted amid a byte releases SDA after nine
-//! clocks, which only the pins as outputs can give.
+//! place, and the pins are low. A camera that was interrupted in the middle of a byte releases SDA
+//! after nine clocks, which only the pins as outputs can give.
 
 use rigless::device::{Device, DeviceContext, Level, RegisterFile};
 use rigless::mcu::Mcu;

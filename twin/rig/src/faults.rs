@@ -12,7 +12,8 @@ pub enum Kind {
     CameraWrongId,
     /// The camera's registers have the values of another program.
     CameraUsed,
-    /// The camera was interrupted amid a byte and holds SDA low until it has had its nine clocks.
+    /// The camera was interrupted in the middle of a byte and holds SDA low until it has had its
+    /// nine clocks.
     SdaStuck,
     /// The camera holds SCL low.
     SclStretch,

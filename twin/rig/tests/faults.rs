@@ -26,8 +26,8 @@ fn a_camera_with_another_id_is_refused() {
     assert_eq!(run.report.sccb_writes, 0);
 }
 
-/// After a reset amid a byte, the microcontroller finds the camera holding SDA; nine clocks free
-/// it.
+/// After a reset in the middle of a byte, the microcontroller finds the camera holding SDA; nine
+/// clocks free it.
 #[test]
 fn a_camera_that_holds_sda_is_freed() {
     let run = Setup::new(firmware(), 240).fault("sda-stuck").run();

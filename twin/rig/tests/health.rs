@@ -144,8 +144,8 @@ fn of_another_answer(file: &[u8]) -> Vec<u8> {
 }
 
 /// The loader's stand-in is absent from USB for a third of a second, and then starts the program by
-/// a jump. The reset for it is not reported as a fault of the program; a plain restart is still
-/// reported.
+/// a jump. The reset for it does not count as a fault of the program: its reason is `Other`. A mere
+/// restart has a reason of its own.
 #[test]
 fn the_parts_own_loader_is_started_on_request_and_leaves_no_trace() {
     const AGAIN: u16 = 41;

@@ -197,7 +197,7 @@ fn a_new_conversation_ends_it_and_can_have_its_own() {
     assert_eq!(outcomes(&run, 8), [Outcome::Done]);
 }
 
-/// The cable is pulled amid the parts and put back: nothing of the snapshot remains.
+/// The cable is pulled between the parts and put back: nothing of the snapshot remains.
 #[test]
 fn a_pulled_cable_ends_it() {
     let again = HELLO_MS + 400;

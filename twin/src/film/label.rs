@@ -18,7 +18,7 @@ pub struct Stage {
     pub tangents: [f64; 2],
     /// The force along that direction, N, > 0.
     pub force_n: f64,
-    /// Where the tip first touches the film, mm.
+    /// Place where the tip first touches the film, mm.
     pub offset_mm: [f64; 2],
     /// The largest ratio of tangential to normal force, up to 0.8. Beyond it the tip slides.
     pub friction: f64,

@@ -26,22 +26,22 @@ use hivtac_tests::{pictures, qemu};
 use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use serde_json::{Value, json};
 
-/// The model that the sensor runs.
+/// Layer widths of the sensor's model.
 const SMALL: [u16; 4] = [11, 64, 64, 3];
-/// The paper's model.
+/// Layer widths of the paper's model.
 const PAPER: [u16; 5] = [11, 512, 512, 512, 3];
 /// Columns and rows of the reference frames.
 const SIZES: [[u16; 2]; 4] = [[160, 120], [320, 240], [640, 480], [800, 600]];
-/// How many frames may be without a force before one has one.
+/// The number of frames without a force after which the search for one with a force fails.
 const ATTEMPTS: u64 = 16;
-/// The sizes whose worst cases are measured: the firmware's and the paper's.
+/// The sizes for which worst cases are measured: the firmware's and the paper's.
 const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
 
-/// Columns of the largest frames that fit a board's flash beside everything else.
+/// Columns of the largest frames that fit into a board's flash together with everything else.
 const WIDEST_ON_BOARD: u16 = 320;
 
 fn main() -> Result<()> {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may close it early.
     sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
     let folder = folder.context("usage: benchmark-cases FOLDER [MICROSECONDS …]")?;
@@ -64,7 +64,7 @@ fn main() -> Result<()> {
 
 struct Case {
     work: Work,
-    /// A model file for such frames.
+    /// A model file for these frames.
     model: Vec<u8>,
     /// Columns and rows.
     size: [u16; 2],
@@ -74,13 +74,13 @@ struct Case {
 enum Work {
     /// One frame through the whole pipeline, as the firmware runs it.
     Frame {
-        /// What is special about it; empty for the usual one.
+        /// The frame's special property; empty for the usual one.
         special: &'static str,
         pixels: Vec<u16>,
     },
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
-    /// The network of a model that tells places, and so many steps from its answer.
+    /// The network of a model that gives places, and this number of steps from its answer.
     Steps(u8, [Marker; 4], Rest),
     /// The threshold's table of 64 KiB.
     Table,
@@ -143,7 +143,7 @@ fn cases() -> Result<Vec<Case>> {
             model: weighted_model?,
             ..case(("weighted", usual.clone()))
         });
-        // What is special are colours, drawn in RGB565.
+        // The special properties are colours, drawn in RGB565.
         if format == PixelFormat::Rgb565 && STRAINED.contains(&size) {
             cases.extend(strained(size, &usual).map(case));
         }
@@ -160,14 +160,14 @@ fn cases() -> Result<Vec<Case>> {
     cases.push(Case {
         work: Work::Table,
         model: Vec::new(),
-        // As many values as a pixel has.
+        // As many pixels as a pixel has values.
         size: [256, 256],
         format: PixelFormat::Rgb565,
     });
     Ok(cases)
 }
 
-/// Steps at a press of 0.1 N off the middle.
+/// Returns the case of steps at a press of 0.1 N off the middle.
 fn stepping(steps: u8) -> Result<Case> {
     let (format, size) = (PixelFormat::Rgb565, [320, 240]);
     let model = models::anywhere(steps);
@@ -186,7 +186,7 @@ fn stepping(steps: u8) -> Result<Case> {
     })
 }
 
-/// Frames of the demo's scene, of the firmware's size.
+/// Returns frames of the demo's scene, of the firmware's size.
 fn demo(times: &[u64]) -> Result<Vec<Case>> {
     let (format, size) = (PixelFormat::Rgb565, [320, 240]);
     let model = model(format, size, BinaryMask)?;
@@ -203,7 +203,7 @@ fn demo(times: &[u64]) -> Result<Vec<Case>> {
     Ok((0..).zip(times).map(case).collect())
 }
 
-/// Rust source that includes what a board can hold, and the files that it includes.
+/// Rust source that includes the cases that fit on a board, and the included files.
 #[derive(Default)]
 struct Board {
     frames: String,
@@ -217,7 +217,7 @@ impl Board {
         match &case.work {
             Work::Steps(..) | Work::Table => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
-            // The board's program reads RGB565.
+            // The board's program only reads RGB565.
             Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),
             Work::Frame {
                 special,
@@ -255,7 +255,7 @@ impl Board {
     }
 }
 
-/// Worst cases beside the usual frame.
+/// Returns the worst cases that are measured in addition to the usual frame.
 fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16>); 4] {
     [
         ("5 % salt", pictures::salted(usual.to_vec(), 5, 1)),
@@ -268,9 +268,9 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
     ]
 }
 
-/// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first
-/// frame that goes all the way to a force, so that all of it is measured. In the smallest frames
-/// noise can make a marker implausible.
+/// Returns the usual frame: the simulated sensor with its usual light and noise under 0.1 N at α =
+/// 4°, β = −3°. It is the first frame with a force, to include every stage in the measurement. In
+/// the smallest frames noise can make a marker implausible.
 fn usual_frame(
     model: &[u8],
     format: PixelFormat,
@@ -301,12 +301,12 @@ fn scene(name: &str, format: PixelFormat, [width, height]: [u16; 2]) -> Result<S
     })?)
 }
 
-/// A frame as it lies in memory.
+/// Returns a frame in the order in which it lies in memory.
 fn frame(scene: &Scene, number: u64, seconds: f64) -> Vec<u16> {
     scene.frame(number, seconds).words().into_owned()
 }
 
-/// The small model, for frames of a size.
+/// Returns the small model, for frames of a size.
 fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Result<Vec<u8>> {
     let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
     let pixels = frame(&scene("rest", format, size)?, 0, 0.0);
@@ -314,7 +314,7 @@ fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Re
     Ok(models::file_for(geometry, format, (centroid, rest), &SMALL))
 }
 
-/// Where a frame shows the markers.
+/// Returns the markers' position in a frame.
 fn position(
     geometry: Geometry,
     format: PixelFormat,
@@ -328,7 +328,7 @@ fn position(
     })
 }
 
-/// What a frame shows.
+/// Returns the measurement of a frame.
 fn seen(
     geometry: Geometry,
     format: PixelFormat,

@@ -31,7 +31,8 @@ const DISC: usize = 9;
 pub struct Weight {
     /// Motion and slopes at rest per function of [`Pull::at_rest`].
     at_rest: [[f64; DISC]; AT_REST],
-    /// What a load adds to the motion along x and along z per function of [`Pull::under_load`].
+    /// The addition by a load to the motion along x and along z per function of
+    /// [`Pull::under_load`].
     under_load: Table,
 }
 

@@ -6,14 +6,14 @@
 //! once. The groups then follow each other as the FIFO is emptied. All effects at a line's
 //! beginning or end keep their times: interrupts of the interface, and of a DMA whose blocks are
 //! whole lines. So does the answer to whether a counter has moved since the last block. A write to
-//! the interface amid the line finds the bytes that have come by then, and the rest comes in
+//! the interface within the line finds the bytes that have come by then, and the rest comes in
 //! groups.
 //!
-//! Differences from the chip: memory that is read amid a line has less of it. If the DMA is stopped
-//! amid a line, the overrun comes at the line's end. If the sensor starts over amid a line, the
-//! rest of that line is lost.
+//! Differences from the chip: memory that is read within a line has less of it. If the DMA is
+//! stopped within a line, the overrun comes at the line's end. If the sensor starts over within a
+//! line, the rest of that line is lost.
 //!
-//! A fault that disturbs the camera or the DMA amid a line keeps that line in groups. A busy bus
+//! A fault that disturbs the camera or the DMA within a line keeps that line in groups. A busy bus
 //! does the same to all lines of a run in which it is ever busy.
 
 use rigless::device::DeviceContext;
@@ -93,7 +93,7 @@ impl Dcmi {
         self.due = (group < to).then_some(Bytes { run, from, to });
     }
 
-    /// Prepares for an access to the interface amid a line that arrives as one event. The bytes
+    /// Prepares for an access to the interface within a line that arrives as one event. The bytes
     /// until now are received, and the rest arrives in groups.
     pub(super) fn catch_up(&mut self, context: &mut DeviceContext<'_>) {
         let (Some(next), Some(frame)) = (self.next, &self.frame) else {
@@ -298,7 +298,7 @@ mod tests {
         );
     }
 
-    /// A DMA that stops amid a line costs the frame, at the latest when the next line begins.
+    /// A DMA that stops within a line costs the frame, at the latest when the next line begins.
     #[test]
     fn words_that_nobody_takes_overrun() {
         let mut bench = Bench::new();
