@@ -136,8 +136,8 @@ fn exposure_and_gain_that_are_set_are_in_use_while_frames_are_counted() {
         assert_eq!(sample.status.0 & dark.0, 0, "{sample:?}");
         assert!(sample.force.is_some(), "{sample:?}");
     }
-    // The difference of device time and true time changes once: the exposure's middle is later in
-    // the frame. It is 1 ms, and both clocks include it.
+    // Device time and true time keep their difference. After the change the exposure's middle is
+    // 1 ms later in the frame, which both times include.
     run.assert_times();
 }
 

@@ -1,3 +1,5 @@
+//! The errors of making and pressing a film.
+
 use std::fmt;
 
 use hivtac_twin::SceneError;

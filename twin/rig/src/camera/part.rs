@@ -22,7 +22,7 @@ pub trait Part: Debug + Send {
     /// Returns the value of a register.
     fn read(&self, address: u8) -> u16;
 
-    /// Returns the answer to a register's read of a different part from the same maker.
+    /// Returns the answer of a different part from the same maker to a read of a register.
     fn read_as_another(&self, address: u8) -> u16;
 
     /// Writes a register. Returns whether the write was a reset of all registers.
