@@ -166,8 +166,8 @@ impl Camera {
         self.focal_px
     }
 
-    /// Returns the place in the picture, px, of the point (x, y, z) mm of the film frame. z must be
-    /// > −10 mm: in front of the pinhole.
+    /// Returns the place in the picture, px, of the point (x, y, z) mm of the film frame. The point
+    /// must be in front of the pinhole: z > −10 mm.
     pub fn project(&self, [x, y, z]: [f64; 3]) -> [f64; 2] {
         let rho = (x * x + y * y).sqrt();
         if rho == 0.0 {

@@ -50,9 +50,9 @@ pub struct Design {
     /// The stretch of the mounted film along x and y, −0.01 to 0.05. With 0.012 it was cut 1.2 %
     /// shorter than it is between the posts.
     pub stretch: [f64; 2],
-    /// Variation of the thickness over the mounted film: t = thickness · (1 + sx X + sy Y + cxx X²
-    /// + cxy X Y + cyy Y²), X = x / 14 mm. This is (sx, sy). The thickness must stay between half
-    /// and twice the nominal one.
+    /// Variation of the thickness over the mounted film. This is (sx, sy) of t = thickness · (1 +
+    /// sx X + sy Y + cxx X² + cxy X Y + cyy Y²), X = x / 14 mm. The thickness must stay between
+    /// half and twice the nominal one.
     pub thickness_slope: [f64; 2],
     /// (cxx, cxy, cyy) of [`Self::thickness_slope`].
     pub thickness_curve: [f64; 3],

@@ -4,9 +4,9 @@ use super::*;
 
 /// A cantilever strip under a force at its end that keeps its direction.
 ///
-/// K. Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145, from elliptic integrals: for P L²/(E I)
-/// = 1, 5 and 10 the end goes down by 0.30172, 0.71379, 0.81061 L and back by 0.05643, 0.38763,
-/// 0.55500 L.
+/// K. Mattiasson, Int. J. Numer. Meth. Engng 17 (1981) 145, from elliptic integrals. For a load P
+/// L²/(E I) of 1, 5 and 10 the end goes down by 0.30172, 0.71379, 0.81061 L and back by 0.05643,
+/// 0.38763, 0.55500 L.
 #[test]
 fn a_cantilever_bends_as_eulers_elastica() {
     let strip = Material {
