@@ -1,19 +1,20 @@
-//! Whether something touches the film.
+//! Decides whether something touches the film.
 
 use hivtac_terms::units::{MicroNewtons, UnsignedMicroNewtons};
 
-/// The least |F| that counts as a contact, however certain it is.
+/// The smallest |F| that counts as a contact, however certain it is.
 pub const LEAST_CONTACT: MicroNewtons = MicroNewtons(2_000);
 /// A contact's |F| is at least this many times its standard uncertainty.
 pub const CONTACT_SIGMAS: u32 = 3;
 
-/// Whether |F| is large and certain enough that something touches the film. Its uncertainty is that
-/// by noise: how strong a unit's film is, is uncertain alike in all frames.
+/// Returns whether |F| is large and certain enough for a contact. `by_noise` is the standard
+/// uncertainty of |F| by noise alone: the strength of a unit's film is a constant error, equal in
+/// all frames.
 pub fn is_contact(magnitude: MicroNewtons, by_noise: UnsignedMicroNewtons) -> bool {
     is_force(magnitude, by_noise, LEAST_CONTACT)
 }
 
-/// Whether |F| is at least as large as that, and as certain as a contact's.
+/// As [`is_contact`], with a smallest |F| of the caller's choice.
 #[inline]
 pub fn is_force(
     magnitude: MicroNewtons,

@@ -1,4 +1,4 @@
-//! The force that explains the markers best, by the film run forwards.
+//! Computes the force that explains the markers best, with the film run forwards.
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
@@ -14,45 +14,47 @@ use hivtac_terms::units::{
     MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
-/// Where a unit's markers rest, and what follows from that before there is a frame.
+/// Where a unit's markers rest, and what follows from that before the first frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Resting {
     mounting: Mounting,
-    /// Whether it is the unit that the model was made on.
+    /// True for the unit that the model was made on.
     is_own: bool,
     px: Markers,
     areas: [f32; DOTS],
-    /// How far that may be from where the film rests; `None` where it is known.
+    /// Covariance of the difference between this and where the film rests; `None` if there is none.
     drift: Option<Covariance>,
-    /// What the film's own weight does; `None` where the tables and the rest position have it.
+    /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     hanging: Option<Hanging>,
 }
 
-/// What is left over of markers that are known less well, in parts of its variance, is seldom more
-/// than this: their uncertainty is stated for the worst of them, which are few (seen at a fifth of
-/// the light: in 1 of 1,000 frames).
+/// Largest usual residual of markers that are known less well, relative to its variance. Their
+/// uncertainty is stated for the worst of them, which are few: at a fifth of the light, 1 of 1,000
+/// frames exceeds this.
 const UNEXPLAINED_BLURRED: f32 = 5.0;
-/// Where the search for a light touch begins, in parts of the largest size.
+/// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
-/// How exactly units are built, as standard deviations: a marker's place along each axis, mm; and
-/// whatever shift and turn its camera has, in parts of the pattern's radius, its focal length and
-/// its distance from the film.
+/// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
+/// axis, mm. `BUILT`: any shift and turn of the camera; focal length and distance from the film as
+/// a fraction of the pattern's radius.
 const GLUED_MM: f32 = 0.15;
 const BUILT: Drift = Drift {
     unseen: [0.1, 0.1, 0.025],
     ..Drift::NONE
 };
-/// Areas at which a marker's noise is known, in parts of the one at rest.
+/// Areas, relative to the area at rest, between which a marker's noise is known.
 const AREAS: [f32; 2] = [0.5, 6.0];
 
 impl Resting {
-    /// For a model that takes steps, and markers that rest there; the film's weight is no matter:
-    /// it hangs as it did when the rest position was taken.
+    /// For a model that takes steps, with markers that rest at `rest`. The film's weight needs no
+    /// correction: gravity is as it was when the rest position was taken. Returns `None` if the
+    /// model takes no steps.
     pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
         Resting::of_turned(model, rest, None)
     }
 
-    /// The same of a sensor that was turned since, and markers that rest there as gravity is now.
+    /// As [`Resting::of_model`], for a sensor that was turned since; `rest` is under today's
+    /// gravity.
     pub fn of_turned(model: &Model<'_>, rest: &Rest, turned: Option<Turned>) -> Option<Resting> {
         let forward = model.forward.as_ref().filter(|forward| forward.steps > 0)?;
         let flat = turned.map_or(*rest, |turned| forward.as_made(rest, turned));
@@ -61,15 +63,15 @@ impl Resting {
         Some(resting)
     }
 
-    /// Says how far the film may rest from there.
+    /// Sets how far the film may rest from this rest position.
     pub fn set_drift(&mut self, drift: &Drift) {
         let is_known = *drift == Drift::NONE;
         self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
     }
 
-    /// For markers that rest there, and at `flat` where gravity pulls as it did on the model's
-    /// film: by what the model knows of the unit that it was made on; of another one by what its
-    /// rest picture tells. The camera of a unit that was calibrated may have been mounted anew.
+    /// For markers that rest at `rest`, and at `flat` under the gravity of the model's film. The
+    /// unit that the model was made on uses what the model knows of it, any other unit its rest
+    /// picture. The camera of a calibrated unit may have been mounted anew.
     fn new(
         forward: &Forward<'_>,
         rest: &Rest,
@@ -79,7 +81,7 @@ impl Resting {
     ) -> Resting {
         let told = forward.rest_image.mounting(flat);
         let near = own.is_near(&flat.features);
-        // The tables are of this unit's own markers.
+        // The tables already include how this unit's markers are glued.
         let known = Mounting {
             per_px: forward.per_px.unwrap_or(told.per_px),
             beside_mm: Markers::default(),
@@ -111,8 +113,9 @@ impl Resting {
         }
     }
 
-    /// The force that another rest position of a unit looks like, µN, and its standard uncertainty
-    /// by noise, whatever the camera did.
+    /// Returns the force, µN, that the difference to another rest position of this unit looks like,
+    /// and its standard uncertainty by noise. The camera may have moved in any way. Returns `None`
+    /// if the model takes no steps.
     pub fn touch(
         model: &Model<'_>,
         rest: &Rest,
@@ -123,8 +126,8 @@ impl Resting {
         Self::touch_by(model, rest, turned, other, (&Drift::MOUNTED_ANEW, noise))
     }
 
-    /// The same of a unit of which no rest position is known, built like the model's, which rests
-    /// there as gravity is now.
+    /// As [`Resting::touch`], for a unit built like the model's whose rest position under today's
+    /// gravity is unknown.
     pub fn touch_of_unit(
         model: &Model<'_>,
         rest: &Rest,
@@ -163,7 +166,7 @@ impl Resting {
         Some((force.magnitude, by_noise))
     }
 
-    /// How markers moved from there. Once in the near memory, which is scarce.
+    /// How the markers moved from rest. Compiled once, because the near memory is scarce.
     #[inline(never)]
     fn observed(
         &self,
@@ -188,7 +191,8 @@ impl Resting {
             let [more_away, more_across] = *at_four_areas;
             let variances = [(away, more_away), (across, more_across)].map(|(at_rest, more)| {
                 let growth = 1.0 + (more - 1.0) * (larger - 1.0) / 3.0;
-                // A law that falls to nothing within the areas would weigh a marker as certain.
+                // Limited from below: a law that falls to 0 within the areas would make a marker
+                // certain.
                 let seen = frame.times * scale * at_rest * growth.max(0.1);
                 seen * seen + blur * blur
             });
@@ -204,7 +208,7 @@ impl Resting {
         }
     }
 
-    /// The load that explains the markers best, from the network's answer on.
+    /// Returns the load that explains the markers best. The steps begin at the network's answer.
     pub fn estimate(
         &self,
         forward: &Forward<'_>,
@@ -224,9 +228,9 @@ impl Resting {
         )
     }
 
-    /// What a sample says of a load that was found in a frame of that noise;
-    /// [`Status::UNEXPLAINED`] when it explains the markers badly, or is the largest that the
-    /// tables hold.
+    /// Returns the force of a load that was found in a frame of this noise, and its status. The
+    /// status is [`Status::UNEXPLAINED`] if the load explains the markers badly, or is the largest
+    /// in the tables.
     pub fn told(
         &self,
         forward: &Forward<'_>,
@@ -244,14 +248,14 @@ impl Resting {
         if estimate.pose.size >= forward.limits.size {
             status |= Status::MAGNITUDE_OUT_OF_RANGE | Status::UNEXPLAINED;
         }
-        // A load that explains nothing tells of no contact.
+        // A load that does not explain the markers is no evidence of a contact.
         if status.contains(Status::UNEXPLAINED) {
             status.0 &= !Status::CONTACT.0;
         }
         (force, status)
     }
 
-    /// The force of [`Self::estimate`] as [`Self::told`], of a frame whose noise is as modelled.
+    /// [`Self::estimate`] and [`Self::told`] in one, for a frame whose noise is as modelled.
     pub fn force(
         &self,
         forward: &Forward<'_>,
@@ -265,7 +269,7 @@ impl Resting {
     }
 }
 
-/// The force of a load, and how uncertain |F| is by noise.
+/// Returns the force of a load, and the standard uncertainty of |F| by noise.
 fn force(strength: &Strength, estimate: &Estimate) -> (Force, UnsignedMicroNewtons) {
     let pose = &estimate.pose;
     let micronewtons = 1e6 * strength.stiffness.magnitude_n(pose.size);
@@ -298,7 +302,8 @@ fn force(strength: &Strength, estimate: &Estimate) -> (Force, UnsignedMicroNewto
     (force, UnsignedMicroNewtons(by_noise))
 }
 
-/// Of direction, |F|, place and |F| by noise: in m°, µN and µm, at least one of each.
+/// Returns the uncertainties of direction, |F|, place and |F| by noise, in m°, µN, µm and µN; each
+/// at least 1.
 fn stated(sigma: Option<Sigma>) -> [u32; 4] {
     let Some(sigma) = sigma else {
         let nothing = i32::MAX as u32;
@@ -315,7 +320,7 @@ fn stated(sigma: Option<Sigma>) -> [u32; 4] {
     [direction, magnitude, place, by_noise].map(|part| rounded(part).max(1).unsigned_abs())
 }
 
-/// To nearest; at the limits of 32 bits beyond them.
+/// Rounds to nearest; saturates at the limits of 32 bits.
 fn rounded(value: f32) -> i32 {
     (value + 0.5f32.copysign(value)) as i32
 }

@@ -1,12 +1,12 @@
-//! The paper's eleven features (Section 5).
+//! Computes the paper's eleven features (Section 5) of four markers.
 
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
-/// How many numbers the features are.
+/// Number of features.
 pub const FEATURES: usize = 11;
-/// How many of them, the first ones, are coordinates; the last is an area.
+/// Number of coordinates, which come first; the last feature is an area.
 pub const COORDINATES: usize = 10;
 
 /// x = [x0, y0, x1, y1, x2, y2, x3, y3, x_rect, y_rect, Area_rect].
@@ -14,15 +14,15 @@ pub const COORDINATES: usize = 10;
 pub struct Features {
     /// Centroids of markers 0–3, (x, y).
     pub centroids: [(Px, Px); 4],
-    /// Centre of their bounding rectangle over the real-valued centroids, (x, y).
+    /// Centre of the bounding rectangle of the real-valued centroids, (x, y).
     pub rect_center: (Px, Px),
-    /// Its area, px² (it overflows 32 bits from VGA up).
+    /// Area of that rectangle, px² (it overflows 32 bits from VGA up).
     pub rect_area: Q<16, i64>,
 }
 
 impl Features {
-    /// The features of four markers. The centre rounds half up to 1/65,536 px, the area to
-    /// 1/65,536 px².
+    /// Returns the features of four markers. The centre is rounded half up to 1/65,536 px, the area
+    /// to 1/65,536 px².
     pub fn of_markers(markers: &[Marker; 4]) -> Features {
         let centroids = markers.map(|marker| (marker.x, marker.y));
         let (left, right) = extent(centroids.map(|c| c.0));
@@ -43,7 +43,7 @@ impl Features {
         [x0, y0, x1, y1, x2, y2, x3, y3, x, y]
     }
 
-    /// The eleven numbers in the paper's order, px and at last px².
+    /// The eleven numbers in the paper's order: px, the last one px².
     pub fn to_array(&self) -> [Q<16, i64>; FEATURES] {
         let mut numbers = [self.rect_area; FEATURES];
         for (number, coordinate) in numbers.iter_mut().zip(self.coordinates()) {
@@ -52,7 +52,7 @@ impl Features {
         numbers
     }
 
-    /// The other way round; centroids and centre must fit 32 bits.
+    /// The inverse of [`Features::to_array`]; centroids and centre must fit 32 bits.
     pub fn from_array(numbers: [Q<16, i64>; FEATURES]) -> Features {
         let px = |i: usize| Px(numbers[i].narrowed().bits());
         Features {
@@ -63,7 +63,7 @@ impl Features {
     }
 }
 
-/// The least and the largest.
+/// The smallest and the largest value.
 fn extent(values: [Px; 4]) -> (Px, Px) {
     let low = values.iter().min().copied();
     let high = values.iter().max().copied();

@@ -1,18 +1,19 @@
-//! One layer of a model, in place in the file.
+//! Gives access to one layer of a model, in place in the file.
 
 use crate::force::packing::{LOADED_AHEAD, ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 
 /// The widest layer a model may have, and the size of the network's two activation buffers.
 pub const MAX_WIDTH: usize = 512;
 
-/// A fully connected layer: `outputs` rows of `inputs` weights, and a bias and rescaling a row.
+/// A fully connected layer: `outputs` rows of `inputs` weights, and for each row a bias and a
+/// rescaling.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Layer<'a> {
     pub(crate) inputs: usize,
     pub(crate) outputs: usize,
     pub(crate) weight_width: WeightWidth,
     pub(crate) largest_activation: u16,
-    /// Packed, and [`LOADED_AHEAD`] zeros after them.
+    /// Packed, followed by [`LOADED_AHEAD`] zeros.
     pub(crate) weights: &'a [u8],
     /// Four bytes each.
     pub(crate) biases: &'a [u8],
@@ -35,18 +36,18 @@ impl<'a> Layer<'a> {
         self.outputs
     }
 
-    /// How wide its weights are.
+    /// The width of its weights.
     pub fn weight_width(&self) -> WeightWidth {
         self.weight_width
     }
 
-    /// What activations are limited to, 1–32,767; 0 in the last layer, which has none.
+    /// Upper limit of its activations, 1–32,767; 0 in the last layer, which has no activations.
     pub fn largest_activation(&self) -> u16 {
         self.largest_activation
     }
 
     /// A weight, −127 to 127 or −32,767 to 32,767; 0 beyond the layer's rows and columns. Slow: for
-    /// looking at a model.
+    /// inspection only.
     pub fn weight(&self, row: usize, column: usize) -> i16 {
         let per_word = self.weight_width.per_word();
         let group = self.groups().nth(row / ROWS_TOGETHER);
@@ -58,7 +59,7 @@ impl<'a> Layer<'a> {
         }
     }
 
-    /// Bias and rescaling of its rows, one for each output.
+    /// Bias and rescaling of each row, one for each output.
     pub fn rows(&self) -> impl Iterator<Item = Row> + use<'a> {
         let (biases, _) = self.biases.as_chunks();
         let (multipliers, _) = self.multipliers.as_chunks();
@@ -72,7 +73,7 @@ impl<'a> Layer<'a> {
             })
     }
 
-    /// Its weights, four rows at a time: for each word's worth of columns, a word of each row.
+    /// Its weights in groups of four rows: for each word's worth of columns, one word of each row.
     pub(crate) fn groups(&self) -> impl Iterator<Item = &'a [[[u8; 4]; ROWS_TOGETHER]]> + use<'a> {
         let packed = self.weights.len().saturating_sub(LOADED_AHEAD);
         let (words, _) = self.weights[..packed].as_chunks::<4>();
@@ -80,12 +81,12 @@ impl<'a> Layer<'a> {
         words.chunks_exact((self.padded_inputs() / self.weight_width.per_word()).max(1))
     }
 
-    /// Columns of the packed weights.
+    /// Number of columns of the packed weights.
     pub(crate) fn padded_inputs(&self) -> usize {
         self.inputs.next_multiple_of(self.weight_width.block())
     }
 
-    /// Rows of the packed weights.
+    /// Number of rows of the packed weights.
     pub(crate) fn padded_outputs(&self) -> usize {
         self.outputs.next_multiple_of(ROWS_TOGETHER)
     }
@@ -96,20 +97,20 @@ impl<'a> Layer<'a> {
         (self.biases, self.multipliers, self.shifts)
     }
 
-    /// Whether every shift is 33 or more, so that the high word of a product says all.
+    /// Whether every shift is 33 or more, so that the high word of a product is enough.
     #[cfg(armv7em)]
     pub(crate) fn rescales_by_high_word(&self) -> bool {
         self.rescales_by_high_word
     }
 
-    /// The packed weights, and [`LOADED_AHEAD`] bytes after them that may be read.
+    /// The packed weights, followed by [`LOADED_AHEAD`] readable bytes.
     #[cfg(armv7em)]
     pub(crate) fn weights_and_more(&self) -> &'a [u8] {
         self.weights
     }
 }
 
-/// What makes an output of a row's sum.
+/// Converts a row's sum to an output.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
     /// Added to the sum.

@@ -1,4 +1,4 @@
-//! Four markers to a force: integers, and single precision in [`forward`].
+//! Turns four markers into a force: in integers, and in single precision in [`forward`].
 //!
 //! ```text
 //! 4 markers → 11 features → quantized MLP → (α, β, |F|) → force + status
@@ -17,9 +17,9 @@
 //! Film frame, right-handed: x right and y down in the image, z = x × y out of the film, away from
 //! the camera.
 //!
-//! F = |F| · (sin α cos β, sin β, −cos α cos β): β's stage carries α's. A press has F_z < 0. The
-//! other way round, α = atan2(Fx, −Fz), −180° < α ≤ 180°, and β = atan2(Fy, √(Fx² + Fz²)), −90° ≤ β
-//! ≤ 90°. Where β = ±90°, and where F = 0, α is 0; where F = 0, so is β.
+//! F = |F| · (sin α cos β, sin β, −cos α cos β): the stage of β carries that of α. A press has F_z
+//! < 0. Inversely, α = atan2(Fx, −Fz), −180° < α ≤ 180°, and β = atan2(Fy, √(Fx² + Fz²)), −90° ≤ β
+//! ≤ 90°. α is 0 if β = ±90° or F = 0; β is 0 if F = 0.
 //!
 //! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at
 //! most 0.5 µN; a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
@@ -60,16 +60,16 @@ use hivtac_terms::units::{
     UnsignedMilliDegrees,
 };
 
-/// Beyond this standard uncertainty a direction is called unreliable: it is half the paper's range
-/// of ±10° (Section 4), so that little more than the sign of α is left.
+/// A direction with a larger standard uncertainty counts as unreliable. The limit is half the
+/// paper's range of ±10° (Section 4): beyond it little more than the sign of α is known.
 pub const UNRELIABLE_DIRECTION: UnsignedMilliDegrees = UnsignedMilliDegrees(5_000);
-/// How far beyond the calibrated range a force still counts as inside: a training set's largest
-/// forces come out a little larger or smaller than they were. |F|: one part in this many.
+/// How far beyond the calibrated range a force still counts as inside: one part in this many of
+/// |F|. The largest forces of a training set come out slightly larger or smaller than they were.
 pub const RANGE_MARGIN: i32 = 20;
-/// The same, for angles.
+/// The same margin for angles.
 pub const ANGLE_MARGIN: MilliDegrees = MilliDegrees(1_000);
 
-/// The same, for each coordinate of the place.
+/// The same margin for each coordinate of the place.
 pub const PLACE_MARGIN: Micrometres = Micrometres(250);
 
 /// Direction and size of a force.
@@ -84,11 +84,12 @@ pub struct Polar {
 }
 
 impl Polar {
-    /// Of a vector (Fx, Fy, Fz). |F| is limited to 2,147.483647 N.
+    /// Of a vector (Fx, Fy, Fz). |F| saturates at 2,147.483647 N.
     pub fn of_vector(vector: [MicroNewtons; 3]) -> Polar {
         let [x, y, z] = vector.map(|component| i64::from(component.0));
         let magnitude = rounded_root(vector.map(square).iter().sum());
-        // Shifted until the largest fills 31 bits, so that a small force keeps its direction.
+        // Shifted until the largest component fills 31 bits, so that a small force keeps its
+        // direction.
         let shift = (x.unsigned_abs() | y.unsigned_abs() | z.unsigned_abs()).leading_zeros();
         let [x, y, z] = [x, y, z].map(|component| component << shift.saturating_sub(33));
         let sideways = rounded_root(x.unsigned_abs().pow(2) + z.unsigned_abs().pow(2));
@@ -111,17 +112,17 @@ impl Polar {
         unit.map(|part| {
             let component: Q<30, i64> =
                 Q::from_bits(i64::from(part.bits()) * i64::from(self.magnitude.0));
-            // A sine may exceed one in its last place.
+            // A sine may exceed 1 in its last digit.
             let limits = (i64::from(-i32::MAX), i64::from(i32::MAX));
             MicroNewtons(component.rounded().clamp(limits.0, limits.1) as i32)
         })
     }
 }
 
-/// The force that a model's outputs mean, and its status bits:
+/// Returns the force that a model's outputs mean, and its status bits:
 /// [`Status::MAGNITUDE_OUT_OF_RANGE`], [`Status::DIRECTION_OUT_OF_RANGE`],
 /// [`Status::DIRECTION_UNRELIABLE`], [`Status::PLACE_OUT_OF_RANGE`] and [`Status::CONTACT`]. A
-/// negative |F| from a model is one of nothing: it becomes 0.
+/// negative |F| from a model becomes 0.
 pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
     let outputs = output.values;
     let (polar, vector) = match model.output {
@@ -148,8 +149,8 @@ pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
     (force, status)
 }
 
-/// How far a force can be trusted, of which |F| is as uncertain by noise, and whether it is of a
-/// contact. The angles count only where the direction does.
+/// Returns the status bits of range, reliability and contact. `by_noise` is the standard
+/// uncertainty of |F| by noise. The range of angles is checked only if the direction is reliable.
 fn trust(force: &Force, by_noise: UnsignedMicroNewtons, range: &CalibratedRange) -> Status {
     let largest = range
         .magnitude
@@ -176,7 +177,7 @@ fn trust(force: &Force, by_noise: UnsignedMicroNewtons, range: &CalibratedRange)
     status
 }
 
-/// The place that a model tells at this |F|.
+/// The place at this |F|; `None` if the model has no place outputs.
 fn place_of(model: &Model<'_>, [x, y]: [i32; 2], magnitude: MicroNewtons) -> Option<Place> {
     model.output.tells_place().then(|| Place {
         x: SignedMicrometres(x),
@@ -185,7 +186,7 @@ fn place_of(model: &Model<'_>, [x, y]: [i32; 2], magnitude: MicroNewtons) -> Opt
     })
 }
 
-/// α and β as the model gives them, brought to the ranges of their meaning.
+/// α and β from the model's outputs, wrapped or limited to their ranges.
 fn of_angles([alpha, beta, magnitude]: [i32; 3]) -> Polar {
     let turned = i64::from(alpha).rem_euclid(360_000) as i32;
     Polar {
@@ -199,13 +200,13 @@ fn of_angles([alpha, beta, magnitude]: [i32; 3]) -> Polar {
     }
 }
 
-/// The product of two numbers within ±1 and a few steps.
+/// The product of two numbers within ±1 and a few steps of rounding.
 fn product(a: Q<30>, b: Q<30>) -> Q<30> {
     let product: Q<60, i64> = Q::from_bits(i64::from(a.bits()) * i64::from(b.bits()));
     product.rounded_to().narrowed()
 }
 
-/// Of a component: at most 2⁶², so that three fit 64 bits, unsigned.
+/// The square of a component: at most 2⁶², so that the sum of three fits 64 bits, unsigned.
 fn square(value: MicroNewtons) -> u64 {
     u64::from(value.0.unsigned_abs()).pow(2)
 }

@@ -1,16 +1,17 @@
-//! The quantized network: the portable definition that every kernel matches bit for bit.
+//! Runs the quantized network. This is the portable definition that every kernel matches bit for
+//! bit.
 //!
-//! Every number is an integer and every rescaling rounds once, half up:
-//! `rescale(a, m, s) = (a·m + 2^(s−1)) >> s`.
+//! Every number is an integer, and every rescaling rounds once, half up: `rescale(a, m, s) = (a·m +
+//! 2^(s−1)) >> s`.
 //!
 //! 1. Input: `x_i = sat16(rescale(f_i − tare_i + rest_i − mean_i, m_i, s_i))`. The difference is
-//!    limited to ±(2³⁸ − 1) first, which no two frames of up to 800 × 800 px exceed; with m < 2²⁴
+//!    first limited to ±(2³⁸ − 1), which no two frames of up to 800 × 800 px exceed. With m < 2²⁴
 //!    the product stays below 2⁶².
 //! 2. Hidden layer: `acc_j = bias_j + Σ w_ji·x_i`, `a_j = clamp(rescale(acc_j, m_j, s_j), 0, A)`
 //!    with the layer's largest activation A.
 //! 3. Output layer: `y_j = sat32(rescale(acc_j, m_j, s_j))`.
 //!
-//! [`Model::parse`] has proven that `acc_j` fits `i32`; with m < 2³¹ the product stays below 2⁶².
+//! [`Model::parse`] proves that `acc_j` fits `i32`; with m < 2³¹ the product stays below 2⁶².
 
 use crate::force::features::{COORDINATES, FEATURES, Features};
 use crate::force::kernels::{Inputs, Sums, activate, multiply};
@@ -19,28 +20,28 @@ use crate::force::model::{InputScaling, Model, OUTPUTS, PLACE_OUTPUTS};
 use crate::force::rescale::{rescale_input, rescale_small_input, rescale_sum};
 use hivtac_terms::fixed::Q;
 
-/// Room for the numbers of one layer.
+/// Buffers for the numbers of one layer.
 #[derive(Clone, Debug)]
 pub struct Network {
-    /// What a layer is fed.
+    /// The inputs of the layer.
     inputs: Inputs,
-    /// What its rows add up to.
+    /// The sums of its rows.
     sums: Sums,
 }
 
-/// What the network makes of one set of features.
+/// The network's outputs for one set of features.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Output {
-    /// The outputs that say a force, in the units of the model's output kind.
+    /// The force, in the units of the model's output kind.
     pub values: [i32; OUTPUTS],
-    /// The outputs that say its place, p_x and p_y in µm; 0 from a model that does not tell it.
+    /// The place, p_x and p_y in µm; 0 if the model has no place outputs.
     pub place: [i32; PLACE_OUTPUTS],
-    /// True when an input met the limits of `i16` (8 σ): far from all that the model was made from.
+    /// True if an input reached the limits of `i16` (8 σ): far from all training data.
     pub input_saturated: bool,
 }
 
 impl Network {
-    /// Room for any model.
+    /// Buffers for any model.
     pub const fn new() -> Network {
         Network {
             inputs: Inputs::new(),
@@ -48,7 +49,7 @@ impl Network {
         }
     }
 
-    /// Runs `model` on `features`, measured from the rest position `tare`.
+    /// Runs `model` on `features`, relative to the rest position `tare`.
     pub fn run(&mut self, model: &Model<'_>, features: &Features, tare: &Features) -> Output {
         let scaled = scale_inputs(&model.input, features, tare, &model.rest.features);
         let inputs = self.inputs.values_mut().iter_mut().zip(&scaled);
@@ -118,7 +119,7 @@ pub fn scale_inputs(
     inputs
 }
 
-/// What is left of step 3 after the sums.
+/// The rescaling of step 3.
 fn output(layer: &Layer<'_>, sums: &Sums, outputs: &mut [i32; OUTPUTS + PLACE_OUTPUTS]) {
     for ((row, sum), output) in layer.rows().zip(sums).zip(outputs) {
         *output = rescale_sum(sum + row.bias, row.multiplier, row.shift);
@@ -135,7 +136,7 @@ mod tests {
     use proptest::prelude::*;
     use std::{vec, vec::Vec};
 
-    /// The arithmetic of `docs/architecture.md` in 128 bits, where nothing can overflow.
+    /// The arithmetic of `docs/architecture.md` in 128 bits, which cannot overflow.
     fn reference(spec: &ModelSpec, features: &Features, tare: &Features) -> Vec<i128> {
         let rescale = |value: i128, multiplier: u32, shift: u8| {
             let exact = value * i128::from(multiplier);
@@ -175,7 +176,7 @@ mod tests {
         values
     }
 
-    /// All outputs that the model has.
+    /// All outputs of the model.
     fn outputs(model: &Model<'_>, output: &Output) -> Vec<i128> {
         let all = output.values.iter().chain(&output.place);
         all.take(model.output.count())
@@ -219,7 +220,7 @@ mod tests {
         features
     }
 
-    /// Random weights as large as its width, and for int16 the proof, allow.
+    /// Random weights as large as their width allows, and for int16 also the proof.
     fn randomize(layer: &mut LayerSpec, largest_input: u32, random: &mut impl FnMut() -> u32) {
         let proven = (1 << 30) / largest_input / u32::from(layer.inputs);
         let largest = proven.min(layer.weight_width.largest_weight().into());
@@ -280,7 +281,7 @@ mod tests {
         }
     }
 
-    /// Every weight, input and activation at its limit, and the widest layers.
+    /// Every weight, input and activation at its limit, in the widest layers.
     #[test]
     fn extremes_of_every_number() {
         for weight in [-127, 127] {
@@ -289,7 +290,7 @@ mod tests {
                 layer.weights.fill(weight);
                 layer.biases.fill(i32::from(weight) * 1000);
                 layer.multipliers.fill((1 << 31) - 1);
-                // The largest values come out as large as they can.
+                // The largest values are not scaled down.
                 layer.shifts.fill(1);
             }
             spec.input.multipliers = [(1 << 24) - 1; FEATURES];
@@ -325,7 +326,7 @@ mod tests {
                 let model = Model::parse(&bytes).unwrap();
                 let far = (extreme(a, area_a), extreme(b, area_b));
                 let found = Network::new().run(&model, &far.0, &far.1);
-                // The reference does not saturate the difference itself; that only matters beyond
+                // The reference does not saturate the difference itself, which matters only beyond
                 // ±2⁶³.
                 if area_a != i64::MIN && area_b != i64::MIN {
                     assert_eq!(outputs(&model, &found), reference(&spec, &far.0, &far.1));
@@ -372,7 +373,7 @@ mod tests {
             check(&spec, &features(seed), &features(!seed));
         }
 
-        /// What enters is features − tare + rest: moving both moves nothing.
+        /// The input is features − tare + rest: moving features and tare equally changes nothing.
         #[test]
         fn a_tare_moves_no_calibration(seed: u64, dx in -100_000i32..100_000) {
             let spec = random_spec(spec(&[11, 8, 3]), seed);

@@ -1,75 +1,76 @@
-//! How noisy frames are: what the film leaves unexplained of one frame beside the frame before.
+//! Measures how noisy frames are, from what the film leaves unexplained in two successive frames.
 //!
-//! Four markers tell eight coordinates, a load explains five of them, and three are left over
-//! whatever the load is. What a thing on the film or an error of the model leaves there hardly
-//! changes from a frame to the next, 6 ms later; what noise leaves there is another draw. So half
-//! the square of the difference of two frames is the variance of noise alone: little light, a high
-//! gain or flickering specks show in it, and a force, a fast one too, does not.
+//! Four markers have eight coordinates, and a load explains five of them. Three are left over,
+//! whatever the load is. An object on the film or a model error leaves nearly the same there in two
+//! successive frames, 6 ms apart; noise leaves independent values. So half the squared difference
+//! of two frames is the variance of noise alone. It shows little light, a high gain or flickering
+//! specks, but no force, not even a fast one.
 
 use crate::force::forward::{Column, UNEXPLAINED, square};
 use crate::force::kernels::sqrt;
 use hivtac_terms::units::Px;
 
-/// Coordinates that are left over.
+/// Number of coordinates that are left over.
 const LEFT_OVER: f32 = 3.0;
-/// The mean variance follows one in this many frames: 0.1 s at 156 frames a second.
+/// Time constant of the mean variance, in frames: 0.1 s at 156 frames a second.
 const FRAMES: f32 = 16.0;
-/// A single frame counts as at most so many times the mean variance: a thing that falls onto the
-/// film moves a marker once.
+/// Limit of a single frame's variance, relative to the mean: an object that falls onto the film
+/// moves a marker once.
 const MOST_AT_ONCE: f32 = 8.0;
-/// The mean of so few frames is off by less than this nearly always: 3 of its standard deviations.
+/// The mean's scatter over this many frames nearly always stays below this: 3 of its standard
+/// deviations.
 const SCATTER: f32 = 0.6;
-/// Noise that is more times as large as modelled makes the judgement of what is left over too dull:
-/// a variance of 10 times (seen of a camera with 4 times the noise: 7).
+/// Largest variance that is accepted, relative to the modelled one. Beyond it the residual no
+/// longer separates good frames from bad. A camera with 4 times the noise reaches 7.
 const LARGEST: f32 = 10.0;
 
-/// How a frame's noise differs from what a model says of its frames.
+/// How a frame's noise differs from the model's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameNoise {
-    /// How many times as large it is, > 0.
+    /// Factor on the modelled noise, > 0.
     pub times: f32,
-    /// A standard uncertainty of each coordinate beside it, 0 or more.
+    /// An additional standard uncertainty of each coordinate, 0 or more.
     pub blur: Px,
 }
 
 impl FrameNoise {
-    /// It does not.
+    /// No difference.
     pub const AS_MODELLED: FrameNoise = FrameNoise {
         times: 1.0,
         blur: Px(0),
     };
 }
 
-/// Noise of the frames up to now.
+/// The noise level of the frames up to now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NoiseLevel {
-    /// What the frame before left over, in parts of the modelled noise.
+    /// Residual of the previous frame, in units of the modelled noise.
     before: Option<Column>,
-    /// What the frame under way does.
+    /// Residual of the current frame.
     now: Option<Column>,
-    /// Mean variance of what is left over, in parts of the modelled one.
+    /// Mean variance of the residual, relative to the modelled one.
     variance: f32,
 }
 
 impl NoiseLevel {
-    /// As large as the model says.
+    /// The level that the model states.
     pub const AS_MODELLED: NoiseLevel = NoiseLevel {
         before: None,
         now: None,
         variance: 1.0,
     };
 
-    /// The next frame does not follow the one before at once.
+    /// Call before a frame that does not immediately follow the previous one.
     pub fn forget_frame(&mut self) {
         (self.before, self.now) = (None, None);
     }
 
-    /// The next frame begins.
+    /// Call at the beginning of each frame.
     pub fn begin_frame(&mut self) {
         self.before = self.now.take();
     }
 
-    /// What to expect of a frame, at least what the model says; with a blur beside it.
+    /// Returns the noise to expect of a frame, at least the model's, with this additional blur.
     pub fn of_frame(&self, blur: Px) -> FrameNoise {
         let variance = (self.variance - SCATTER).clamp(1.0, LARGEST);
         FrameNoise {
@@ -78,10 +79,10 @@ impl NoiseLevel {
         }
     }
 
-    /// Takes what a frame left over when `noise` was expected of it.
+    /// Takes the residual of a frame, in units of the expected `noise`.
     pub fn saw(&mut self, noise: FrameNoise, left: &Column) {
         let left = left.map(|part| part * noise.times);
-        // What the largest noise does not explain is no noise.
+        // A residual beyond the largest noise is not noise.
         self.now = (square(&left) <= LARGEST * UNEXPLAINED).then_some(left);
         let Some((before, left)) = self.before.as_ref().zip(self.now.as_ref()) else {
             return;
@@ -101,7 +102,7 @@ mod tests {
 
     const FOLLOWING: usize = 4_000;
 
-    /// A normal deviate, by the sum of twelve even ones.
+    /// A normal deviate: the sum of twelve uniform ones.
     fn normal(state: &mut u64) -> f32 {
         let mut sum = -6.0;
         for _ in 0..12 {
@@ -113,7 +114,7 @@ mod tests {
         sum
     }
 
-    /// Three coordinates of noise of a size, and what stays or moves slowly in the others.
+    /// Three coordinates with noise of this size; all of them with a constant or slow part.
     fn left(state: &mut u64, times: f32, drift: f32) -> Column {
         let mut left = [drift; 8];
         for part in &mut left[..3] {
@@ -130,8 +131,8 @@ mod tests {
         level.of_frame(Px(0)).times
     }
 
-    /// Noise as modelled is told as it is, but for 1 of 100 frames, whatever stays left over beside
-    /// it.
+    /// With noise as modelled, the factor is 1 but for 1 of 100 frames, whatever constant residual
+    /// there is.
     #[test]
     fn usual_noise_is_as_modelled() {
         for stays in [0.0, 4.0] {
@@ -146,7 +147,7 @@ mod tests {
         }
     }
 
-    /// Larger noise is told within a quarter after 0.2 s, and forgotten as soon.
+    /// After 0.2 s the factor fits larger noise; it falls again as fast.
     #[test]
     fn larger_noise_is_followed() {
         for times in [1.8f32, 3.0] {
@@ -163,7 +164,7 @@ mod tests {
         }
     }
 
-    /// One frame that something moves is one draw too large, not a level.
+    /// One frame in which something moves is one large value, not a level.
     #[test]
     fn a_single_jump_is_no_noise() {
         let (mut level, mut state) = (NoiseLevel::AS_MODELLED, 3);
@@ -174,7 +175,7 @@ mod tests {
             let told = pushed(&mut level, &left(&mut state, 1.0, jump));
             assert!(told < 1.3, "{told}");
         }
-        // The frame after a pause is compared with none.
+        // The frame after a pause has no predecessor to compare with.
         level.forget_frame();
         let before = level.of_frame(Px(0));
         pushed(&mut level, &left(&mut state, 1.0, 0.0));
@@ -182,7 +183,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is left over: never surer than the model, never beyond the largest.
+        /// For any residual, the factor is at least 1 and at most the largest.
         #[test]
         fn it_stays_within_its_limits(
             frames in proptest::collection::vec([any::<f32>(); 8], 1..20),

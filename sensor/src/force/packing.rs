@@ -1,11 +1,11 @@
-//! How weights lie in the model file, so that a kernel reads them one word after the other.
+//! Defines the order of weights in the model file, in which a kernel reads them word by word.
 //!
-//! Four rows go together: for each word's worth of columns, a word of each row. Columns are filled
-//! up with zeros to a whole block of the kernel, rows to a group of four.
+//! Four rows form a group: for each word's worth of columns, one word of each row. Columns are
+//! padded with zeros to a whole block of the kernel, rows to a group of four.
 
 /// Rows whose words alternate.
 pub const ROWS_TOGETHER: usize = 4;
-/// Zeros after the weights: a kernel loads ahead and reads what it does not use.
+/// Zeros after the weights: a kernel loads ahead and reads bytes that it does not use.
 pub(crate) const LOADED_AHEAD: usize = 16;
 
 /// Largest magnitude of an int8 weight.
@@ -36,7 +36,7 @@ impl WeightWidth {
         }
     }
 
-    /// What a weight may be, in words.
+    /// The allowed weights, as text.
     pub(crate) const fn range(self) -> &'static str {
         match self {
             WeightWidth::Int8 => "-127 to 127",
@@ -44,7 +44,7 @@ impl WeightWidth {
         }
     }
 
-    /// Columns are filled up with zeros to a multiple of this: what a kernel takes at a time.
+    /// Columns are padded with zeros to a multiple of this, which a kernel takes at a time.
     pub const fn block(self) -> usize {
         match self {
             WeightWidth::Int8 => 32,
@@ -61,12 +61,12 @@ impl WeightWidth {
     }
 }
 
-/// The four weights of a word of int8: each half is 256·w₁ + w₀, as a number of 16 bits. Only words
-/// of weights beyond −127 to 127 give such.
+/// The four weights of a word of int8. Each half is the 16-bit number 256·w₁ + w₀. Only words whose
+/// weights exceed −127 to 127 give such results.
 pub fn unpack8(word: [u8; 4]) -> [i16; 4] {
     let [[w0, w1], [w2, w3]] = unpack16(word).map(|lane| {
         let low = lane as i8;
-        // 256·w₁, of at most 32,768: it may just leave 16 bits.
+        // 256·w₁ is at most 32,768, which just exceeds 16 bits.
         let high = (i32::from(lane) - i32::from(low)) >> 8;
         [i16::from(low), high as i16]
     });
@@ -91,7 +91,7 @@ pub fn pack16([w0, w1]: [i16; 2]) -> [u8; 4] {
     [a, b, c, d]
 }
 
-/// The bytes of a layer's `rows`, each of so many columns.
+/// Packs a layer's rows of `columns` weights each.
 #[cfg(any(test, feature = "encode"))]
 pub(crate) fn pack(width: WeightWidth, weights: &[i16], columns: usize) -> alloc::vec::Vec<u8> {
     use alloc::vec::Vec;
@@ -143,7 +143,8 @@ mod tests {
         assert_eq!(count, 255 * 255, "no two words for the same weights");
     }
 
-    /// What `hivtac_expand` and `hivtac_dot8` do in a lane, in numbers that cannot overflow.
+    /// The arithmetic of `hivtac_expand` and `hivtac_dot8` in a lane, in numbers that cannot
+    /// overflow.
     #[test]
     fn composite_lanes_give_256_times_the_products() {
         let ends = [-127_i16, -1, 0, 1, 126, 127];

@@ -1,17 +1,17 @@
-//! The network's one rounding: `rescale(a, m, s) = (a·m + 2^(s−1)) >> s`, exact, halves up.
+//! Defines the network's one rounding: `rescale(a, m, s) = (a·m + 2^(s−1)) >> s`, exact, halves up.
 //!
-//! A Cortex-M gives the high word of a product in one instruction. With s ≥ 33 that word is all
-//! that counts: the rounding is a multiple of 2³², leaves the low word as it is, and that falls
-//! away in the shift. What is left, (high + 2^(s−33)) >> (s − 32), is ((high >> (s − 33)) + 1) >>
-//! 1, which cannot overflow.
+//! A Cortex-M computes the high word of a product in one instruction. With s ≥ 33 only that word
+//! counts: the rounding is a multiple of 2³², so the low word stays unchanged and is shifted out.
+//! The rest, (high + 2^(s−33)) >> (s − 32), equals ((high >> (s − 33)) + 1) >> 1, which cannot
+//! overflow.
 
-/// Largest difference of features that enters the rescaling.
+/// Largest difference of features that is rescaled; larger ones are limited to it.
 const LARGEST_DIFFERENCE: i64 = (1 << 38) - 1;
-/// Bits that an input's multiplier, below 2²⁴, lacks to 2³¹.
+/// Bits between an input's multiplier, below 2²⁴, and 2³¹.
 const SPARE_BITS: u32 = 7;
 
-/// sat16(rescale(value, m, s)) with m < 2²⁴ and s of 1 to 62. The value is limited to ±(2³⁸ − 1)
-/// first.
+/// sat16(rescale(value, m, s)) with m < 2²⁴ and s of 1 to 62. The value is first limited to ±(2³⁸ −
+/// 1).
 pub fn rescale_input(value: i64, multiplier: u32, shift: u8) -> i16 {
     match i32::try_from(value) {
         Ok(value) => rescale_small_input(value, multiplier, shift),
@@ -19,10 +19,10 @@ pub fn rescale_input(value: i64, multiplier: u32, shift: u8) -> i16 {
     }
 }
 
-/// [`rescale_input`] of what fits 32 bits, as every difference of coordinates in a frame does.
+/// [`rescale_input`] for 32 bits, which hold every difference of coordinates in a frame.
 #[inline(always)]
 pub fn rescale_small_input(value: i32, multiplier: u32, shift: u8) -> i16 {
-    // The same with m and 2^s made larger by as much.
+    // Equal to the definition with m and 2^s both multiplied by 2^[`SPARE_BITS`].
     let beyond = u32::from(shift).wrapping_sub(33 - SPARE_BITS);
     if beyond < 31 {
         let rounded = of_high_word(value, multiplier << SPARE_BITS, beyond);
@@ -43,7 +43,7 @@ pub fn rescale_sum(sum: i32, multiplier: u32, shift: u8) -> i32 {
     }
 }
 
-/// rescale(value, m, beyond + 33) with m < 2³¹ and `beyond` of 0 to 30. It lies within ±2³⁰.
+/// rescale(value, m, beyond + 33) with m < 2³¹ and `beyond` of 0 to 30. The result is within ±2³⁰.
 #[inline(always)]
 fn of_high_word(value: i32, multiplier: u32, beyond: u32) -> i32 {
     let high = (i64::from(value) * i64::from(multiplier as i32)) >> 32;

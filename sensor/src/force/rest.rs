@@ -1,4 +1,4 @@
-//! The rest position: where the untouched film has its markers.
+//! Holds the rest position: where the markers are while nothing touches the film.
 
 use crate::force::features::Features;
 use crate::markers::rules::pattern::{Pattern, distance};
@@ -9,8 +9,9 @@ use hivtac_terms::units::Px;
 /// The longest side of a picture, px.
 const LARGEST_SIDE: i32 = 800;
 
-/// The untouched film of the same unit has its markers no farther from its rest position than this,
-/// beside what its camera did: half a pixel. What touches it, and another unit, moves one farther.
+/// Half a pixel. After the camera's motion is removed, the untouched film of the same unit has all
+/// markers within this of its rest position. A touch, or another unit's film, moves one of them
+/// farther.
 pub const NEAR: Px = Px(Px::ONE.0 / 2);
 
 /// A rest position.
@@ -23,7 +24,7 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// Of these markers.
+    /// The rest position of these markers.
     pub fn of_markers(markers: &[Marker; 4]) -> Rest {
         Rest {
             features: Features::of_markers(markers),
@@ -31,7 +32,7 @@ impl Rest {
         }
     }
 
-    /// Whether all coordinates of these markers are within [`NEAR`] of it.
+    /// Returns whether all coordinates of these markers are within [`NEAR`] of the rest position.
     pub fn is_near(&self, features: &Features) -> bool {
         let near = |a: Px, b: Px| a.0.abs_diff(b.0) <= NEAR.0.unsigned_abs();
         let pairs = self.features.centroids.iter().zip(&features.centroids);
@@ -49,8 +50,8 @@ impl Rest {
         })
     }
 
-    /// The same whose markers lie so many px farther. The bounding rectangle of a mean is not the
-    /// mean of rectangles: what it changes by is added.
+    /// Returns the rest position with each marker moved by `px`. The bounding rectangle of a mean
+    /// is not the mean of rectangles, so the rectangle's change is added.
     pub fn displaced(&self, px: &[[f32; 2]; 4]) -> Rest {
         let mut markers = self.markers();
         let before = Features::of_markers(&markers);
@@ -75,8 +76,8 @@ impl Rest {
         }
     }
 
-    /// Whether it can be a rest position: inside the largest picture, with markers of at least a
-    /// pixel.
+    /// Returns whether this can be a rest position: inside the largest picture, with markers of at
+    /// least a pixel.
     pub fn is_sound(&self) -> bool {
         let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
         let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;
@@ -87,10 +88,9 @@ impl Rest {
             && self.areas.iter().all(|area| (1..=largest).contains(area))
     }
 
-    /// Whether the markers are as far from their common centre as a film at rest shows them, to
-    /// 15 %. That leaves room for a film 1.5 mm nearer or farther and for markers 0.7 mm off their
-    /// places, and refuses a film that something presses: every force against such a rest would be
-    /// wrong.
+    /// Returns whether the markers' mean distance from their common centre fits a film at rest, to
+    /// 15 %. That allows a film 1.5 mm nearer or farther, and markers 0.7 mm off their places. It
+    /// refuses a film that is pressed: every force against such a rest position would be wrong.
     pub fn fits(&self, geometry: &Geometry) -> bool {
         let center = Pattern::of_centroids(self.features.centroids).center;
         let [a, b, c, d] = self.features.centroids.map(|point| distance(point, center));

@@ -38,7 +38,7 @@ fn vector_error(polar: Polar) -> f64 {
 fn polar_error(vector: [MicroNewtons; 3]) -> [f64; 3] {
     let [x, y, z] = vector.map(|component| f64::from(component.0));
     let found = Polar::of_vector(vector);
-    // Along y there is no α, and it is said to be 0.
+    // Along y, α is 0 by definition.
     let alpha = if x == 0.0 && z == 0.0 {
         0.0
     } else {
@@ -114,7 +114,7 @@ fn the_largest_vectors_saturate() {
     }
 }
 
-/// What a network says of a force alone.
+/// The output of a network that gives only a force.
 fn output(values: [i32; 3]) -> Output {
     Output {
         values,
@@ -178,7 +178,7 @@ fn odd_angles_are_brought_into_their_range() {
     assert!((-180_000..=180_000).contains(&force.alpha.0));
 }
 
-/// What a contact's status says beside that it is one.
+/// The status of a contact, without its contact bit.
 fn of_contact(status: Status) -> Status {
     assert!(status.contains(Status::CONTACT));
     Status(status.0 & !Status::CONTACT.0)
@@ -246,7 +246,7 @@ fn a_force_carries_the_uncertainty_of_its_size() {
     }
 }
 
-/// Places to 4 mm and a margin of 0.25 mm, told only of what touches the film.
+/// Places to 4 mm, a margin of 0.25 mm; the place is checked only during a contact.
 #[test]
 fn trust_in_a_place() {
     let mut spec = place_spec(&[11, 5]);

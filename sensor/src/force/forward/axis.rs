@@ -1,42 +1,42 @@
-//! Cubic splines along one axis of the film.
+//! Evaluates cubic splines along one axis of the film.
 
 use hivtac_terms::fixed::Q;
 
-/// How many coefficients a spline's value at a point is made of.
+/// Number of coefficients that make a spline's value at a point.
 pub const SPAN: usize = 4;
-/// The least and the most nodes of an axis.
+/// Allowed number of nodes.
 pub const NODES: core::ops::RangeInclusive<usize> = 6..=16;
-/// What weights add up to, in steps of 2⁻¹⁵: the largest i16, as one itself does not fit.
+/// The sum of a value's weights, in steps of 2⁻¹⁵: the largest i16, as 2¹⁵ itself does not fit.
 pub const ONE: f32 = 32_767.0;
-/// 3·2²²: what is added to it is rounded to whole numbers, as f32 has no smaller steps there, and
-/// those of 16 bits are then the low half of its bits.
+/// 3·2²². A number added to it is rounded to an integer, because f32 has no smaller steps there.
+/// Numbers of 16 bits are then the low half of its bits.
 const WHOLE: f32 = 12_582_912.0;
 
-/// The nodes of cubic splines, which are sums of B-splines: one for each node, smooth over the
-/// second node and the last but one (not-a-knot). Borrowed from a file.
+/// The nodes of cubic splines, borrowed from a file. A spline is a sum of B-splines, one for each
+/// node, and smooth over the second and the last but one node (not-a-knot).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis<'a> {
     /// f32 each, mm.
     nodes: &'a [[u8; 4]],
-    /// What slopes' weights are in parts of, 1/mm.
+    /// Unit of the slopes' weights, 1/mm.
     slope_unit: f32,
 }
 
-/// What the value and the slope at a point are made of: so much of each coefficient from the first
-/// on.
+/// The weights of four successive coefficients in the value and the slope at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
     /// The first coefficient.
     pub first: usize,
-    /// Parts of the value, [`ONE`] in all; their sizes add up to at most that and four roundings.
+    /// Weights of the value, [`ONE`] in sum. Their absolute values add up to at most [`ONE`] and
+    /// four roundings.
     pub values: [Q<15, i16>; SPAN],
-    /// Parts of the slope in units of [`Axis::slope_unit`], likewise.
+    /// Weights of the slope in units of [`Axis::slope_unit`], with the same limit.
     pub slopes: [Q<15, i16>; SPAN],
 }
 
 impl<'a> Axis<'a> {
-    /// Of growing nodes, f32 each, between ±100 mm, at least 0.01 mm apart; `None` of others, or of
-    /// too few or too many.
+    /// Takes rising nodes, f32 each. Returns `None` if their number is not in [`NODES`], one is
+    /// beyond ±100 mm, or two are less than 0.01 mm apart.
     pub fn new(nodes: &'a [[u8; 4]]) -> Option<Axis<'a>> {
         let mm = |node: &[u8; 4]| f32::from_le_bytes(*node);
         let grow = nodes
@@ -50,8 +50,8 @@ impl<'a> Axis<'a> {
             nodes,
             slope_unit: 0.0,
         };
-        // Parts of B-splines of the second degree add up to one, over at least the narrowest span:
-        // the slopes' parts, differences of three times these, add up to at most six over it.
+        // Weights of quadratic B-splines add up to one. The slope's weights are differences of
+        // three times these, over at least the narrowest span: at most six over that span.
         let spans = (SPAN - 1..nodes.len()).map(|span| axis.knot_mm(span + 1) - axis.knot_mm(span));
         axis.slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
         Some(axis)
@@ -61,8 +61,8 @@ impl<'a> Axis<'a> {
         f32::from_le_bytes(self.nodes.get(nth).copied().unwrap_or_default())
     }
 
-    /// Four times the first node, the nodes but the outer two at each end, four times the last
-    /// node.
+    /// Knots: four times the first node, the nodes but the outer two at each end, four times the
+    /// last node.
     fn knot_mm(&self, nth: usize) -> f32 {
         self.node_mm(match nth {
             0..SPAN => 0,
@@ -71,7 +71,7 @@ impl<'a> Axis<'a> {
         })
     }
 
-    /// How many nodes it has.
+    /// Number of nodes.
     pub fn count(&self) -> usize {
         self.nodes.len()
     }
@@ -81,21 +81,21 @@ impl<'a> Axis<'a> {
         [self.node_mm(0), self.node_mm(self.count() - 1)]
     }
 
-    /// What slopes' weights are in parts of, 1/mm.
+    /// Unit of the slopes' weights, 1/mm.
     pub fn slope_unit(&self) -> f32 {
         self.slope_unit
     }
 
-    /// What the value and the slope at x are made of; beyond an end, those at the end.
+    /// Returns the weights of the value and the slope at x; beyond an end, those at the end.
     pub fn at(&self, x_mm: f32) -> Weights {
         let [from, to] = self.ends_mm();
-        // A value that is no number is at the first node.
+        // NaN counts as the first node.
         let x = if x_mm > from { x_mm.min(to) } else { from };
         let inner = SPAN..self.count();
         let first = inner.take_while(|knot| self.knot_mm(*knot) <= x).count();
         let [a, b, c, d, e, f] = core::array::from_fn(|k| self.knot_mm(first + 1 + k));
-        // Cox and de Boor's recurrence, for the span from c to d; the slopes are made of the
-        // splines of one degree less.
+        // Cox and de Boor's recurrence, for the span from c to d; the slopes are made of quadratic
+        // splines.
         let [c_x, d_x] = [x - c, d - x];
         let part = 1.0 / (d - c);
         let [linear_c, linear_d] = [d_x * part, c_x * part];
@@ -129,7 +129,7 @@ impl<'a> Axis<'a> {
     }
 }
 
-/// The nearest, of so many steps of 2⁻¹⁵, at most 2¹⁵.
+/// Rounds to the nearest step of 2⁻¹⁵; at most 2¹⁵ steps.
 fn rounded(steps: f32) -> Q<15, i16> {
     Q::from_bits((steps + WHOLE).to_bits() as i16)
 }
@@ -154,7 +154,7 @@ mod tests {
             / f64::from(ONE)
     }
 
-    /// Greville's points are the coefficients of x itself: its slope is one.
+    /// Greville's points are the coefficients of x itself, whose slope is 1.
     #[test]
     fn a_line_is_a_spline() {
         let nodes = bytes(&NODES_MM);

@@ -1,28 +1,28 @@
-//! What a model does not know of how the images move, as a covariance of their coordinates:
-//! interpolated between sizes and places of the load; and coordinates in which a covariance is the
-//! unit matrix.
+//! Describes what a model does not know about the images' motion, as a covariance of their
+//! coordinates. It interpolates between sizes and places of the load, and whitens: in white
+//! coordinates the covariance is the unit matrix.
 
 use super::pose::{Pose, limited};
 use super::solve::{Column, EQUATIONS};
 use super::terms::Limits;
 use crate::force::kernels::sqrt;
 
-/// Knots along sizes and along each axis of places.
+/// Allowed number of knots along the size and along each axis of places.
 pub const KNOTS: core::ops::RangeInclusive<u8> = 2..=16;
-/// The largest step of a factor's entries, focal lengths.
+/// Largest step of a factor's entries, focal lengths.
 pub const LARGEST_STEP: f32 = 1e-3;
-/// Entries of a triangle.
+/// Entries of a lower triangle.
 const TRIANGLE: usize = EQUATIONS * (EQUATIONS + 1) / 2;
-/// Bytes of a knot: a step and the factor's entries.
+/// Bytes of a knot: a step and the entries of the factor.
 const KNOT: usize = 4 + 2 * TRIANGLE;
-/// Of a unit of which nothing but a rest picture is known, where no file says more: standard
-/// uncertainties of each coordinate of a marker's motion, and of all of them together, in parts of
-/// the motion.
+/// For a unit of which only a rest picture is known, if the file has no grid for it: standard
+/// uncertainty as a fraction of the motion. `OF_ITSELF` is that of each coordinate of a marker,
+/// `OF_ALL` that of all coordinates together.
 const OF_ITSELF: f32 = 0.03;
 const OF_ALL: f32 = 0.1;
 
-/// A covariance of x and y of all images, in focal lengths squared; what is above the diagonal
-/// means nothing.
+/// A covariance of x and y of all images, in focal lengths squared. Entries above the diagonal are
+/// unused.
 pub type Covariance = [Column; EQUATIONS];
 
 /// Covariances by the load's size and place, borrowed from a model file.
@@ -30,28 +30,28 @@ pub type Covariance = [Column; EQUATIONS];
 pub struct CovarianceGrid<'a> {
     /// Knots along the size, along y and along x.
     counts: [u8; 3],
-    /// Places go to so many mm either way.
+    /// Places range from −`end_mm` to `end_mm` along each axis.
     end_mm: f32,
-    /// By size, place along y and place along x: an f32 step, and a lower triangle of i16 of such
-    /// steps, row by row, whose square is the covariance.
+    /// Indexed by size, place along y, place along x. Each knot is an f32 step and a lower triangle
+    /// of i16, row by row, in units of the step. The factor times its transpose is the covariance.
     knots: &'a [[u8; KNOT]],
 }
 
 /// What a model does not know of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unknown<'a> {
-    /// Nothing that would matter beside noise.
+    /// Negligible compared with noise.
     Nothing,
-    /// What its file says.
+    /// As the model file says.
     Grid(CovarianceGrid<'a>),
-    /// As much as may differ between units, in parts of what moves.
+    /// As much as may differ between units, relative to the motion.
     Unit,
 }
 
 impl<'a> CovarianceGrid<'a> {
-    /// Of so many knots ([`KNOTS`]) along the size, y and x, of places to `end_mm` either way (0.1
-    /// to 100), and of as many bytes as [`CovarianceGrid::length`] says; `None` of others, or where
-    /// a step is not between 0 and [`LARGEST_STEP`].
+    /// Takes the number of knots ([`KNOTS`]) along the size, y and x, and the largest place
+    /// `end_mm` (0.1 to 100). Returns `None` if a number of knots, `end_mm` or the number of bytes
+    /// ([`CovarianceGrid::length`]) is wrong, or a step is not between 0 and [`LARGEST_STEP`].
     pub fn new(counts: [u8; 3], end_mm: f32, bytes: &'a [u8]) -> Option<CovarianceGrid<'a>> {
         let (knots, _) = bytes.as_chunks();
         let grid = CovarianceGrid {
@@ -73,9 +73,9 @@ impl<'a> CovarianceGrid<'a> {
         counts.into_iter().map(usize::from).product::<usize>() * KNOT
     }
 
-    /// At a load; beyond the last size or place as there. Sizes of knots are the squares of even
-    /// parts. Between knots it is their factors that are interpolated: any sum of those is one of a
-    /// covariance.
+    /// Returns the covariance at a load; beyond the last size or place, the covariance there. Knot
+    /// k of n+1 is at (k/n)² of the largest size. Factors, not covariances, are interpolated: any
+    /// sum of factors is the factor of a covariance.
     pub fn at(&self, pose: &Pose, limits: &Limits) -> Covariance {
         let [sizes, lines, places] = self.counts.map(usize::from);
         let along = |at_mm: f32| 0.5 + 0.5 * at_mm / self.end_mm;
@@ -95,8 +95,8 @@ impl<'a> CovarianceGrid<'a> {
 }
 
 impl Unknown<'_> {
-    /// Under a load that moves the images so. Not inlined: what it needs of the stack is free again
-    /// behind it.
+    /// Returns the covariance under a load that moves the images by `moved`. Not inlined, so that
+    /// its stack is released on return.
     #[inline(never)]
     pub fn covariance(&self, pose: &Pose, limits: &Limits, moved: &Column) -> Covariance {
         match self {
@@ -107,7 +107,7 @@ impl Unknown<'_> {
     }
 }
 
-/// What may differ between units where images move so.
+/// The covariance of what may differ between units whose images move by `moved`.
 fn of_motion(moved: &Column) -> Covariance {
     let mut covariance: Covariance = moved.map(|a| moved.map(|b| OF_ALL * OF_ALL * a * b));
     for (dot, [x, y]) in moved.as_chunks::<2>().0.iter().enumerate() {
@@ -124,7 +124,7 @@ fn step(knot: &[u8; KNOT]) -> f32 {
     f32::from_le_bytes([a, b, c, d])
 }
 
-/// A part of a knot's factor more.
+/// Adds `part` times a knot's factor.
 fn add(factor: &mut Covariance, knot: Option<&[u8; KNOT]>, part: f32) {
     let Some(knot) = knot else { return };
     let part = part * step(knot);
@@ -149,7 +149,7 @@ fn squared(factor: &Covariance) -> Covariance {
     covariance
 }
 
-/// The two of `count` even knots from 0 to 1 that a value lies between, and how much each counts.
+/// Returns the two of `count` evenly spaced knots from 0 to 1 around a value, each with its weight.
 pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
     let last = count - 1;
     let at = limited(value, 0.0, 1.0) * last as f32;
@@ -161,12 +161,12 @@ pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
 /// Coordinates in which a covariance is the unit matrix.
 #[derive(Clone, Copy, Debug)]
 pub struct Whitening {
-    /// The covariance's lower factor, with one over its diagonal in that one's place.
+    /// The covariance's lower factor, with the reciprocals of its diagonal on the diagonal.
     factor: Covariance,
 }
 
 impl Whitening {
-    /// `None` when the covariance has a direction without any, or a number is none.
+    /// Returns `None` if the covariance is singular, or an entry is not a finite number.
     pub fn new(covariance: &Covariance) -> Option<Whitening> {
         let mut factor = Covariance::default();
         for i in 0..EQUATIONS {
@@ -182,7 +182,7 @@ impl Whitening {
         Some(Whitening { factor })
     }
 
-    /// What a column is in these coordinates.
+    /// A column in these coordinates.
     pub fn of(&self, column: &Column) -> Column {
         let mut white = *column;
         for (i, row) in self.factor.iter().enumerate() {
@@ -192,7 +192,7 @@ impl Whitening {
     }
 }
 
-/// A number less the products of parts with as many others.
+/// `whole` minus the sum of products.
 fn less(whole: f32, parts: &[f32], others: &[f32]) -> f32 {
     let products = parts.iter().zip(others);
     products.fold(whole, |left, (part, other)| left - part * other)
@@ -218,7 +218,7 @@ mod tests {
         }
     }
 
-    /// Knots of entries by knot and entry, in steps of 10⁻⁵.
+    /// Bytes of knots whose entries `entry(knot, index)` gives, in steps of 10⁻⁵.
     fn knots(entry: impl Fn(usize, usize) -> i16) -> Vec<u8> {
         let mut bytes = Vec::new();
         for knot in 0..COUNTS.map(usize::from).iter().product() {
@@ -228,8 +228,8 @@ mod tests {
         bytes
     }
 
-    /// Standard deviations of one coordinate alone that are linear along each axis, the size's root
-    /// for the size, come out as they are, at knots, between them and beyond.
+    /// The standard deviation of one coordinate is linear in each place axis and in the root of the
+    /// size. It is reproduced at knots, between them, and beyond them as at the last one.
     #[test]
     fn planes_come_back() {
         let sigma = |size: f32, y: f32, x: f32| 1e3 * (1.0 + size + 2.0 * y + x);
@@ -273,7 +273,7 @@ mod tests {
             row[i] += 0.5;
         }
         let whitening = Whitening::new(&covariance).unwrap();
-        // Columns of what whitens.
+        // Columns of the whitening matrix.
         let inverse: [Column; 8] = core::array::from_fn(|k| {
             let mut unit = Column::default();
             unit[k] = 1.0;
@@ -310,7 +310,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever a file holds and wherever the load is: with noise it is a covariance.
+        /// With noise added, every file and every load gives a covariance.
         #[test]
         fn with_noise_it_is_always_a_covariance(
             seed in any::<u64>(),

@@ -1,4 +1,4 @@
-//! Steps downhill: each to the load that the linearized film says explains the markers best.
+//! Steps downhill to the load that explains the markers best, each by the linearized film.
 
 use super::Forward;
 use super::covariance::{Covariance, Unknown, Whitening};
@@ -9,72 +9,73 @@ use super::predict::Prediction;
 use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, Unknowns, solve, square};
 use crate::force::kernels::sqrt;
 
-/// A step that would explain no more than this of the residual, in parts of its variance, is not
-/// needed: it would move no unknown by more than a fifth of its standard uncertainty.
+/// The steps have converged if the next one would explain at most this part of the residual,
+/// relative to its variance. It would move no unknown by more than a fifth of its standard
+/// uncertainty.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
-/// Where a step that would explain no more than this lowers no residual, what is left is the
-/// tables' rounding.
+/// If a step that would explain at most this does not lower the residual, the rest is rounding of
+/// the tables.
 const ROUNDING: f32 = 0.5;
-/// Where steps end and more than this is left, they may have stuck where the tables bend: χ² of
-/// three degrees of freedom is more in 1 of 100 honest frames.
+/// If more than this is left where the steps end, they may be stuck where the tables bend. χ² of
+/// three degrees of freedom exceeds it in 1 of 100 honest frames.
 const STUCK: f32 = 11.3;
-/// The first of the unknowns that are the tilt, which the place follows.
+/// Index of the tilt among the unknowns; the place follows it.
 const TILT: usize = 1;
-/// What is likely before there is a frame: tilt along x and y, rad, and place along x and y, mm,
-/// are nothing to within this. A load too weak for its direction and place keeps what is likely,
-/// instead of being sought where steps do not end.
+/// Prior: standard deviations of the tilt along x and y, rad, and the place along x and y, mm,
+/// around 0. A load too weak for its direction and place stays near the prior; otherwise the steps
+/// would not end.
 const LIKELY: [f32; 4] = [0.3, 0.3, 2.5, 2.5];
-/// The markers' equations, and those of what is likely.
+/// The markers' equations, and those of the prior.
 const ROWS: usize = EQUATIONS + LIKELY.len();
-/// What is left of a step that did not lower the residual.
+/// Factor by which the next step is shortened if one did not lower the residual.
 const SHORTER: f32 = 0.5;
 
-/// A way from a first guess to the load that explains the markers best.
+/// The descent from a first guess to the load that explains the markers best.
 pub struct Descent<'a> {
     forward: &'a Forward<'a>,
     markers: Markers<'a>,
     here: Linearization,
-    /// How much of the next step is tried.
+    /// The fraction of the next step that is tried.
     part: f32,
-    /// How its way bends: what the unknowns change beside it, times the square of that part.
+    /// How the path bends: added to the unknowns, times the square of that fraction.
     bend: Unknowns,
-    /// Whether the step would be no larger than rounding.
+    /// True if the last step changed no more than rounding.
     has_ended: bool,
     /// How often the film was run forwards.
     looks: u8,
 }
 
-/// What the markers of a frame show, and of which unit.
+/// What the markers of a frame show, how they are mounted, and what is unknown of the unit.
 struct Markers<'a> {
     observed: &'a Observed<'a>,
     mounting: &'a Mounting,
     unknown: Unknown<'a>,
 }
 
-/// A load, and what the markers say there.
+/// A load, and the linear equations of the markers there.
 struct Linearization {
     pose: Pose,
-    /// What the load does not explain of the markers' motion, and the slopes of what it does, focal
-    /// lengths.
+    /// The part of the markers' motion that the load does not explain, and the slopes of the part
+    /// that it does, focal lengths.
     left: Column,
     slopes: [Column; UNKNOWNS],
-    /// By the covariance of noise and of what is not known of the unit, at this load; `None` where
-    /// that is none.
+    /// Weighted by the covariance, at this load, of noise and of what is unknown of the unit;
+    /// `None` if that covariance is singular or not finite.
     white: Option<White>,
 }
 
-/// The same in coordinates in which the covariance is the unit matrix.
+/// A linearization in coordinates in which the covariance is the unit matrix.
 struct White {
     whitening: Whitening,
-    /// The square of what the load does not explain of the markers' motion.
+    /// The square of the part of the motion that the load does not explain.
     unexplained: f32,
-    /// That square, and how unlikely the load is.
+    /// That square, plus the square of the distance from the prior.
     square: f32,
     solved: Option<Solved>,
 }
 
 impl<'a> Descent<'a> {
-    /// At a guess; at the nearest load that the tables hold where it is beyond.
+    /// Begins at a guess; outside the tables, at the nearest load inside.
     pub fn new(
         forward: &'a Forward<'a>,
         observed: &'a Observed<'a>,
@@ -99,10 +100,10 @@ impl<'a> Descent<'a> {
         }
     }
 
-    /// Tries a step; one that does not lower the residual, by the covariance where it begins, is
-    /// not taken, and the next is shorter then, along a way that bends as the whole step's residual
-    /// says (geodesic acceleration: Transtrum and Sethna 2012). False when the markers do not tell
-    /// where to go.
+    /// Tries a step. A step that does not lower the residual, weighted by the covariance where it
+    /// begins, is not taken, and the next one is shorter. It then follows a path that bends as the
+    /// whole step's residual says (geodesic acceleration: Transtrum and Sethna 2012). Returns false
+    /// if the markers do not determine a step.
     pub fn step(&mut self) -> bool {
         let Some((white, solved)) = self.here.solved() else {
             return false;
@@ -123,31 +124,31 @@ impl<'a> Descent<'a> {
         true
     }
 
-    /// Whether more steps would not help, whether or not the load explains the markers.
+    /// Returns whether more steps would not help, whether or not the load explains the markers.
     pub fn is_over(&self) -> bool {
         self.has_converged() || self.is_done()
     }
 
-    /// Whether another step would hardly explain more.
+    /// Whether another step would explain hardly more.
     fn has_converged(&self) -> bool {
         let solved = self.here.solved();
         solved.is_some_and(|(_, solved)| solved.explained <= LEFT_TO_EXPLAIN)
     }
 
-    /// Whether the load explains the markers, and the steps came to an end.
+    /// Returns whether the load explains the markers and the steps came to an end.
     pub fn is_done(&self) -> bool {
         let white = self.here.white.as_ref();
         let is_explained = white.is_some_and(|white| white.unexplained <= STUCK);
         is_explained && (self.has_ended || self.has_converged())
     }
 
-    /// What it has come to.
+    /// The load that it has reached.
     pub fn estimate(self) -> Estimate {
         let left = self.here.by_noise(&self.markers.observed.by_noise());
         let white = self.here.white;
         Estimate {
             pose: self.here.pose,
-            // What has no covariance explains nothing.
+            // A load without a covariance explains nothing: infinite residual.
             unexplained: white
                 .as_ref()
                 .map_or(f32::INFINITY, |white| white.unexplained),
@@ -158,7 +159,7 @@ impl<'a> Descent<'a> {
     }
 }
 
-/// The markers' equations, and those of what is likely, in parts of their standard uncertainties.
+/// The markers' equations and those of the prior, in units of their standard uncertainties.
 struct Equations {
     columns: [[f32; ROWS]; UNKNOWNS],
     side: [f32; ROWS],
@@ -182,7 +183,7 @@ impl Equations {
     }
 }
 
-/// How far a load is from what is likely.
+/// The distance of a load from the prior, in standard deviations.
 fn unlikely(pose: &Pose) -> [f32; LIKELY.len()] {
     let ([a, b], [x, y]) = (pose.tilt, pose.place_mm);
     let parts = [a, b, x, y];
@@ -220,8 +221,8 @@ impl Linearization {
         Some((white, white.solved.as_ref()?))
     }
 
-    /// How a way from here bends whose whole first step leads there: what the slopes here say of
-    /// the residual there. Not inlined, as [`White::new`].
+    /// Returns how the path from here bends if its whole first step leads to `there`: the slopes
+    /// here, solved for the residual there. Not inlined, as [`White::new`].
     #[inline(never)]
     fn bend(&self, whitening: &Whitening, there: &Linearization) -> Unknowns {
         let mut equations = Equations::new(whitening, &self.slopes, &there.left, &there.pose);
@@ -229,13 +230,13 @@ impl Linearization {
         solved.map_or(Unknowns::default(), |solved| solved.unknowns)
     }
 
-    /// What no load near this one explains of the markers' motion, in parts of their noise alone.
+    /// The part of the motion that no load near this one explains, in units of its noise alone.
     fn by_noise(&self, noise: &Covariance) -> Column {
         let Some(whitening) = Whitening::new(noise) else {
             return [f32::INFINITY; EQUATIONS];
         };
         let mut equations = Equations::new(&whitening, &self.slopes, &self.left, &self.pose);
-        // Where the markers do not tell the load, all that is left.
+        // If the markers do not determine the load, the whole residual.
         let left = equations.side;
         let side = match solve(equations.columns, &mut equations.side) {
             Some(_) => equations.side,
@@ -246,7 +247,8 @@ impl Linearization {
 }
 
 impl White {
-    /// Not inlined: what it needs of the stack is free again behind it.
+    /// Returns `None` if the covariance is singular or not finite. Not inlined, so that its stack
+    /// is released on return.
     #[inline(never)]
     fn new(
         covariance: &Covariance,
@@ -265,9 +267,9 @@ impl White {
     }
 }
 
-/// The load after a part of a step, and the square of that of a bend. Where that is too steep for
-/// the tables, the other unknowns follow the tilt back: without that, steps along the tables'
-/// border would not lower the residual.
+/// The load after `part` of a step and `part`² of a bend. If its tilt exceeds the tables, the tilt
+/// is held back and the other unknowns follow it. Otherwise steps along the tables' border would
+/// not lower the residual.
 fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &Unknowns) -> Pose {
     let most = forward.limits.tilt;
     let mut step = solved.unknowns;
@@ -291,7 +293,7 @@ fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &
     )
 }
 
-/// The nearest load that the tables hold.
+/// The nearest load inside the tables.
 fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
     let too_steep = (pose.angle() / forward.limits.tilt).max(1.0);
     let [from, to] = forward.tables.ends_mm();

@@ -1,5 +1,5 @@
-//! How far the film may rest from where its rest position was taken: camera and film wander with
-//! temperature, and whoever touches the sensor moves them.
+//! Describes how far the film may rest from its rest position. Camera and film drift with
+//! temperature, and move when the sensor is touched.
 
 use super::covariance::Covariance;
 use super::mounting::{Mounting, about_middle, radius};
@@ -9,42 +9,43 @@ use super::solve::Column;
 /// What may have happened to a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Standard uncertainties of what nobody saw, in parts of the pattern's radius: of a shift
-    /// along x and along y each, of a turn, and of a change of scale.
+    /// Standard uncertainties of what no frame has shown, relative to the pattern's radius: of a
+    /// shift along x and along y each, of a turn, and of a change of scale.
     pub unseen: [f32; 3],
-    /// How far from it the untouched film's markers were when they were seen last, px.
+    /// Distance of the untouched film's markers from the rest position when they were last seen,
+    /// px.
     pub seen_px: Markers,
 }
 
 impl Drift {
-    /// Of a rest position that was taken just now.
+    /// A rest position that was taken just now.
     pub const NONE: Drift = Drift {
         unseen: [0.0; 3],
         seen_px: [[0.0; 2]; DOTS],
     };
 
-    /// Of a rest position that no frame of the untouched film has confirmed: 0.08 px at 320×240,
-    /// and half as much again by a change of scale, which looks like a press.
+    /// A rest position that no frame of the untouched film has confirmed: 0.08 px at 320×240, and
+    /// 1.5 times that by a change of scale, which looks like a press.
     pub const UNSEEN: Drift = Drift {
         unseen: [1e-3, 1e-3, 1.5e-3],
         ..Drift::NONE
     };
 
-    /// Of a camera that may have been mounted anew: any shift and turn. A change of scale is
-    /// small: a press looks like a larger one.
+    /// A camera that may have been mounted anew: any shift and turn. The change of scale is small,
+    /// because a press looks like a larger one.
     pub const MOUNTED_ANEW: Drift = Drift {
         unseen: [0.1, 0.1, 1e-3],
         ..Drift::NONE
     };
 
-    /// The farthest that a marker's coordinate was seen from there, px.
+    /// The largest distance of a marker's coordinate from the rest position, px.
     pub fn farthest_px(&self) -> f32 {
         let far = self.seen_px.as_flattened().iter();
         far.fold(0.0, |farthest, part| part.abs().max(farthest))
     }
 
-    /// As a covariance of images of markers that rest at these px; what is above the diagonal means
-    /// nothing.
+    /// Returns the covariance of the images of markers that rest at these px. Entries above the
+    /// diagonal are unused.
     pub fn covariance(&self, mounting: &Mounting, rest_px: &Markers) -> Covariance {
         let about = about_middle(rest_px);
         let [shift, turn, scale] = self.unseen;
@@ -92,7 +93,7 @@ mod tests {
         sum
     }
 
-    /// Radius 70.7 px, 0.01 focal lengths a pixel.
+    /// The pattern's radius is 70.7 px, a pixel 0.01 focal lengths.
     #[test]
     fn shift_turn_and_scale_are_as_uncertain_as_told() {
         let drift = Drift {

@@ -1,4 +1,4 @@
-//! Gauss–Newton steps from a first guess to the load that explains the markers best.
+//! Takes Gauss–Newton steps from a first guess to the load that explains the markers best.
 
 use super::covariance::{Covariance, Unknown};
 use super::descent::Descent;
@@ -9,14 +9,14 @@ use super::solve::{Column, Solved};
 use super::weight::Hanging;
 use super::{Forward, Strength};
 
-/// What is left over, in parts of its variance, is more than this in 1 of 2,000 honest frames: χ²
-/// of three degrees of freedom is more than 17.7 then.
+/// Largest residual, relative to its variance, of a load that explains the markers. χ² of three
+/// degrees of freedom exceeds 17.7 in 1 of 2,000 honest frames.
 pub const UNEXPLAINED: f32 = 17.7;
-/// χ² of three degrees of freedom is more than this in 1 of 6: what is left over beyond it is taken
-/// for noise that is larger than the model says.
+/// χ² of three degrees of freedom exceeds this in 1 of 6 frames. A larger residual is taken for
+/// noise that is larger than the model says.
 const USUAL: f32 = 5.0;
-/// Steps that a frame takes at most: more than the model asks for while what they led to does not
-/// explain the markers. Units of which little is known begin far from where they end.
+/// Most steps of a frame. It exceeds what the model asks for: more steps follow while the load does
+/// not explain the markers. Little-known units begin far from the result.
 pub const STEPS_AT_MOST: u8 = 8;
 
 /// How the markers' images moved since the rest position, and how well that is known.
@@ -24,25 +24,24 @@ pub const STEPS_AT_MOST: u8 = 8;
 pub struct Observed<'a> {
     /// x and y of markers 0–3, focal lengths along the film's axes.
     pub moved: Column,
-    /// The noise of each marker: covariances of x and x, x and y, y and y, focal lengths squared;
-    /// the first and the last > 0.
+    /// The noise of each marker: covariances xx, xy, yy, focal lengths squared; xx and yy > 0.
     pub noise: [[f32; 3]; DOTS],
-    /// How far the rest position may be from where the film rests ([`Drift`](super::Drift)); `None`
-    /// where it is known.
+    /// Covariance of the rest position's distance from where the film rests
+    /// ([`Drift`](super::Drift)); `None` if the distance is 0.
     pub drift: Option<&'a Covariance>,
-    /// What the film's own weight does; `None` where the tables and the rest position have it.
+    /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     pub hanging: Option<&'a Hanging>,
 }
 
 impl Observed<'_> {
-    /// The noise of all markers: no two share any.
+    /// The noise of all markers, which is independent between markers.
     pub(super) fn by_noise(&self) -> Covariance {
         let mut covariance = Covariance::default();
         self.add_noise(&mut covariance);
         covariance
     }
 
-    /// Noise, and what the rest position may be off.
+    /// Adds noise, and the covariance of the rest position.
     pub(super) fn add_to(&self, covariance: &mut Covariance) {
         self.add_noise(covariance);
         let drift = self.drift.into_iter().flatten();
@@ -68,22 +67,23 @@ impl Observed<'_> {
 pub struct Estimate {
     /// The load.
     pub pose: Pose,
-    /// What it does not explain: the square of that in parts of its covariance, by noise and by
-    /// what is not known of the unit.
+    /// The squared residual, relative to its covariance by noise and by what is unknown of the
+    /// unit.
     pub unexplained: f32,
-    /// What no load near it explains, in parts of noise alone: what changes of it from frame to
-    /// frame is noise, whatever is not known of the unit.
+    /// The residual that no load near this one explains, in units of noise alone. Its change from
+    /// frame to frame is noise, whatever is unknown of the unit.
     pub left: Column,
-    /// What the markers say at this load; `None` where they do not tell its parts.
+    /// The solution of the markers' equations at this load; `None` if they do not determine all
+    /// unknowns.
     pub solved: Option<Solved>,
-    /// How often the film was run forwards: once where the steps begin, and once for each step.
+    /// How often the film was run forwards: once at the start, and once for each step.
     pub looks: u8,
 }
 
 impl Forward<'_> {
-    /// Takes steps from a guess; if they lead to a load that does not explain the markers, or from
-    /// which they find no way on, from where the markers moved most, too: from there they find
-    /// theirs where a guess was bad. Once in the near memory, which is scarce.
+    /// Takes steps from a guess. If they end at a load that does not explain the markers, or get
+    /// stuck, takes steps from where the markers moved most, too; these succeed where a guess was
+    /// bad. Returns the better load. Compiled once, because the near memory is scarce.
     #[inline(never)]
     pub fn estimate(
         &self,
@@ -111,8 +111,8 @@ impl Forward<'_> {
         Estimate { looks, ..nearer }
     }
 
-    /// Takes as many steps as the model asks for, and more where these do not explain the markers.
-    /// Also whether that came to an end.
+    /// Takes as many steps as the model asks for, and more if these do not explain the markers.
+    /// Also returns whether the descent came to an end.
     fn descend(&self, mut descent: Descent<'_>) -> (Estimate, bool) {
         for step in 0..STEPS_AT_MOST {
             if step >= self.steps && descent.is_over() {
@@ -130,29 +130,29 @@ impl Forward<'_> {
 /// Standard uncertainties of a load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigma {
-    /// Of the direction, both ways across it together, rad.
+    /// Of the direction, both axes across it together, rad.
     pub direction: f32,
     /// Of |F|, N.
     pub magnitude_n: f32,
-    /// That by what the markers leave open of the size alone, N.
+    /// The part of `magnitude_n` that noise leaves in the size alone, N.
     pub by_noise_n: f32,
     /// Of each coordinate of the place, mm: the root of half their covariance's trace.
     pub place_mm: f32,
 }
 
 impl Estimate {
-    /// Whether a load explains the markers; what is no number explains nothing.
+    /// Returns whether the load explains the markers; false if the residual is NaN.
     pub fn is_explained(&self) -> bool {
         (0.0..=UNEXPLAINED).contains(&self.unexplained)
     }
 
-    /// How many times the markers' stated noise what is left over speaks for, at least 1.
+    /// By what factor the residual exceeds the markers' stated noise, at least 1.
     fn noisier(&self) -> f32 {
         libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
     }
 
-    /// How well the load is known; `None` where the markers do not tell its parts. The covariance
-    /// counts as larger where more is left over than it explains as a rule.
+    /// Returns the standard uncertainties; `None` if the markers do not determine all unknowns.
+    /// They are widened if the residual is larger than usual.
     pub fn sigma(&self, strength: &Strength) -> Option<Sigma> {
         let solved = self.solved.as_ref()?;
         let covariance = |(a, b): (usize, usize)| solved.covariance(a, b);
@@ -170,8 +170,8 @@ impl Estimate {
     }
 }
 
-/// The covariance (xx, xy, yy) of the direction: of a tilt away from the normal all of it, across
-/// that so much less as the circle is shorter than its angle.
+/// The covariance (xx, xy, yy) of the direction. Away from the normal the tilt counts fully; across
+/// that it counts by sin θ / θ, as the circle there is shorter than its angle.
 fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
     let [x, y] = pose.tilt;
     let square = x * x + y * y;
@@ -185,9 +185,9 @@ fn across(pose: &Pose, [xx, xy, yy]: [f32; 3]) -> [f32; 3] {
     [away, sine * both, sine * sine * along]
 }
 
-/// What a covariance (xx, xy, yy) states as its σ: 95 of 100 errors are within 1.731 times it
-/// (√(−ln 0.05)), however long and narrow their ellipse is. A round one's is the root of its trace;
-/// of a narrow one's 95 of 100 are within 1.960 times that.
+/// The σ that is stated for a covariance (xx, xy, yy): 95 of 100 errors are within 1.731 times it
+/// (√(−ln 0.05)), whatever the shape of their ellipse. For a round ellipse σ is the root of the
+/// trace; for a narrow one 95 of 100 errors are within 1.960 times that root.
 pub fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
     let trace = xx + yy;
     let apart = (xx - yy) * (xx - yy) + 4.0 * xy * xy;
@@ -215,7 +215,7 @@ mod tests {
         largest_size: 0.63,
     };
 
-    /// Of a load of which what is left over is as given.
+    /// An estimate with this residual.
     fn estimate(unexplained: f32) -> Estimate {
         let mut spread = [[0.0; 5]; 5];
         for (k, row) in spread.iter_mut().enumerate() {
@@ -244,8 +244,7 @@ mod tests {
         [sigma.direction, sigma.magnitude_n, sigma.place_mm]
     }
 
-    /// Noise of n times what is stated leaves n² times as much over, and is stated n times as
-    /// large.
+    /// Noise of n times the stated noise leaves an n² times larger residual, and widens σ n times.
     #[test]
     fn what_is_left_over_beyond_the_usual_widens_all_three() {
         let stated = parts(1.0);
@@ -258,8 +257,8 @@ mod tests {
         }
     }
 
-    /// Uncertain strength of a unit is beside what the markers leave open, by squares; between two
-    /// sizes it is between theirs.
+    /// The uncertainty of a unit's strength adds to that of the size in squares, and is
+    /// interpolated between sizes.
     #[test]
     fn a_units_strength_is_uncertain_beside_its_size() {
         let unsure = Strength {
@@ -279,7 +278,7 @@ mod tests {
     }
 
     proptest! {
-        /// No uncertainty becomes smaller by more that is left over, whatever the numbers.
+        /// A larger residual never makes an uncertainty smaller.
         #[test]
         fn more_that_is_left_over_never_makes_a_force_surer(
             less in prop_oneof![0.0f32..100.0, any::<f32>()],

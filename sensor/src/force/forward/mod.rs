@@ -1,26 +1,26 @@
-//! Which force at which place explains where the markers are: a model of the film run forwards, and
-//! Gauss–Newton steps on it.
+//! Finds the force and its place that explain the markers' positions: a model of the film run
+//! forwards, and Gauss–Newton steps on it.
 //!
-//! Four markers have eight coordinates, a contact five unknowns. The network's answer is the first
-//! guess; each step evaluates the film at it, with its slopes, and solves the linearized problem.
-//! What three redundant coordinates do not explain tells a load that the model does not know, and
-//! the slopes tell how well the load is known.
+//! Four markers have eight coordinates, a contact has five unknowns. The network's answer is the
+//! first guess. Each step evaluates the film and its slopes there, and solves the linearized
+//! problem. The residual of the three redundant coordinates exposes a load that the model does not
+//! know; the slopes give the uncertainty of the load.
 //!
-//! Single precision throughout, each operation rounded once and in a fixed order: additions,
-//! multiplications, divisions and roots are IEEE 754's on every machine, so that the same numbers
-//! come out on all of them.
+//! All of it is single precision, each operation rounded once and in a fixed order. Additions,
+//! multiplications, divisions and roots follow IEEE 754 on every machine, so the results are the
+//! same bits everywhere.
 //!
 //! | file | subject |
 //! |---|---|
-//! | `axis`, `terms`, `table` | splines over the place, polynomials in size and tilt, a marker's sums of both |
+//! | `axis`, `terms`, `table` | splines over the place, polynomials in size and tilt, their sums |
 //! | `pose` | a load in the variables in which the film is nearly a polynomial |
-//! | `predict` | where all images go, with slopes |
+//! | `predict` | the positions of all images, with slopes |
 //! | `mounting` | where this unit's markers are glued, and how its camera sees them |
 //! | `solve` | eight equations, five unknowns |
 //! | `descent` | steps downhill from a guess |
-//! | `covariance` | what is not known of the unit beside the noise |
-//! | `weight` | what the film's own weight does |
-//! | `estimate` | from guesses to a load, what is left over, standard uncertainties |
+//! | `covariance` | what is unknown of the unit, in addition to the noise |
+//! | `weight` | the effect of the film's own weight |
+//! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 
 use covariance::between;
 use pose::limited;
@@ -57,53 +57,52 @@ pub use weight::{Gravity, Hanging, Turned, Weight};
 /// Most steps that a model may ask for.
 pub const MOST_STEPS: u8 = 3;
 
-/// Sizes at which it is told how well other units' strength is known.
+/// Number of sizes at which the uncertainty of other units' strength is given.
 pub const RELATIVE: usize = 5;
 
 /// A film run forwards, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forward<'a> {
-    /// Gauss–Newton steps from the network's guess, 0 to [`MOST_STEPS`]; with 0 the network stands
-    /// alone.
+    /// Gauss–Newton steps from the network's guess, 0 to [`MOST_STEPS`]. With 0 the network's
+    /// answer is final.
     pub steps: u8,
     /// The largest loads.
     pub limits: Limits,
-    /// How strong the force of a size is.
+    /// The force of each size.
     pub stiffness: Stiffness,
-    /// What a rest picture says of a unit.
+    /// How to read a unit's mounting from its rest picture.
     pub rest_image: RestImage,
-    /// How the camera of the unit that it was made on sees the film, focal lengths per px
-    /// ([`Mounting::per_px`]); `None` when nothing beside the rest picture tells it.
+    /// Focal lengths per px of the camera of the model's own unit ([`Mounting::per_px`]); `None` if
+    /// only its rest picture says.
     pub per_px: Option<[f32; 2]>,
     /// How well markers are seen.
     pub noise: Noise,
     /// The film's tables.
     pub tables: Tables<'a>,
-    /// What they leave of how the images move on the unit that it was made on; `None` when that is
-    /// nothing beside noise.
+    /// The covariance that the tables leave on the model's own unit; `None` if it is negligible
+    /// compared with noise.
     pub own: Option<CovarianceGrid<'a>>,
-    /// Any other unit, of which there is a rest picture; `None` where the file does not say.
+    /// What is known of any other unit with a rest picture; `None` if the file has no such section.
     pub other: Option<Others<'a>>,
-    /// What the film's own weight does; `None` where the file does not say.
+    /// The effect of the film's own weight; `None` if the file has no such section.
     pub weight: Option<Weight<'a>>,
 }
 
-/// What is known of units beside the one that a model was made on.
+/// What is known of units other than the one that a model was made on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Others<'a> {
-    /// How strong the force of a size is on one without stretch.
+    /// The force of each size on a unit without stretch.
     pub stiffness: Stiffness,
-    /// Standard uncertainty of that, in parts of it, at the squares of even parts of the largest
-    /// size.
+    /// Relative standard uncertainty of the force. Knot k of n+1 is at (k/n)² of the largest size.
     pub relative: [f32; RELATIVE],
-    /// What the tables leave of how the images move, beside the size.
+    /// The covariance that the tables leave in the images' motion, apart from the size's.
     pub covariance: CovarianceGrid<'a>,
 }
 
-/// How strong the force of a size is on a unit, and how well that is known.
+/// The force of each size on a unit, and how well it is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Strength {
-    /// How strong it is.
+    /// The force of each size.
     pub stiffness: Stiffness,
     /// As [`Others::relative`].
     relative: [f32; RELATIVE],
@@ -111,7 +110,7 @@ pub struct Strength {
 }
 
 impl Strength {
-    /// Standard uncertainty of |F| of a size that is known as well as `size_sigma`, N.
+    /// Standard uncertainty, N, of |F| at a size with the standard uncertainty `size_sigma`.
     pub fn sigma_n(&self, size: f32, size_sigma: f32) -> f32 {
         let of_size = self.stiffness.per_size_n(size) * size_sigma;
         let root = libm::sqrtf(limited(size / self.largest_size, 0.0, 1.0));
@@ -125,7 +124,7 @@ impl Strength {
 }
 
 impl<'a> Forward<'a> {
-    /// What is not known of the unit that it was made on, or of another one.
+    /// What is unknown of the model's own unit (`is_own`), or of any other.
     pub fn unknown(&self, is_own: bool) -> Unknown<'a> {
         match (is_own, self.own, self.other) {
             (true, None, _) => Unknown::Nothing,
@@ -135,7 +134,7 @@ impl<'a> Forward<'a> {
         }
     }
 
-    /// How strong forces are on the unit that it was made on, or on another one.
+    /// The strength of the model's own unit (`is_own`), or of any other.
     pub fn strength(&self, is_own: bool) -> Strength {
         let others = self.other.as_ref().filter(|_| !is_own);
         Strength {
@@ -146,15 +145,15 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// How far a marker's coordinates in one frame are from where it is.
+/// The error of a marker's coordinates in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// By the pixel grid at rest, where it is the same in every frame: what a tare takes for the
-    /// rest position less where the markers rest, px.
+    /// Error by the pixel grid at rest, equal in every frame: a tare's rest position minus the
+    /// markers' true rest positions, px.
     pub rest_px: Markers,
-    /// Standard uncertainty of a marker as large as at rest, px, > 0: away from the pattern's
-    /// middle, in which direction a disc's image is narrow, and across that.
+    /// Standard uncertainty of a marker that is as large as at rest, px, > 0: away from the
+    /// pattern's middle, in which direction a disc's image is narrow, and across that.
     pub at_rest_px: [f32; 2],
-    /// How many times that of one four times as large.
+    /// The factor on that for a marker of four times the area.
     pub at_four_areas: [f32; 2],
 }

@@ -1,4 +1,4 @@
-//! Where this unit's markers are on its film, and how its camera sees them.
+//! Describes where a unit's markers are glued on its film, and how its camera sees them.
 
 use super::predict::{DOTS, Markers};
 use super::solve::{Column, square};
@@ -8,31 +8,31 @@ use crate::force::rest::{NEAR, Rest};
 /// How a unit's camera sees its film, and where its markers are glued.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mounting {
-    /// Focal lengths per px: (x + iy) in px times this complex number is in focal lengths along the
-    /// film's axes.
+    /// Focal lengths per px: a position x + iy in px times this complex number is in focal lengths
+    /// along the film's axes.
     pub per_px: [f32; 2],
-    /// How far each marker is glued beside its place, mm.
+    /// Distance of each marker from its nominal place, mm.
     pub beside_mm: Markers,
 }
 
-/// What a rest picture says of a mounting when the camera is as the tables have it.
+/// How to read a mounting from a rest picture, with the camera as in the tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RestImage {
     /// Where the tables' markers are seen at rest, focal lengths from the axis.
     pub at: Markers,
-    /// What a focal length is on the film at each of them: away from the axis, and across that, mm.
+    /// Millimetres on the film per focal length at each marker: away from the axis, and across
+    /// that.
     pub film_mm: Markers,
 }
 
-/// How far a unit's camera may be from where it was, in parts of the pattern's radius, as the sine
-/// of its turn and in parts of its scale.
+/// Largest motion of a unit's own camera that was mounted anew: shift as a fraction of the
+/// pattern's radius, turn as its sine, relative change of scale.
 const LARGEST_SHIFT: f32 = 0.125;
 const LARGEST_TURN: f32 = 0.052;
 const LARGEST_SCALE: f32 = 0.01;
 
 impl RestImage {
-    /// The direction in which a marker's image lies from the axis, of length one; along x where it
-    /// lies there.
+    /// Unit vector from the axis to a marker's image; along x if the image is on the axis.
     #[inline]
     pub fn away(&self, dot: usize) -> [f32; 2] {
         let [x, y] = self.at.get(dot).copied().unwrap_or_default();
@@ -43,8 +43,8 @@ impl RestImage {
         }
     }
 
-    /// Where on the film the markers moved most, mm: the mean of their places, each counting as the
-    /// square of its motion, focal lengths; the middle where none moved.
+    /// Where on the film the markers moved most, mm: the mean of their places, weighted by the
+    /// square of their motion; the middle if none moved.
     pub fn where_most(&self, moved: &Column) -> [f32; 2] {
         let (mut sum, mut all) = ([0.0; 2], f32::MIN_POSITIVE);
         for ((at, film_mm), [x, y]) in self.at.iter().zip(&self.film_mm).zip(moved.as_chunks().0) {
@@ -55,8 +55,8 @@ impl RestImage {
         sum.map(|part| part / all)
     }
 
-    /// The covariance (xx, xy, yy) of a marker's image whose variances are these, away from the
-    /// axis and across that.
+    /// The covariance (xx, xy, yy) of a marker's image with these variances away from the axis and
+    /// across that.
     #[inline]
     pub fn noise(&self, dot: usize, [away, across]: [f32; 2]) -> [f32; 3] {
         let [x, y] = self.away(dot);
@@ -67,9 +67,9 @@ impl RestImage {
         ]
     }
 
-    /// What a tare tells of a unit, when nothing else is known of it. Shift, turn and size of the
-    /// whole pattern count as the camera's, which a rest picture cannot tell from gluing; what is
-    /// left is gluing.
+    /// Returns the mounting of a unit of which only a tare is known. Shift, turn and size of the
+    /// whole pattern are attributed to the camera, because a rest picture cannot separate them from
+    /// gluing. The remainder is gluing.
     pub fn mounting(&self, rest: &Rest) -> Mounting {
         let seen = about_middle(&places_px(rest));
         let own = about_middle(&self.at);
@@ -84,7 +84,7 @@ impl RestImage {
         }
     }
 
-    /// What a shift of a marker's image, focal lengths, is on the film, mm.
+    /// Converts a shift of a marker's image, focal lengths, to millimetres on the film.
     fn on_film(&self, dot: usize, [x, y]: [f32; 2]) -> [f32; 2] {
         let ([ux, uy], [away, across]) = (self.away(dot), self.film_mm[dot]);
         let away = away * (x * ux + y * uy);
@@ -106,18 +106,18 @@ fn middle(places: &Markers) -> [f32; 2] {
     middle
 }
 
-/// Places as seen from their mean.
+/// Places relative to their mean.
 pub(super) fn about_middle(places: &Markers) -> Markers {
     let middle = middle(places);
     places.map(|[x, y]| [x - middle[0], y - middle[1]])
 }
 
-/// How far places are from their mean, which they are seen from: root mean square.
+/// Root mean square distance of places from their mean; `about` is relative to it.
 pub(super) fn radius(about: &Markers) -> f32 {
     sqrt(square(about.as_flattened()) / DOTS as f32)
 }
 
-/// The complex number that brings what is seen nearest to where it would be seen.
+/// The complex number that maps `seen` to `own` with the smallest squared error.
 fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
     let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
     for ([x, y], [cx, cy]) in seen.iter().zip(own) {
@@ -125,22 +125,22 @@ fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
         across += x * cy - y * cx;
         square += x * x + y * y;
     }
-    // The markers in a sound rest position are not all in one place; if they were, nothing would be
-    // seen to move.
+    // The markers of a sound rest position are not all in one place. If they were, the result is 0:
+    // no motion.
     let square = if square > 0.0 { square } else { f32::MAX };
     [along / square, across / square]
 }
 
-/// How a camera moved over a film since it was seen with its markers elsewhere, as far as a shift,
-/// a turn and a change of scale explain that.
+/// How a camera moved over a film between two rest pictures, as a shift, a turn and a change of
+/// scale.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraMotion {
     /// How far the markers' middle moved, px.
     pub shift_px: [f32; 2],
-    /// What brings the markers back, as seen from their middle, as a complex number: its argument
-    /// is the turn, x towards y, its absolute value the scale, either the other way round.
+    /// The complex number that maps the markers back, relative to their middle. Its argument is
+    /// minus the turn (x towards y), its absolute value one over the change of scale.
     pub back: [f32; 2],
-    /// How far beside where they were the markers are then: the coordinate that is farthest, px.
+    /// After mapping back: the largest difference of a coordinate from where it was, px.
     pub beside_px: f32,
     /// The pattern's radius before, px.
     radius_px: f32,
@@ -165,13 +165,13 @@ impl CameraMotion {
         }
     }
 
-    /// How many times as large the pattern is seen as before.
+    /// The pattern's size relative to before.
     pub fn times(&self) -> f32 {
         let [along, across] = self.back;
         1.0 / sqrt(along * along + across * across)
     }
 
-    /// Whether it is as small as of a unit's own camera that was mounted anew.
+    /// Whether the motion is small enough for a unit's own camera that was mounted anew.
     fn is_remounting(&self) -> bool {
         let [along, across] = self.back;
         let [x, y] = self.shift_px.map(f32::abs);
@@ -184,9 +184,9 @@ impl CameraMotion {
 }
 
 impl Mounting {
-    /// The same film, seen as at `rest` by a camera that moved since it was seen as at `own`.
-    /// `None` when no shift of an eighth of the pattern's radius, turn of 3° and change of scale of
-    /// 1 % bring all markers within [`NEAR`] of that: another unit's film.
+    /// The same film, seen as at `rest` by a camera that moved since `own`. Returns `None` for
+    /// another unit's film: no shift of an eighth of the pattern's radius, turn of 3° and change of
+    /// scale of 1 % brings all markers within [`NEAR`] of `own`.
     pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
         let motion = CameraMotion::between(own, rest);
         motion.is_remounting().then(|| Mounting {
@@ -195,12 +195,12 @@ impl Mounting {
         })
     }
 
-    /// How a marker's image moved, px, in focal lengths along the film's axes.
+    /// Converts the motion of a marker's image from px to focal lengths along the film's axes.
     pub fn moved(&self, px: [f32; 2]) -> [f32; 2] {
         turned(self.per_px, px)
     }
 
-    /// The same the other way round.
+    /// The inverse of [`Mounting::moved`].
     pub fn px(&self, [x, y]: [f32; 2]) -> [f32; 2] {
         let [a, b] = self.per_px;
         let square = (a * a + b * b).max(f32::MIN_POSITIVE);
@@ -237,7 +237,7 @@ mod tests {
         film_mm: [[12.76, 10.85]; DOTS],
     };
 
-    /// Markers seen at the places of a nominal camera, moved by so many focal lengths each.
+    /// Markers at the places of a nominal camera, each moved by `moved` focal lengths.
     fn rest(moved: Markers, per_focal: [f32; 2], middle: [f32; 2]) -> Rest {
         let seen = |k: usize| {
             let [x, y] = [0, 1].map(|i| REST.at[k][i] + moved[k][i]);
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn a_camera_that_is_off_moves_no_marker() {
-        // Rolled by 3°, 2 % longer, 5 px beside the middle.
+        // Rolled by 3°, 2 % longer, 5 px off the middle.
         let per_focal = [
             178.5 * 3f32.to_radians().cos(),
             178.5 * 3f32.to_radians().sin(),
@@ -274,15 +274,15 @@ mod tests {
         assert!((x - 0.01).abs() < 1e-6 && (y - 0.02).abs() < 1e-6);
     }
 
-    /// A taper is nobody's but the markers'. It makes the pattern a little larger, too, by its
-    /// square.
+    /// A taper is attributed to the markers alone. Its square makes the pattern slightly larger,
+    /// too.
     #[test]
     fn gluing_that_no_camera_makes_is_found() {
         let taper = [[0.01, 0.0], [-0.01, 0.0], [0.01, 0.0], [-0.01, 0.0]];
         let mounting = REST.mounting(&rest(taper, [175.0, 0.0], [159.5, 119.5]));
         for (k, [x, y]) in mounting.beside_mm.into_iter().enumerate() {
             let [sx, sy] = CORNERS[k];
-            // Along x by 0.01: half of it away from the axis and half across.
+            // 0.01 along x: half of it away from the axis and half across.
             let (away, across) = (taper[k][0] * sx / 2.0, -taper[k][0] * sy / 2.0);
             let expected = [
                 12.76 * away * sx - 10.85 * across * sy,
@@ -300,7 +300,7 @@ mod tests {
         assert_eq!(REST.noise(4, [4.0, 1.0]), [4.0, 0.0, 1.0]);
     }
 
-    /// Shifted by (2, −1) px, turned by 1°, 1 % larger, and one marker 0.2 px beside that.
+    /// Shifted by (2, −1) px, turned by 1°, 1 % larger; then one marker is 0.2 px off that.
     #[test]
     fn a_camera_that_moved_is_told_by_shift_turn_and_scale() {
         let focal = [178.5, 0.0];

@@ -1,12 +1,12 @@
-//! A load in the variables in which the film's answer is nearly a polynomial.
+//! Describes a load in the variables in which the film's answer is nearly a polynomial.
 
 use super::terms::Limits;
 use crate::force::kernels::sqrt;
 
-/// Which force presses where.
+/// A force and the place where it presses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Pose {
-    /// How strongly: |F| = `linear_n`·size + `cubic_n`·size³ ([`Stiffness`]).
+    /// The strength: |F| = `linear_n`·size + `cubic_n`·size³ ([`Stiffness`]).
     pub size: f32,
     /// The force's polar angle, split along x and y, rad.
     pub tilt: [f32; 2],
@@ -14,25 +14,25 @@ pub struct Pose {
     pub place_mm: [f32; 2],
 }
 
-/// How strong a force of a size is: bending holds the film first, then stretching does.
+/// The force of a size: first the film's bending resists, then its stretching.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stiffness {
-    /// N.
+    /// The linear coefficient, N.
     pub linear_n: f32,
-    /// N.
+    /// The cubic coefficient, N.
     pub cubic_n: f32,
 }
 
-/// Newton's steps to a size: from above, where the cubic is convex, six bring it to 10⁻⁶ of itself.
+/// Newton's steps to a size. From above, where the cubic is convex, six reach 10⁻⁶ relative.
 const SIZE_STEPS: usize = 8;
 
 impl Stiffness {
-    /// |F|, N, of a size.
+    /// |F| of a size, N.
     pub fn magnitude_n(&self, size: f32) -> f32 {
         size * self.linear_n + size * size * size * self.cubic_n
     }
 
-    /// The slope of |F| by the size, N.
+    /// The slope of |F| by size, N.
     pub fn per_size_n(&self, size: f32) -> f32 {
         self.linear_n + 3.0 * size * size * self.cubic_n
     }
@@ -47,7 +47,7 @@ impl Stiffness {
     }
 }
 
-/// `f32::clamp` between limits that a model file tells, which panics unless they are in order.
+/// As `f32::clamp`, which panics if its limits are not in order; here they come from a model file.
 pub fn limited(value: f32, least: f32, most: f32) -> f32 {
     if value < least {
         least
@@ -59,8 +59,8 @@ pub fn limited(value: f32, least: f32, most: f32) -> f32 {
 }
 
 impl Pose {
-    /// Of a force, N, that presses (F_z < 0) at a place, mm; one that pulls is as one that does
-    /// nothing.
+    /// Returns the pose of a force, N, that presses (F_z < 0) at a place, mm. A force that pulls
+    /// gives size 0.
     pub fn of_force(
         [x, y, z]: [f32; 3],
         place_mm: [f32; 2],
@@ -83,21 +83,21 @@ impl Pose {
         }
     }
 
-    /// The force's direction, a unit vector; of a tilt of at most 1 rad to 10⁻⁷.
+    /// The force's direction, a unit vector, exact to 10⁻⁷ for tilts of at most 1 rad.
     pub fn direction(&self) -> [f32; 3] {
         let [x, y] = self.tilt;
         let (sine, cosine) = sine_over_angle_and_cosine(x * x + y * y);
         [sine * x, sine * y, -cosine]
     }
 
-    /// How large the tilt is, rad.
+    /// The size of the tilt, rad.
     pub fn angle(&self) -> f32 {
         let [x, y] = self.tilt;
         sqrt(x * x + y * y)
     }
 }
 
-/// sin θ / θ and cos θ of θ², which is at most 1: series to θ¹⁰ and θ¹².
+/// sin θ / θ and cos θ from θ² ≤ 1: series to θ¹⁰ and θ¹².
 pub fn sine_over_angle_and_cosine(t: f32) -> (f32, f32) {
     const SINE: [f32; 6] = [
         -1.0 / 39_916_800.0,
@@ -120,9 +120,9 @@ pub fn sine_over_angle_and_cosine(t: f32) -> (f32, f32) {
     (horner(&SINE), horner(&COSINE))
 }
 
-/// θ / tan θ, of a tangent up to 2 to 0.005: good for a first guess.
+/// θ / tan θ, for tangents up to 2 exact to 0.005: good enough for a first guess.
 fn angle_over_tangent([x, y]: [f32; 2]) -> f32 {
-    // arctan t / t ≈ 3 / (1 + 2 √(1 + t²)), Shafer's.
+    // Shafer's formula: arctan t / t ≈ 3 / (1 + 2 √(1 + t²)).
     3.0 / (1.0 + 2.0 * sqrt(1.0 + x * x + y * y))
 }
 

@@ -1,10 +1,10 @@
-//! Where the markers' images go under a load, with the slopes of that.
+//! Predicts the motion of the markers' images under a load, with its slopes.
 //!
-//! Each marker has a table of its own, finer where the tip is near it. All are made of the same few
+//! Each marker has its own table, finer where the tip is near the marker. All tables share a few
 //! functions of size and tilt, which are sums of the terms. Each marker sees the tilt from its own
-//! side, but the size is the same for all: what follows from that is worked out once. Of a function
-//! only those terms are kept that a mirror at the tilt's first axis leaves, or those that it turns:
-//! films are nearly mirrored there, and half of the terms are half of the work.
+//! side, but the size is the same for all; its part is computed once. A function keeps only terms
+//! that are even, or only terms that are odd, under a mirror at the tilt's first axis. Films are
+//! nearly symmetric there, and half of the terms are half of the work.
 
 use super::pose::Pose;
 use super::solve::{Column, EQUATIONS, UNKNOWNS};
@@ -12,9 +12,9 @@ use super::table::{Answer, Table};
 use super::terms::{Limits, Powers, Sizes, Terms, Tilts};
 use crate::force::kernels::Factors;
 
-/// Markers.
+/// Number of markers.
 pub const DOTS: usize = EQUATIONS / 2;
-/// Functions of size and tilt at most.
+/// Most functions of size and tilt.
 pub const MOST_FUNCTIONS: usize = 16;
 
 /// Positions along x and y for each marker.
@@ -24,25 +24,25 @@ pub type Markers = [[f32; 2]; DOTS];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tables<'a> {
     terms: Terms,
-    /// By function and its terms, f32 each: functions of even powers of the tilt's second part, and
-    /// of odd ones.
+    /// By function and term, f32 each: functions of even powers of the tilt's second part, then
+    /// those of odd powers.
     functions: [&'a [[u8; 4]]; 2],
     dots: [Table<'a>; DOTS],
 }
 
-/// Where the images go.
+/// The motion of the images.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prediction {
-    /// x and y of the markers, in focal lengths.
+    /// x and y of the markers, focal lengths.
     pub moved: Column,
     /// Slopes by size, tilt along x and y (1/rad), place along x and y (1/mm).
     pub slopes: [Column; UNKNOWNS],
 }
 
 impl<'a> Tables<'a> {
-    /// Of functions' parts of each term, first those of even powers of the tilt's second part, and
-    /// tables of as many functions each; `None` where their numbers do not fit, or a part is not
-    /// within ±1.
+    /// Takes the functions' coefficients of each term, functions of even powers of the tilt's
+    /// second part first, and a table of each marker. Returns `None` if the numbers of terms and
+    /// functions do not fit, or a coefficient is not within ±1.
     pub fn new(
         terms: Terms,
         functions: [&'a [u8]; 2],
@@ -73,7 +73,7 @@ impl<'a> Tables<'a> {
         })
     }
 
-    /// The first and the last place along both axes that all tables hold, mm.
+    /// The first and the last place that all tables cover along both axes, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
         let axes = self.dots.iter().flat_map(Table::axes);
         axes.fold([f32::MIN, f32::MAX], |[from, to], axis| {
@@ -82,8 +82,8 @@ impl<'a> Tables<'a> {
         })
     }
 
-    /// Where the images of markers go that are glued `beside_mm` of the tables': a marker beside
-    /// its place is as one in its place, with the tip as far beside the other way.
+    /// Predicts the motion of markers that are glued `beside_mm` from their nominal places. That
+    /// equals a nominal marker with the tip displaced by the opposite.
     pub fn predict(&self, pose: &Pose, limits: &Limits, beside_mm: &Markers) -> Prediction {
         let sizes = Sizes::at(pose.size, limits);
         let mut tilts = [Tilts::NONE; DOTS];
@@ -105,7 +105,7 @@ impl<'a> Tables<'a> {
         prediction
     }
 
-    /// What the functions are under a load of a size, at the tilt as each marker sees it.
+    /// Computes the functions under a load of a size, at the tilt as each marker sees it.
     fn set_functions(
         &self,
         sizes: &Sizes,

@@ -1,7 +1,8 @@
-//! Linear equations for five unknowns, by least squares.
+//! Solves linear equations for five unknowns by least squares.
 //!
-//! Modified Gram–Schmidt, the right side as a sixth column: as stable as Householder's reflections
-//! for least squares (Björck 1967), and nothing is squared.
+//! Modified Gram–Schmidt with the right side as a sixth column. It is as stable as Householder's
+//! reflections for least squares (Björck 1967), and avoids the squared condition of normal
+//! equations.
 
 use crate::force::kernels::sqrt;
 
@@ -9,36 +10,36 @@ use crate::force::kernels::sqrt;
 pub const UNKNOWNS: usize = 5;
 /// Equations of the markers: x and y of each.
 pub const EQUATIONS: usize = 8;
-/// A column of which less than this part is left beside those before it says nothing of its own:
-/// the tables' slopes are exact to some 10⁻³ of the largest.
+/// A column whose remainder after Gram–Schmidt is below this fraction of the whole column cannot be
+/// distinguished from those before it: the tables' slopes are exact to some 10⁻³ of the largest.
 const LEAST_OWN: f32 = 1e-3;
 
 /// A column of the markers' equations.
 pub type Column = [f32; EQUATIONS];
-/// Size, tilt along x and y, place along x and y, or what they change.
+/// Size, tilt along x and y, place along x and y, or their changes.
 pub type Unknowns = [f32; UNKNOWNS];
 
-/// The square of what has these parts.
+/// The sum of the squares of these parts.
 pub(crate) fn square(parts: &[f32]) -> f32 {
     parts.iter().fold(0.0, |sum, part| sum + part * part)
 }
 
-/// What equations say.
+/// The solution of the equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solved {
     /// The unknowns.
     pub unknowns: Unknowns,
-    /// The square of what no unknowns explain, of the right side.
+    /// The squared part of the right side that no unknowns explain.
     pub left_over: f32,
-    /// The square of what they explain.
+    /// The squared part that they explain.
     pub explained: f32,
-    /// By unknown: rows whose products are the unknowns' covariances when the equations' are the
-    /// unit matrix.
+    /// One row for each unknown. Products of rows are the unknowns' covariances if those of the
+    /// equations are the unit matrix.
     pub spread: [[f32; UNKNOWNS]; UNKNOWNS],
 }
 
 impl Solved {
-    /// The covariance of two unknowns. Once in the near memory, which is scarce.
+    /// The covariance of two unknowns. Compiled once, because the near memory is scarce.
     #[inline(never)]
     pub fn covariance(&self, a: usize, b: usize) -> f32 {
         let [Some(a), Some(b)] = [a, b].map(|unknown| self.spread.get(unknown)) else {
@@ -48,8 +49,8 @@ impl Solved {
         pairs.fold(0.0, |sum, (a, b)| sum + a * b)
     }
 
-    /// The nearest unknowns to `unknowns`, by what the equations say, in which those at `first` and
-    /// after it are less by `less` along a direction of length one.
+    /// Returns the unknowns nearest to `unknowns`, weighted by the equations, whose entries at
+    /// `first` and after it are smaller by `less` along the unit vector `along`.
     pub fn held_back(
         &self,
         unknowns: Unknowns,
@@ -70,8 +71,9 @@ impl Solved {
     }
 }
 
-/// The unknowns whose combination of `columns` is nearest to `side`, of which what they do not
-/// explain is left; `None` when the columns do not tell them apart, or a number is no number.
+/// Returns the unknowns whose combination of `columns` is nearest to `side`, and leaves the
+/// residual in `side`. Returns `None` if the columns do not determine them, or a number is not
+/// finite.
 pub fn solve<const N: usize>(
     mut columns: [[f32; N]; UNKNOWNS],
     side: &mut [f32; N],
@@ -81,7 +83,7 @@ pub fn solve<const N: usize>(
     let mut along = [0.0; UNKNOWNS];
     for k in 0..UNKNOWNS {
         let own = norm(&columns[k]);
-        // Not more than the whole, up to rounding; what is no number is not among them.
+        // Up to rounding, at most the whole column's norm; NaN is outside the range.
         if !(f32::MIN_POSITIVE.max(LEAST_OWN * whole[k])..2.0 * whole[k]).contains(&own) {
             return None;
         }
@@ -112,7 +114,7 @@ pub fn solve<const N: usize>(
     sound.then_some(solved)
 }
 
-/// Of an upper triangular matrix with nothing near zero on its diagonal.
+/// The inverse of an upper triangular matrix whose diagonal is not near zero.
 fn inverse(upper: &[[f32; UNKNOWNS]; UNKNOWNS]) -> [[f32; UNKNOWNS]; UNKNOWNS] {
     let mut inverse = [[0.0; UNKNOWNS]; UNKNOWNS];
     for column in 0..UNKNOWNS {
@@ -130,7 +132,7 @@ fn norm<const N: usize>(column: &[f32; N]) -> f32 {
     sqrt(dot(column, column))
 }
 
-/// In four sums, none of which waits for another.
+/// Four independent sums, so that none waits for another.
 fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
     let mut sums = [0.0; 4];
     for (k, (a, b)) in a.iter().zip(b).enumerate() {
@@ -177,7 +179,7 @@ mod tests {
             let Some(solved) = solve(columns, &mut side.clone()) else {
                 return Ok(());
             };
-            // What a rounding of the equations may move an unknown by.
+            // How far a rounding of the equations may move an unknown.
             let side = norm(&side);
             for (k, unknown) in unknowns.iter().enumerate() {
                 let spread = solved.covariance(k, k).sqrt();
@@ -187,8 +189,8 @@ mod tests {
             prop_assert!(solved.left_over <= 1e-6 * side * side);
         }
 
-        /// Against f64 normal equations: nearest, with what is left at right angles to every
-        /// column.
+        /// Compared with normal equations in f64: the solution is nearest, its residual orthogonal
+        /// to every column.
         #[test]
         fn what_is_left_is_across_all_columns(
             parts in prop::array::uniform(-1.0f32..1.0),
@@ -242,7 +244,7 @@ mod tests {
 
     #[test]
     fn the_covariance_is_that_of_the_normal_equations() {
-        // Columns at right angles, of lengths 1, 2, 3, 4 and 5.
+        // Orthogonal columns of lengths 1, 2, 3, 4 and 5.
         let mut all = [[0.0; 8]; 5];
         for (k, column) in all.iter_mut().enumerate() {
             column[k] = (k + 1) as f32;

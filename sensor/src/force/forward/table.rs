@@ -1,25 +1,25 @@
-//! How one marker's image moves: splines over the tip's place, whose coefficients count as
-//! functions of size and tilt say.
+//! Holds the motion of one marker's image: splines over the tip's place, whose coefficients are
+//! weighted by functions of size and tilt.
 //!
-//! Coefficients are steps of 16 bits, whose size is in the function's own. Along both axes they
-//! are summed up in integers, which cannot overflow whatever a file says (`kernels::spline`); what
-//! is left is single precision.
+//! Coefficients are 16-bit integers in steps; the step's size is part of the function. Sums along
+//! both axes are integers, which cannot overflow for any file (`kernels::spline`). All else is
+//! single precision.
 
 use super::axis::{Axis, ONE, Weights};
 use super::predict::MOST_FUNCTIONS;
 use crate::force::kernels::{Factors, Parts, spline};
 
-/// Steps that a sum over both axes is in parts of: what weights are parts of, squared, / 2¹⁶.
+/// Unit of a sum over both axes: the weights' unit squared, over 2¹⁶.
 const SUM: f32 = 65_536.0 / (ONE * ONE);
-/// Motion along x and along y.
+/// Outputs: motion along x and along y.
 pub const OUTPUTS: usize = 2;
 
-/// How a marker's image moves along x and y, each a sum of functions of size and tilt whose
+/// How a marker's image moves along x and y. Each is a sum of functions of size and tilt whose
 /// coefficients are splines over the place. Borrowed from a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<'a> {
     axes: [Axis<'a>; 2],
-    /// The direction along which the first part of its functions' tilt is.
+    /// The direction of the first part of the functions' tilt.
     away: [f32; 2],
     functions: usize,
     /// By node along y, output, function and node along x, i16 each.
@@ -45,8 +45,8 @@ pub struct Answer {
 }
 
 impl<'a> Table<'a> {
-    /// Of axes along x and y, a direction of the tilt's first part and these bytes, as many as
-    /// [`Table::length`] says; `None` of others.
+    /// Takes the axes along x and y, the direction of the tilt's first part, and the steps. Returns
+    /// `None` if the number of functions or of bytes ([`Table::length`]) is wrong.
     pub fn new(
         axes: [Axis<'a>; 2],
         away: [f32; 2],
@@ -73,12 +73,12 @@ impl<'a> Table<'a> {
         &self.axes
     }
 
-    /// How many functions it is a sum of.
+    /// Number of functions.
     pub fn functions(&self) -> usize {
         self.functions
     }
 
-    /// A tilt along its direction and across that.
+    /// A tilt split along the table's direction and across it.
     pub fn tilt(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let [c, s] = self.away;
         [c * a + s * b, c * b - s * a]
@@ -93,8 +93,9 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// An output (0 along x, 1 along y) with its slopes, by what its functions and their slopes are
-    /// under a load: by size, and by the tilt along its direction and across that.
+    /// Returns an output (0 along x, 1 along y) with its slopes. `functions` holds the functions
+    /// under a load, and their slopes by size, by the tilt along the table's direction and across
+    /// it.
     pub fn answer(&self, output: usize, place: &Place, functions: &[Factors]) -> Answer {
         let count = self.functions.min(functions.len());
         let functions = functions.get(..count).unwrap_or_default();
@@ -114,7 +115,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// The sums of an output's coefficients around a place, times factors.
+    /// Sums an output's coefficients around a place, times the factors.
     fn spline(&self, output: usize, place: &Place, factors: &[Factors]) -> [f32; 6] {
         let node = 2 * self.axes[0].count();
         let before = (place.y.first * OUTPUTS + output) * self.functions * node + 2 * place.x.first;
@@ -138,7 +139,7 @@ mod tests {
     /// Of 30°.
     const AWAY: [f32; 2] = [0.866_025_4, 0.5];
 
-    /// Nodes every mm from -3 to 3.
+    /// Nodes every mm from −3 to 3.
     const NODES: [[u8; 4]; 7] = {
         let mut nodes = [[0; 4]; 7];
         let mut k = 0;
@@ -164,7 +165,7 @@ mod tests {
         all.map(|function| function.map(|part| STEP * part))
     }
 
-    /// The steps from a function of their index.
+    /// A table whose steps are a function of their index.
     fn with<R>(step: impl Fn(usize) -> i16, use_it: impl FnOnce(&Table) -> R) -> R {
         let steps = Table::length(&axes(), FUNCTIONS);
         let steps: Vec<u8> = (0..steps / 2).flat_map(|k| step(k).to_le_bytes()).collect();
@@ -207,8 +208,8 @@ mod tests {
         );
     }
 
-    /// The largest steps everywhere, of either sign: nothing overflows (tests check it), and the
-    /// sum is what it should be.
+    /// The largest steps of either sign everywhere: nothing overflows (tests check overflow), and
+    /// the sum is right.
     #[test]
     fn the_largest_steps_add_up() {
         for step in [i16::MIN, i16::MAX] {
@@ -228,7 +229,7 @@ mod tests {
                 },
             );
         }
-        // Signs as the slopes' parts have them.
+        // Steps with the signs of the slopes' weights.
         let [x, y] = axes().map(|axis| axis.at(0.4));
         let sign = |k: usize| {
             let (i, j) = (k % 6, k / (OUTPUTS * FUNCTIONS * 6));

@@ -1,14 +1,14 @@
-//! The polynomials in size and tilt that the answer of a film at one place is a sum of.
+//! Evaluates the polynomials in size and tilt of which the film's answer at one place is a sum.
 
 use crate::force::kernels::Factors;
 
-/// Terms of a set at most.
+/// Most terms of a set.
 pub const MOST_TERMS: usize = 88;
-/// Sizes of a group at most.
+/// Most sizes of a group.
 pub const MOST_SIZES: usize = 8;
-/// Degrees of tilt, with that of none.
+/// Number of degrees of tilt, degree 0 included.
 pub const MOST_TILTS: usize = 5;
-/// The powers j and k of the groups of even k: first by j + k, then by k.
+/// The powers j and k of the groups of even k: sorted by j + k, then by k.
 pub const EVEN: [[usize; 2]; 9] = [
     [0, 0],
     [1, 0],
@@ -20,21 +20,21 @@ pub const EVEN: [[usize; 2]; 9] = [
     [2, 2],
     [0, 4],
 ];
-/// The same of odd k.
+/// The same for odd k.
 pub const ODD: [[usize; 2]; 6] = [[0, 1], [1, 1], [2, 1], [0, 3], [3, 1], [1, 3]];
 
 /// A set of terms s·T_i(2s/s_max − 1)·a^j·b^k: Chebyshev polynomials of the size s, powers of the
 /// tilt (a, b) in parts of the largest.
 ///
-/// There are so many sizes without tilt, so many with each a^j·b^k of the first degree, and so on.
-/// Terms of one a^j·b^k are a *group*: degrees one after the other, in each j falling.
+/// The number of sizes depends on the degree j + k of the tilt. Terms of one a^j·b^k are a *group*.
+/// Groups are sorted by degree, and by falling j within a degree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Terms {
-    /// For each degree of tilt.
+    /// Number of sizes for each degree of tilt.
     sizes: [u8; MOST_TILTS],
 }
 
-/// The largest size and tilt (rad) of a film's loads: what its terms are scaled by.
+/// The largest size and tilt (rad) of a film's loads, which scale the terms.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// The largest size.
@@ -43,21 +43,21 @@ pub struct Limits {
     pub tilt: f32,
 }
 
-/// What terms with a size are, s·T_i, and their slopes by it.
+/// The size's factors of the terms, s·T_i, and their slopes.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes([[f32; 2]; MOST_SIZES]);
 
-/// The powers of one part of a tilt, in parts of the largest.
+/// The powers of one part of a tilt, relative to the largest.
 #[derive(Clone, Copy, Debug)]
 pub struct Powers {
     /// a^j.
     values: [f32; MOST_TILTS],
-    /// Their slopes, 1/rad.
+    /// The slopes of the powers, 1/rad.
     slopes: [f32; MOST_TILTS],
 }
 
-/// What terms with a tilt are: a^j·b^k of the groups of even k and of odd k, and its slopes by the
-/// tilt along both its parts, 1/rad.
+/// The tilt's factors of the terms: a^j·b^k of the groups of even k and of odd k, and their slopes
+/// by both parts of the tilt, 1/rad.
 #[derive(Clone, Copy, Debug)]
 pub struct Tilts {
     even: [[f32; 3]; EVEN.len()],
@@ -65,7 +65,7 @@ pub struct Tilts {
 }
 
 impl Terms {
-    /// `None` when it would be none or more than [`MOST_TERMS`], or one size has more than
+    /// Returns `None` if there are no terms or more than [`MOST_TERMS`], or a degree has more than
     /// [`MOST_SIZES`].
     pub fn new(sizes: [u8; MOST_TILTS]) -> Option<Terms> {
         let most = sizes.iter().max().map_or(0, |most| usize::from(*most));
@@ -75,20 +75,20 @@ impl Terms {
         sound.then_some(terms)
     }
 
-    /// How many there are of even k, and of odd k.
+    /// Number of terms of even k, and of odd k.
     pub fn counts(&self) -> [usize; 2] {
         let of = |[j, k]: &[usize; 2]| self.sizes_of(j + k);
         [EVEN.iter().map(of).sum(), ODD.iter().map(of).sum()]
     }
 
-    /// How many sizes there are of a degree of tilt.
+    /// Number of sizes of a degree of tilt.
     #[inline]
     fn sizes_of(&self, degree: usize) -> usize {
         self.sizes.get(degree).copied().map_or(0, usize::from)
     }
 
-    /// What a sum of the terms of even k, of these parts, is under a load of a size and of each of
-    /// these tilts.
+    /// Computes a function with the coefficients `parts` of the terms of even k, for one size and
+    /// each of these tilts.
     #[inline]
     pub fn even(
         &self,
@@ -104,7 +104,7 @@ impl Terms {
         }
     }
 
-    /// The same of odd k.
+    /// The same for odd k.
     #[inline]
     pub fn odd(
         &self,
@@ -120,7 +120,7 @@ impl Terms {
         }
     }
 
-    /// What each group of terms counts under a load of a size, and the slope of that by the size.
+    /// Sums each group over the size, and its slope by the size.
     #[inline]
     fn sum_up(
         &self,
@@ -138,7 +138,7 @@ impl Terms {
     }
 }
 
-/// A sum of terms with a size, and its slope.
+/// A sum of the size's factors, and its slope.
 #[inline]
 fn sum(parts: &[[u8; 4]], sizes: &Sizes) -> [f32; 2] {
     let mut sums = [0.0; 2];
@@ -149,7 +149,7 @@ fn sum(parts: &[[u8; 4]], sizes: &Sizes) -> [f32; 2] {
     sums
 }
 
-/// A function under a tilt, by what its groups count.
+/// A function under a tilt, from the sums of its groups.
 #[inline]
 fn tilted<const G: usize>(groups: &[[f32; 2]; G], tilts: &[[f32; 3]; G]) -> Factors {
     let mut sums = Factors::default();
@@ -197,13 +197,13 @@ impl Powers {
 }
 
 impl Tilts {
-    /// Before there is a tilt.
+    /// The value before [`Tilts::set`].
     pub const NONE: Tilts = Tilts {
         even: [[0.0; 3]; EVEN.len()],
         odd: [[0.0; 3]; ODD.len()],
     };
 
-    /// Of the powers of both parts of a tilt.
+    /// Sets the products of powers of both parts of a tilt.
     pub fn set(&mut self, a: &Powers, b: &Powers) {
         let even = EVEN.iter().zip(&mut self.even);
         for ([j, k], group) in even.chain(ODD.iter().zip(&mut self.odd)) {
@@ -214,7 +214,7 @@ impl Tilts {
     }
 }
 
-/// One of the powers; indices of groups are below their number, so that nothing else is read.
+/// A power by its degree. The groups' degrees are below the number of powers.
 #[inline]
 fn power(of: &[f32; MOST_TILTS], degree: usize) -> f32 {
     of.get(degree).copied().unwrap_or(0.0)
@@ -260,7 +260,7 @@ mod tests {
         }
     }
 
-    /// Every a^j·b^k to the fourth degree is a group, once.
+    /// Every a^j·b^k up to the fourth degree is in exactly one group.
     #[test]
     fn groups_are_all_there_are() {
         let mut all: Vec<_> = EVEN.iter().chain(&ODD).map(|[j, k]| (j + k, *k)).collect();
@@ -298,8 +298,7 @@ mod tests {
         }
     }
 
-    /// On the other side of the tilt's first axis functions of even k are the same, and those of
-    /// odd k the opposite.
+    /// Mirroring the tilt at its first axis keeps functions of even k, and negates those of odd k.
     #[test]
     fn a_mirror_turns_odd_functions() {
         let terms = Terms::new(TERMS).unwrap();

@@ -1,10 +1,10 @@
-//! What a film's own weight does to the images: at rest, and less under a load.
+//! Computes how the film's own weight moves the images: at rest, and less under a load.
 //!
-//! Weight along the film's normal acts as a load of its own. With it the film is as large a load's
-//! as the root a of |F|(a) = |F|(s) − p·g_z, s being the tip's, and what it moves is nearly in
-//! proportion to Δ = a − s: all of it hangs from that at rest, some hundredths under a deep press.
-//! Functions of Δ and of gravity along the film are made once, when gravity changes; a frame sums
-//! what is left of them over the load.
+//! Weight along the film's normal acts as a load of its own. With it, the film is as under a load
+//! of size a, the root of |F|(a) = |F|(s) − p·g_z, with the tip's size s. The motion is nearly in
+//! proportion to Δ = a − s; under a deep press it is a few hundredths of that at rest. Functions of
+//! Δ and of gravity along the film are computed once, when gravity changes. Each frame sums the
+//! rest over the load.
 
 use super::covariance::{Covariance, between};
 use super::mounting::Mounting;
@@ -16,75 +16,76 @@ use super::{Forward, Markers};
 use crate::force::kernels::sqrt;
 use crate::force::rest::Rest;
 
-/// Gravity along x, y and z of the film's frame, in parts of g.
+/// Gravity along x, y and z of the film frame, in g.
 pub type Gravity = [f32; 3];
 
-/// Functions of gravity that sum up to what weight does at rest: Δ, Δ², Δ³, x, y, x·Δ and y·Δ.
+/// Number of functions of gravity whose sum is the effect at rest: Δ, Δ², Δ³, x, y, x·Δ and y·Δ.
 pub const AT_REST: usize = 7;
-/// Those of which more is added under a load: Δ, Δ², x and y.
+/// Number of functions that have an additional part under a load: Δ, Δ², x and y.
 pub const UNDER_LOAD: usize = 4;
-/// Sizes at which it is known what is added, the squares of even parts of the largest; at none
-/// nothing is.
+/// Number of sizes at which the additional part is given: (k/n)² of the largest, k from 1. It is 0
+/// at size 0.
 pub const SIZES: usize = 10;
-/// Functions of place and tilt: 1, x, y, x², x·y, y², of the tilt a and b, a² + b².
+/// Number of functions of place and tilt: 1, x, y, x², x·y, y², the tilt's a and b, a² + b².
 pub const TERMS: usize = 9;
-/// Bytes of what is added at a size by a function of gravity: a step, and parts of each coordinate
-/// and term.
+/// Bytes of the additional part at one size by one function of gravity: a step, and a coefficient
+/// of each coordinate and term.
 const BLOCK: usize = 4 + 2 * EQUATIONS * TERMS;
-/// Bytes of all of it.
+/// Bytes of all additional parts.
 pub const BYTES: usize = SIZES * UNDER_LOAD * BLOCK;
-/// Steps of what is added.
+/// Allowed steps of the additional part.
 pub const LEGAL: core::ops::RangeInclusive<f32> = 0.0..=1e3;
-/// Beyond this place, mm, it is as there.
+/// Places are limited to this, mm.
 const LAST_MM: f32 = 5.0;
 /// Newton's steps to a size.
 const STEPS: usize = 12;
-/// Standard uncertainty of gravity that nobody told, in parts of what g along an axis does: one
-/// that was turned over is within two of it. Any two directions are √(2/3) apart along each axis.
+/// Standard uncertainty of an unknown gravity, relative to the effect of 1 g along an axis. A
+/// sensor that was turned over is within two of it. Any two directions differ by √(2/3) along each
+/// axis (root mean square).
 const ANY_WAY: f32 = 1.0;
-/// What these functions leave of each coordinate, standard uncertainty: this part of what weight
-/// does under the load, and that part of what a turn did at rest times the softness. Under some mN
-/// the film turns inside out where gravity pulls away from the camera.
+/// Standard uncertainty of each coordinate that these functions leave. `LEFT`: relative to the
+/// effect of weight under the load. `LEFT_OF_TURN`: relative to the effect of a turn at rest, times
+/// the softness. Below a few mN the film buckles inside out if gravity pulls away from the camera.
 const LEFT: f32 = 0.02;
 const LEFT_OF_TURN: f32 = 0.15;
-/// Gravity that differs by less than this, in parts of g, is the same.
+/// Gravity counts as equal if it differs by less than this, in g.
 const SAME: f32 = 2e-3;
-/// How often a rest picture is read to tell how large weight's effect is in it: each reading leaves
-/// a twentieth of the error of the one before.
+/// How often a rest picture is read to find the size of the weight's effect in it: each reading
+/// leaves a twentieth of the previous error.
 const READINGS: usize = 3;
 
-/// What weight does, borrowed from a model file.
+/// The effect of weight, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weight<'a> {
-    /// Gravity on the film that the tables and the model's own rest position are of; zeros: it
-    /// weighed nothing.
+    /// Gravity on the film of the tables and of the model's own rest position. Zeros: that film had
+    /// no weight.
     pub down: Gravity,
     /// The press that sinks the film as its weight does, N.
     pub press_n: f32,
-    /// Standard uncertainty of what weight does, in parts of that: of the unit that the model was
-    /// made on, and of any other.
+    /// Relative standard uncertainty of the effect: of the unit that the model was made on, and of
+    /// any other.
     pub unsure: [f32; 2],
-    /// What it does at rest by each function, focal lengths.
+    /// The effect at rest of each function, focal lengths.
     pub at_rest: [Column; AT_REST],
-    /// What is added at each size by each function, divided by the film's [softness](soft).
+    /// The additional part at each size of each function, divided by the film's [softness](soft).
     pub under_load: &'a [[u8; BLOCK]],
 }
 
-/// How functions of gravity depend on a film and the load that is on it.
+/// What the functions of gravity need to know of a film.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Functions {
-    /// How strong the force of a size is.
+    /// The force of each size.
     pub stiffness: Stiffness,
     /// As [`Weight::press_n`].
     pub press_n: f32,
 }
 
-/// What is known of gravity on a sensor, when its rest position was taken and now.
+/// What is known of gravity on a sensor: when its rest position was taken, and now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turned {
-    /// It may be any, both times.
+    /// Unknown, both times.
     AnyWay,
-    /// It is this.
+    /// Known, both times.
     From {
         /// When the rest position was taken.
         before: Gravity,
@@ -93,25 +94,25 @@ pub enum Turned {
     },
 }
 
-/// What weight does beside what the tables say, gravity being what it is.
+/// The effect of weight under this gravity, in addition to what the tables include.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hanging {
-    /// Whether the prediction has it; else only its uncertainty.
+    /// True if the prediction includes the effect; otherwise only the covariance does.
     is_told: bool,
-    /// What it does by size and term of each coordinate, divided by the softness.
+    /// The effect by size, coordinate and term, divided by the softness.
     sizes: [[[f32; TERMS]; EQUATIONS]; SIZES + 1],
-    /// What of that the rest position has.
+    /// The part of the effect that the rest position includes.
     at_rest: Column,
-    /// What is uncertain of it at rest, and by how much in parts of it all.
+    /// The uncertain effect at rest, and its relative standard uncertainty.
     moved: Column,
     unsure: f32,
-    /// Gravity along the film, when it is not known: what it does along x and along y.
+    /// For an unknown gravity: the effect of gravity along x and along y.
     along: Option<[Column; 2]>,
 }
 
 impl<'a> Weight<'a> {
-    /// From the bytes of a file; `None` where there are fewer or more than [`BYTES`], or a step is
-    /// not within [`LEGAL`].
+    /// From the bytes of a file. Returns `None` if their number is not [`BYTES`], or a step is not
+    /// within [`LEGAL`].
     pub fn under_load_of(bytes: &'a [u8]) -> Option<&'a [[u8; BLOCK]]> {
         let (blocks, rest) = bytes.as_chunks();
         let sound = blocks.len() == SIZES * UNDER_LOAD
@@ -120,8 +121,7 @@ impl<'a> Weight<'a> {
         sound.then_some(blocks)
     }
 
-    /// How far the images of a film that gravity pulls on so are from a weightless film's, at rest,
-    /// focal lengths.
+    /// How far gravity moves the images at rest, compared with a weightless film, focal lengths.
     pub fn hangs(&self, stiffness: &Stiffness, gravity: Gravity) -> Column {
         let mut sum = Column::default();
         let parts = self.functions(stiffness).at(0.0, gravity);
@@ -131,8 +131,8 @@ impl<'a> Weight<'a> {
         sum
     }
 
-    /// What a sensor shows that was turned so, beside what the tables say; of the unit that they
-    /// were made on, or of another.
+    /// Returns the effect of weight on a turned sensor, in addition to the tables: for the unit
+    /// that they were made on (`is_own`), or for another.
     pub fn hanging(
         &self,
         stiffness: &Stiffness,
@@ -184,7 +184,7 @@ impl<'a> Weight<'a> {
         }
     }
 
-    /// A part of what gravity does at the size of a number, more.
+    /// Adds `part` times the effect of a gravity at the size with this number.
     fn add_at(
         &self,
         number: usize,
@@ -211,7 +211,7 @@ impl<'a> Weight<'a> {
 }
 
 impl Forward<'_> {
-    /// A rest position as it is where gravity pulls as it did on the model's own film.
+    /// Converts a rest position under today's gravity to the gravity of the model's own film.
     pub fn as_made(&self, rest: &Rest, turned: Turned) -> Rest {
         match (&self.weight, turned) {
             (Some(weight), Turned::From { now, .. }) => self.turned(rest, now, weight.down),
@@ -219,7 +219,7 @@ impl Forward<'_> {
         }
     }
 
-    /// A rest position that was taken under a gravity, as it is under another.
+    /// Converts a rest position from one gravity to another.
     pub fn turned(&self, rest: &Rest, from: Gravity, to: Gravity) -> Rest {
         let Some(weight) = &self.weight else {
             return *rest;
@@ -244,8 +244,8 @@ impl Forward<'_> {
         }
     }
 
-    /// What a sensor that was turned so shows beside what the tables say; nothing where gravity is
-    /// always as it was on the model's own film, or the file does not say.
+    /// Returns the effect of weight on a turned sensor, in addition to the tables. Returns `None`
+    /// if gravity has always been as on the model's own film, or the file has no weight section.
     pub fn hanging(&self, turned: Turned, is_own: bool) -> Option<Hanging> {
         let weight = self.weight.as_ref()?;
         if let Turned::From { before, now } = turned
@@ -267,7 +267,7 @@ impl Functions {
     pub fn at(&self, size: f32, [x, y, z]: Gravity) -> [f32; AT_REST] {
         let stiffness = &self.stiffness;
         let with_n = stiffness.magnitude_n(size) - self.press_n * z;
-        // An odd function, whose root Newton's steps find from above.
+        // An odd function; Newton's steps find its root from above.
         let (sign, with_n) = if with_n < 0.0 {
             (-1.0, -with_n)
         } else {
@@ -288,7 +288,7 @@ pub fn terms(place_mm: [f32; 2], [a, b]: [f32; 2]) -> [f32; TERMS] {
     [1.0, x, y, x * x, x * y, y * y, a, b, a * a + b * b]
 }
 
-/// How much softer the film is at rest than under a load of a size, inverted: 1 at rest.
+/// The softness of the film under a load of a size, relative to rest: 1 at rest, less under load.
 pub fn soft(stiffness: &Stiffness, size: f32) -> f32 {
     stiffness.linear_n / stiffness.per_size_n(size)
 }
@@ -312,8 +312,7 @@ fn add_block(block: &[u8; BLOCK], part: f32, sum: &mut [[f32; TERMS]; EQUATIONS]
 }
 
 impl Hanging {
-    /// Adds what weight does under a load to what the tables say, and what of it is uncertain to a
-    /// covariance.
+    /// Adds the effect of weight under a load to a prediction, and its uncertainty to a covariance.
     #[inline(never)]
     pub fn add_to(
         &self,
@@ -344,7 +343,7 @@ impl Hanging {
         }
     }
 
-    /// What weight does under a load beside what it does at rest, and its slope by the size.
+    /// The effect of weight under a load minus that at rest, and its slope by the size.
     fn more(&self, pose: &Pose, stiffness: &Stiffness, limits: &Limits) -> (Column, Column) {
         let terms = terms(pose.place_mm, pose.tilt);
         let size = limited(pose.size / limits.size, 1e-6, 1.0);
@@ -371,7 +370,7 @@ impl Hanging {
     }
 }
 
-/// The covariance of what moves along a column with a standard uncertainty, more.
+/// Adds the covariance of a motion along a column with a standard uncertainty.
 fn add_square(covariance: &mut Covariance, along: &Column, sigma: f32) {
     for (i, row) in covariance.iter_mut().enumerate() {
         for (sum, part) in row[..=i].iter_mut().zip(along) {

@@ -1,13 +1,12 @@
 //! Kernels for Cortex-M4 and M7, in assembly, scheduled for the M7's two issues a cycle.
 //!
 //! All of them lie in sections `.itcm.*`, which a linker script can put into the memory nearest to
-//! the core. The cycles said here are those of LLVM's model of the core
-//! (`llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7`, the block between a label and the
-//! branch back to it), with weights and inputs in memory without wait states.
+//! the core. Cycles are those of LLVM's model of the core (`llvm-mca -mtriple=thumbv7em-none-eabihf
+//! -mcpu=cortex-m7`, the block between a label and the branch back to it), with weights and inputs
+//! in memory without wait states.
 //!
-//! None of them touches the stack but for what it saves, none has paths that depend on
-//! data, and all follow the procedure call standard: r0–r3, r12 and the flags are lost,
-//! the Q flag may be set.
+//! All kernels use the stack only to save registers, have no paths that depend on data, and follow
+//! the procedure call standard. They overwrite r0–r3, r12 and the flags, and may set the Q flag.
 
 use core::arch::global_asm;
 
@@ -117,7 +116,7 @@ unsafe extern "C" {
     /// SMLAWB or SMLAWT; while those of one term are made, the term before is multiplied with its
     /// factors.
     ///
-    /// *No overflow.* See there: whatever the coefficients are.
+    /// *No overflow.* As shown at `portable::spline`, for any coefficients.
     ///
     /// *Contract.* `factors`, up to `end`, which lies a positive number of terms after it; `line`:
     /// bytes to the next line; `back`: bytes from a term's last line to the next term's first one,
@@ -140,11 +139,11 @@ unsafe extern "C" {
 
 /// The proof of [`hivtac_dot8`] for the widest layer.
 const _: () = assert!(MAX_WIDTH as i64 * MAX_WEIGHT8 as i64 * (MAX_ACTIVATION8 as i64) < 1 << 23);
-/// Whole blocks and groups fit the arrays, with what is loaded ahead.
+/// Whole blocks and groups fit the arrays, including the bytes that are loaded ahead.
 const _: () = assert!(MAX_WIDTH.is_multiple_of(32) && LOADED_AHEAD >= 4);
 
-/// As [`portable::multiply`](super::portable::multiply), if the weights are aligned as words;
-/// otherwise does nothing and gives false.
+/// As [`portable::multiply`](super::portable::multiply), if the weights are word-aligned. Otherwise
+/// returns false and does nothing.
 pub fn multiply(layer: &Layer<'_>, inputs: &mut Inputs, sums: &mut Sums) -> bool {
     let weights = layer.weights_and_more().as_ptr();
     if !weights.cast::<u32>().is_aligned() {
@@ -152,7 +151,7 @@ pub fn multiply(layer: &Layer<'_>, inputs: &mut Inputs, sums: &mut Sums) -> bool
     }
     let rows = layer.padded_outputs();
     let columns = layer.padded_inputs();
-    // The other half of the last pair, when the width is odd.
+    // The other half of the last pair, if the width is odd.
     let (Some(sums), Some(half)) = (sums.get_mut(..rows), inputs.0.get_mut(layer.inputs())) else {
         return false;
     };
@@ -180,8 +179,8 @@ pub fn multiply(layer: &Layer<'_>, inputs: &mut Inputs, sums: &mut Sums) -> bool
     true
 }
 
-/// As [`portable::activate`](super::portable::activate) for the first rows, and says for how many:
-/// whole groups of four if the layer's scaling is as the kernel needs it, otherwise none.
+/// As [`portable::activate`](super::portable::activate) for the first rows. Returns their number:
+/// all whole groups of four if the kernel supports the layer's scaling, otherwise 0.
 pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) -> usize {
     let rows = layer.outputs() & !3;
     let (biases, multipliers, shifts) = layer.scaling();
@@ -209,7 +208,8 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) -> usize {
     rows
 }
 
-/// As [`portable::spline`](super::portable::spline), for coefficients that are all there.
+/// As [`portable::spline`](super::portable::spline). Returns `None` unless all coefficients are
+/// inside `steps`.
 #[cfg(target_abi = "eabihf")]
 pub fn spline(
     steps: &[u8],

@@ -1,8 +1,8 @@
-//! The hottest loops, by the fastest means that this processor has.
+//! Runs the hottest loops in the fastest way that this processor offers.
 //!
-//! Each function is the definition in portable Rust, of the same name in `portable`, or a kernel
-//! that gives the same bits: on a Cortex-M4 or M7 (targets `thumbv7em-*`) those of `cortex_m7`, the
-//! only file of this package that holds `unsafe`.
+//! Each function is either the definition of the same name in `portable`, or a kernel that gives
+//! the same bits. Kernels exist for Cortex-M4 and M7 (targets `thumbv7em-*`), in `cortex_m7`, the
+//! only file of `force` that holds `unsafe`.
 
 #[cfg(armv7em)]
 #[allow(unsafe_code)]
@@ -14,17 +14,17 @@ pub use crate::markers::sqrt;
 use crate::force::layer::{Layer, MAX_WIDTH};
 use hivtac_terms::fixed::Q;
 
-/// What a kernel may read beyond the inputs of the widest layer: it loads ahead.
+/// Number of inputs beyond the widest layer's that a kernel may read: it loads ahead.
 const LOADED_AHEAD: usize = 4;
 
-/// The inputs of a layer. Those beyond a layer's width meet weights of zero: what they hold means
-/// nothing.
+/// The inputs of a layer. Values beyond the layer's width are multiplied by zero weights, so they
+/// may be anything.
 #[derive(Clone, Debug)]
 #[repr(C, align(4))]
 pub struct Inputs([i16; MAX_WIDTH + LOADED_AHEAD]);
 
-/// The sums of a layer's rows, before bias and rescaling. A layer of k rows fills up its last group
-/// of four.
+/// The sums of a layer's rows, before bias and rescaling. The last group of four rows is written in
+/// full.
 pub type Sums = [i32; MAX_WIDTH];
 
 impl Inputs {
@@ -40,7 +40,7 @@ impl Inputs {
     }
 }
 
-/// Σ w_ji·x_i of every row j of a layer. Afterwards the inputs mean nothing.
+/// Σ w_ji·x_i of every row j of a layer. Afterwards the inputs are undefined.
 pub fn multiply(layer: &Layer<'_>, inputs: &mut Inputs, sums: &mut Sums) {
     #[cfg(armv7em)]
     if cortex_m7::multiply(layer, inputs, sums) {
@@ -50,7 +50,7 @@ pub fn multiply(layer: &Layer<'_>, inputs: &mut Inputs, sums: &mut Sums) {
 }
 
 /// clamp(rescale(acc_j, m_j, s_j), 0, A) of every row j of a hidden layer, as inputs of the next
-/// one.
+/// layer.
 pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
     #[cfg(armv7em)]
     let done = cortex_m7::activate(layer, sums, inputs);
@@ -59,23 +59,23 @@ pub fn activate(layer: &Layer<'_>, sums: &Sums, inputs: &mut Inputs) {
     portable::activate(layer, sums, inputs.values_mut(), done);
 }
 
-/// Parts of coefficients at four by four nodes: those of the value and of the slope along each
-/// axis, whose sizes each add up to at most one and four roundings.
+/// Weights of coefficients at four by four nodes, for the value and for the slope along each axis.
+/// The absolute values of each set add up to at most one and four roundings.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(4))]
 pub struct Parts {
-    /// Along y, for each line: of the value and of the slope.
+    /// Along y, for each line: weight of the value and of the slope.
     pub y: [[Q<15, i16>; 2]; 4],
-    /// Along x: of the value, of the slope.
+    /// Along x: weights of the value, weights of the slope.
     pub x: [[Q<15, i16>; 4]; 2],
 }
 
-/// What a term's coefficient counts in an output, and in its slopes by size and by tilt along x and
+/// Factors of a term's coefficient in an output, and in its slopes by size and by tilt along x and
 /// y.
 pub type Factors = [f32; 4];
 
-/// An output at a place, and its slopes by size, by tilt along x and y, and along x and y: see
-/// `portable::spline`.
+/// Returns an output at a place, and its slopes by size, by tilt along x and y, and along x and y.
+/// Defined by `portable::spline`.
 pub fn spline(
     steps: &[u8],
     line: usize,

@@ -1,4 +1,4 @@
-//! The definition of every kernel, in portable Rust.
+//! Defines every kernel, in portable Rust.
 
 use super::{Factors, Parts, Sums};
 use crate::force::layer::{Layer, MAX_WIDTH};
@@ -6,8 +6,9 @@ use crate::force::packing::{ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 use crate::force::rescale::rescale_sum;
 use hivtac_terms::fixed::Q;
 
-/// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::force::model::Model::parse) has proven
-/// that it fits, in any order of summation. Apart from the kernel, which has the near memory.
+/// Σ w_ji·x_i of every row j of a layer. [`Model::parse`](crate::force::model::Model::parse) proves
+/// that it fits, in any order of summation. Not inlined into the kernel's section, which is in the
+/// near memory.
 #[cfg_attr(armv7em, inline(never))]
 pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
     match layer.weight_width() {
@@ -16,17 +17,17 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
     }
 }
 
-/// The sum of all terms times their factors, its slopes by size and tilt, by their own factors, and
-/// its slopes along x and y.
+/// Sums all terms times their factors. Returns the value, its slopes by size and tilt, by their own
+/// factors, and its slopes along x and y.
 ///
-/// A term is the sum of its coefficients at four by four nodes, 2¹⁴ times as large: its value, its
-/// slope along x and its slope along y. A coefficient is an i16; those of a term that lie beside
-/// each other along x follow each other, the next term's are `node` bytes farther, and those beside
-/// each other along y `line` bytes. What lies beyond the end counts as zero.
+/// A term is the weighted sum of its coefficients at four by four nodes, times 2¹⁴: a value, a
+/// slope along x and a slope along y. A coefficient is an i16. Neighbours along x are adjacent in
+/// memory, those along y `line` bytes apart, and the next term begins `node` bytes later.
+/// Coefficients beyond the end count as zero.
 ///
-/// With parts whose sizes add up to at most 2¹⁵ + 4 a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
-/// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, whatever the coefficients are.
-/// Apart from the kernel, as [`multiply`].
+/// If the absolute weights add up to at most 2¹⁵ + 4, a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
+/// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, for any coefficients. Not
+/// inlined, as [`multiply`].
 #[cfg_attr(armv7em, inline(never))]
 pub fn spline(
     steps: &[u8],
@@ -54,7 +55,7 @@ pub fn spline(
     sums
 }
 
-/// A term whose coefficients begin there: its value, its slope along x and its slope along y.
+/// A term whose coefficients begin at `at`: its value, its slope along x and its slope along y.
 fn around(steps: &[u8], at: usize, line: usize, parts: &Parts) -> [Q<14>; 3] {
     let times = |sum: Q<15>, part: Q<15, i16>| {
         let product: Q<30, i64> = Q::from_bits(i64::from(sum.bits()) * i64::from(part.bits()));
@@ -82,7 +83,7 @@ fn four(steps: &[u8], at: usize) -> [i16; 4] {
     [0, 1, 2, 3].map(|i| i16::from_le_bytes(pairs[i]))
 }
 
-/// `unpack` gives the N weights of a word.
+/// Sums rows by groups. `unpack` returns the N weights of a word.
 fn sum_groups<const N: usize>(
     layer: &Layer<'_>,
     inputs: &[i16; MAX_WIDTH],

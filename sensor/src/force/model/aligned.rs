@@ -1,7 +1,7 @@
-//! Where a model file must lie for the kernels.
+//! Aligns a model file for the kernels.
 
 /// A model file at a multiple of four, as the kernels need it: a [`Model`](super::Model) of such
-/// bytes [is aligned](super::Model::is_aligned). One that is not runs as well, by the portable
+/// bytes [is aligned](super::Model::is_aligned). An unaligned one works too, with the portable
 /// code.
 ///
 /// ```

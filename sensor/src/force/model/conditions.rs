@@ -1,11 +1,11 @@
-//! What a model was made for.
+//! Describes the frames that a model was made for.
 
 use crate::markers::settings::Settings;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, Threshold};
 
-/// Everything about a frame that changes its features, and what the labels of the training meant.
+/// Everything about a frame that changes its features, and the meaning of the training labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Conditions {
     /// The name of the geometry.
@@ -18,7 +18,7 @@ pub struct Conditions {
     pub dilations: u8,
     /// How a marker's position is taken from its pixels.
     pub centroid: CentroidEstimator,
-    /// What α and β label.
+    /// The meaning of α and β in the labels.
     pub contact: ContactReading,
     /// Where the training data came from.
     pub origin: Origin,
@@ -34,7 +34,7 @@ pub enum Origin {
 }
 
 impl Conditions {
-    /// The settings under which markers are found so.
+    /// The settings with which markers are found in the same way.
     pub fn settings(&self, byte_order: ByteOrder) -> Settings {
         Settings {
             threshold: self.threshold,
@@ -44,7 +44,7 @@ impl Conditions {
         }
     }
 
-    /// Whether markers are found so under these settings.
+    /// Returns whether these settings find markers in the same way.
     pub fn are_of(&self, settings: &Settings) -> bool {
         settings.geometry == self.geometry
             && settings.threshold == self.threshold

@@ -1,4 +1,4 @@
-//! The writer of the model file.
+//! Writes the model file.
 
 use super::{
     CalibratedRange, Conditions, ForwardSpec, InputScaling, Model, ModelError, Origin, OutputKind,
@@ -15,7 +15,7 @@ use alloc::vec::Vec;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::threshold::PixelFormat;
 
-/// Where the film run forwards begins, in the models that have one: after places.
+/// Offset of the film run forwards in models that have one: after the places.
 pub const FORWARD_OFFSET: usize = 456;
 
 /// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
@@ -35,7 +35,7 @@ pub struct ModelSpec {
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
     pub range: CalibratedRange,
-    /// How well it knows them.
+    /// How uncertain its forces are.
     pub uncertainty: Uncertainty,
 }
 
@@ -45,12 +45,12 @@ pub struct LayerSpec {
     /// Number of inputs, 1–512: 11 in the first layer, the outputs of the layer before in the
     /// others.
     pub inputs: u16,
-    /// Number of outputs, 1–512: in the last layer as many as [`OutputKind::count`] says.
+    /// Number of outputs, 1–512; in the last layer [`OutputKind::count`].
     pub outputs: u16,
-    /// How wide the weights are: int16 in the first layer.
+    /// Width of the weights: int16 in the first layer.
     pub weight_width: WeightWidth,
-    /// What activations are limited to: 1–32,767, at most 127 before a layer with int8 weights; 0
-    /// in the last layer.
+    /// Upper limit of the activations: 1–32,767, at most 127 before a layer with int8 weights; 0 in
+    /// the last layer.
     pub largest_activation: u16,
     /// `outputs` rows of `inputs` weights, −127 to 127 or −32,767 to 32,767.
     pub weights: Vec<i16>,
@@ -63,10 +63,10 @@ pub struct LayerSpec {
 }
 
 impl ModelSpec {
-    /// The bytes of the model file. What it returns can be read: it was.
+    /// Returns the bytes of the model file. They have been read back successfully.
     ///
     /// # Errors
-    /// [`ModelError`], as [`Model::parse`] gives it for such a file, or for a list of the wrong
+    /// [`ModelError`], as from [`Model::parse`] of such a file, or because a list has the wrong
     /// length.
     pub fn encode(&self) -> Result<Vec<u8>, ModelError> {
         for (index, layer) in self.layers.iter().enumerate() {
@@ -88,7 +88,7 @@ impl ModelSpec {
         bytes.extend(version(self.output).to_le_bytes());
         bytes.extend([PACKING, 0]);
         bytes.extend([0; 4]); // the length, filled in when it is known
-        // More layers than 16 bits count are more than the reader accepts.
+        // More layers than 16 bits can count are more than the reader accepts.
         let count = u16::try_from(self.layers.len()).unwrap_or(u16::MAX);
         bytes.extend(count.to_le_bytes());
         bytes.extend([
@@ -122,7 +122,8 @@ impl ModelSpec {
     }
 }
 
-/// A model file that takes another number of steps; `None` when it takes none, or is no model file.
+/// Returns the model file with another number of steps; `None` if the model takes no steps, or the
+/// file is not a model.
 pub fn with_steps(file: &[u8], steps: u8) -> Option<Vec<u8>> {
     Model::parse(file).ok()?.forward?;
     let mut bytes = file[..file.len() - 4].to_vec();
@@ -157,7 +158,7 @@ impl LayerSpec {
         Ok(())
     }
 
-    /// A weight out of range would be packed as another.
+    /// A weight out of range would be packed as a different one.
     fn check_weights(&self, layer: usize) -> Result<(), ModelError> {
         let largest = self.weight_width.largest_weight();
         let wrong = |weight: &i16| weight.unsigned_abs() > largest;

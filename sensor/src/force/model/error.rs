@@ -1,4 +1,4 @@
-//! Why a model file is refused.
+//! Lists the reasons why a model file is refused.
 
 use core::fmt;
 
@@ -7,17 +7,17 @@ use core::fmt;
 pub enum ModelError {
     /// The file does not begin with `HVTM`.
     NotAModel,
-    /// The file's layout is one that this program does not know.
+    /// The file's layout is unknown to this program.
     Version {
         /// The file's version.
         found: u16,
     },
-    /// The file's weights lie in an order that this program does not know.
+    /// The order of the file's weights is unknown to this program.
     Packing {
         /// The file's packing.
         found: u8,
     },
-    /// The file ends before what it announces.
+    /// The file ends before its announced content.
     TooShort {
         /// The byte at which more was needed.
         offset: usize,
@@ -26,9 +26,9 @@ pub enum ModelError {
     },
     /// The file is longer or shorter than it says.
     Length {
-        /// The length in its header.
+        /// The length that its header announces.
         announced: u32,
-        /// The length it has.
+        /// The length of the file.
         actual: usize,
     },
     /// The file was damaged.
@@ -42,25 +42,25 @@ pub enum ModelError {
     Field {
         /// Its name in `docs/model-file.md`.
         name: &'static str,
-        /// Where it begins.
+        /// Its offset, bytes.
         offset: usize,
-        /// What it may hold.
+        /// Its allowed values.
         allowed: &'static str,
     },
-    /// A layer's number of inputs is not the number of outputs of what feeds it.
+    /// A layer's number of inputs differs from the number of outputs that feed it.
     Chain {
         /// The layer, from 0.
         layer: usize,
         /// Its inputs.
         inputs: usize,
-        /// What it is fed.
+        /// The number of outputs that feed it.
         fed: usize,
     },
-    /// A layer with int8 weights is fed more than seven bits.
+    /// A layer with int8 weights has inputs of more than seven bits.
     WideInputs {
         /// The layer, from 0.
         layer: usize,
-        /// The largest magnitude that it is fed.
+        /// The largest magnitude of its inputs.
         largest: u16,
     },
     /// A value of one row of a layer is outside its range.
@@ -69,9 +69,9 @@ pub enum ModelError {
         layer: usize,
         /// The row, from 0.
         row: usize,
-        /// Which value.
+        /// The name of the value.
         name: &'static str,
-        /// What it may hold.
+        /// Its allowed values.
         allowed: &'static str,
     },
     /// A row whose sum could leave 32 bits.
@@ -83,11 +83,12 @@ pub enum ModelError {
         /// Σ|w|·max|x| + |bias|.
         bound: u64,
     },
-    /// A list of a specification has not the length that its layer's widths ask for (writing only).
+    /// A list of a specification does not have the length that its layer's widths require (writing
+    /// only).
     SpecLength {
         /// The layer, from 0.
         layer: usize,
-        /// Which list.
+        /// The name of the list.
         name: &'static str,
         /// The length it should have.
         expected: usize,

@@ -1,4 +1,4 @@
-//! What a model file holds of the film run forwards.
+//! Reads and writes the model file's section on the film run forwards.
 
 use super::{ModelError, reader::Reader};
 use crate::force::forward::{
@@ -13,7 +13,7 @@ use {
 };
 
 impl<'a> Forward<'a> {
-    /// Reads the section of a model file alone.
+    /// Reads a section that stands alone.
     ///
     /// # Errors
     /// As [`Model::parse`](super::Model::parse).
@@ -22,8 +22,8 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// Which parts a file has: the covariance of its own unit, what is known of others, and what the
-/// film's weight does.
+/// Optional parts of a file: the covariance of its own unit, the knowledge of other units, and the
+/// effect of the film's weight.
 const PARTS: [[bool; 3]; 8] = {
     const NO: bool = false;
     const HAS: bool = true;
@@ -101,7 +101,7 @@ fn weight<'a>(reader: &mut Reader<'a>) -> Result<Weight<'a>, ModelError> {
     })
 }
 
-/// As many as this program is for.
+/// The number of markers must be this program's.
 fn dots(reader: &mut Reader<'_>) -> Result<(), ModelError> {
     let offset = reader.offset;
     match usize::from(reader.u8()?) {
@@ -252,7 +252,7 @@ pub struct ForwardSpec {
     pub limits: Limits,
     /// How strong the force of a size is.
     pub stiffness: Stiffness,
-    /// What a rest picture says of a unit.
+    /// How to read a unit's mounting from its rest picture.
     pub rest_image: RestImage,
     /// Focal lengths per px of the unit's own camera.
     pub per_px: Option<[f32; 2]>,
@@ -260,27 +260,28 @@ pub struct ForwardSpec {
     pub noise: Noise,
     /// How the images move.
     pub tables: TablesSpec,
-    /// What the tables leave of its own unit's motion.
+    /// The covariance that the tables leave on its own unit.
     pub own: Option<CovarianceSpec>,
-    /// Any other unit.
+    /// What is known of any other unit.
     pub other: Option<OthersSpec>,
-    /// What the film's own weight does.
+    /// The effect of the film's own weight.
     pub weight: Option<WeightSpec>,
 }
 
-/// What a film's weight does, to be written. The fields mean what [`Weight`]'s do.
+/// The effect of a film's weight, to be written. The fields mean what [`Weight`]'s do.
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightSpec {
     /// Gravity on the model's own film.
     pub down: Gravity,
-    /// The press that sinks the film as much, N.
+    /// The press that sinks the film as its weight does, N.
     pub press_n: f32,
-    /// How uncertain all of it is: of the model's own unit, of any other.
+    /// Relative standard uncertainty: of the model's own unit, of any other.
     pub unsure: [f32; 2],
-    /// What it does at rest by each function of gravity, focal lengths.
+    /// The effect at rest of each function of gravity, focal lengths.
     pub at_rest: [[f64; EQUATIONS]; weight::AT_REST],
-    /// What is added by size, function of gravity, coordinate and term, divided by the softness.
+    /// The additional part by size, function of gravity, coordinate and term, divided by the
+    /// softness.
     pub under_load: [[[[f64; weight::TERMS]; EQUATIONS]; weight::UNDER_LOAD]; weight::SIZES],
 }
 
@@ -288,11 +289,11 @@ pub struct WeightSpec {
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct OthersSpec {
-    /// How strong the force of a size is on one without stretch.
+    /// The force of each size on a unit without stretch.
     pub stiffness: Stiffness,
-    /// Standard uncertainty of that, in parts of it.
+    /// Relative standard uncertainty of the force.
     pub relative: [f32; RELATIVE],
-    /// What the tables leave of the motion beside the size.
+    /// The covariance that the tables leave in the motion, apart from the size's.
     pub covariance: CovarianceSpec,
 }
 
@@ -300,13 +301,13 @@ pub struct OthersSpec {
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct TablesSpec {
-    /// What [`Terms::new`] takes.
+    /// The argument of [`Terms::new`].
     pub terms: [u8; MOST_TILTS],
-    /// Functions of size and tilt, each so much of each term: first by the degree of the tilt, then
-    /// by that of its second part, then by that of the size. Each has only terms of even powers of
-    /// the tilt's second part, or, after those, only of odd ones.
+    /// Functions of size and tilt: a coefficient of each term, sorted by the degree of the tilt,
+    /// then by that of its second part, then by that of the size. A function has only terms of even
+    /// powers of the tilt's second part or only of odd ones; those of even powers come first.
     pub functions: Vec<Vec<f32>>,
-    /// A table of each marker.
+    /// One table for each marker.
     pub dots: Vec<TableSpec>,
 }
 
@@ -316,10 +317,10 @@ pub struct TablesSpec {
 pub struct TableSpec {
     /// The nodes along x and along y, mm.
     pub nodes_mm: [Vec<f32>; 2],
-    /// The direction along which the first part of its functions' tilt is, of length one.
+    /// The direction of the first part of the functions' tilt, of length one.
     pub away: [f32; 2],
-    /// By node along y, node along x, output (motion along x, along y) and function: B-splines'
-    /// coefficients.
+    /// By node along y, node along x, output (motion along x, along y) and function: coefficients
+    /// of B-splines.
     pub coefficients: Vec<f64>,
 }
 
@@ -329,7 +330,7 @@ pub struct TableSpec {
 pub struct CovarianceSpec {
     /// Knots along the size, along y and along x.
     pub counts: [u8; 3],
-    /// Places go to so many mm either way.
+    /// Places range from −`end_mm` to `end_mm` along each axis.
     pub end_mm: f32,
     /// By size, place along y and place along x: the lower factor of each covariance, focal
     /// lengths.
@@ -338,7 +339,7 @@ pub struct CovarianceSpec {
 
 #[cfg(any(test, feature = "encode"))]
 impl ForwardSpec {
-    /// The section of a model file alone.
+    /// A section that stands alone.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.push(&mut bytes);
@@ -483,7 +484,8 @@ impl TableSpec {
 
 #[cfg(any(test, feature = "encode"))]
 impl CovarianceSpec {
-    /// As a file has it. Each knot's step is the largest of its entries over 32,767.
+    /// Appends the grid as a file holds it. Each knot's step is the largest of its entries over
+    /// 32,767.
     pub fn push(&self, bytes: &mut Vec<u8>) {
         bytes.extend(self.counts);
         bytes.push(0);
@@ -499,7 +501,7 @@ impl CovarianceSpec {
     }
 }
 
-/// A coefficient in steps of a size, rounded to nearest.
+/// A coefficient in steps of `size`, rounded to nearest.
 #[cfg(any(test, feature = "encode"))]
 fn step(value: f64, size: f64) -> i16 {
     if size == 0.0 {

@@ -1,4 +1,4 @@
-//! What the two widths of weights allow, and that nothing of a file is written in two ways.
+//! Tests the limits of both widths of weights, and that no file content has two encodings.
 
 use super::samples::{read_back, spec, spec16};
 use super::tests::reseal;
@@ -6,7 +6,7 @@ use super::*;
 use crate::force::packing::WeightWidth;
 use std::{string::ToString, vec};
 
-/// Int16 weights reach their ends where the proof allows it, and what feeds a layer counts.
+/// Int16 weights reach their limits if the proof allows it, which depends on the layer's inputs.
 #[test]
 fn int16_accumulators_are_proven_with_what_feeds_them() {
     let mut spec = spec16(&[11, 2, 3], 32_767);
@@ -50,7 +50,7 @@ fn int8_weights_take_seven_bits() {
     assert_eq!(spec.encode(), Err(features));
 }
 
-/// A second way to write the same weights would be a second identity of the same model.
+/// A second encoding of the same weights would give the same model a second identity.
 #[test]
 fn weights_beyond_rows_and_columns_are_zero() {
     let good = spec(&[11, 5, 3]).encode().unwrap();

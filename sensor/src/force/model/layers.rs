@@ -1,4 +1,4 @@
-//! The reader of a model's layers, and the proof that none of their sums can overflow.
+//! Reads a model's layers, and proves that none of their sums can overflow.
 
 use super::{MAX_LAYERS, ModelError, reader::Reader};
 use crate::force::features::FEATURES;
@@ -109,7 +109,7 @@ fn check_rows(index: usize, layer: &Layer<'_>, largest_input: u16) -> Result<(),
     Ok(())
 }
 
-/// Σ|w| of the rows of a group, or the row of a wrong weight, and what it may be.
+/// Σ|w| of each row of a group; for a wrong weight the error names its row and the allowed values.
 fn check_group<const N: usize>(
     layer: &Layer<'_>,
     words: &[[[u8; 4]; ROWS_TOGETHER]],
@@ -135,7 +135,7 @@ fn check_group<const N: usize>(
     Ok(sums.map(u64::from))
 }
 
-/// `products` is the largest |Σ w·x|.
+/// Checks a row's values, and its sum; `products` is the largest |Σ w·x|.
 fn check_row(layer: usize, number: usize, row: Row, products: u64) -> Result<(), ModelError> {
     let error = |name, allowed| ModelError::Row {
         layer,

@@ -1,4 +1,4 @@
-//! The reader of the model file: every check that makes a [`Model`] safe to run is here.
+//! Reads the model file: every check that makes a [`Model`] safe to run is here.
 
 use super::{
     CalibratedRange, Conditions, InputScaling, MAX_LAYERS, Model, ModelError, Origin, OutputKind,
@@ -15,22 +15,22 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
 
 /// The first four bytes of a model file.
 pub(super) const MAGIC: [u8; 4] = *b"HVTM";
-/// The layout of models that tell forces.
+/// The layout of models with forces only.
 pub(super) const FORCE_VERSION: u16 = 3;
-/// The layout of models that tell forces and their places.
+/// The layout of models with forces and places.
 pub(super) const PLACE_VERSION: u16 = 7;
-/// How the weights lie: `packing`.
+/// The order of the weights: field `packing`.
 pub(super) const PACKING: u8 = 1;
-/// What there is beside the layers: nothing, or the film run forwards.
+/// Contents in addition to the layers: none, or the film run forwards.
 pub(super) const NOTHING_BESIDE: u8 = 0;
 pub(super) const FORWARD_BESIDE: u8 = 2;
-/// Bytes of the preset's name, filled up with zeros.
+/// Bytes of the preset's name, padded with zeros.
 pub(super) const NAME_LENGTH: usize = 16;
 /// The checksum at the end, over all bytes before it: CRC-32 of IEEE 802.3.
 pub(super) const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 const LARGEST_SIDE: u16 = 800;
-/// The rectangle of four centroids in the largest frame, px².
+/// Area of the bounding rectangle of four centroids in the largest frame, px².
 const LARGEST_RECT: Q<16, i64> = Q::from_int(LARGEST_SIDE as i64 * LARGEST_SIDE as i64);
 
 pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
@@ -80,7 +80,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
 pub(super) const HEADER_LENGTH: usize = 12;
 const CRC_LENGTH: usize = 4;
 
-/// The layout that a model of these outputs has.
+/// The layout version of a model with these outputs.
 #[cfg(any(test, feature = "encode"))]
 pub(super) fn version(output: OutputKind) -> u16 {
     match output.tells_place() {
@@ -107,7 +107,7 @@ fn output_kind(reader: &mut Reader<'_>, version: u16) -> Result<OutputKind, Mode
     })
 }
 
-/// Whether the film run forwards is beside the layers.
+/// Reads whether the film run forwards follows the layers.
 fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, ModelError> {
     let offset = reader.offset;
     match reader.u8()? {
@@ -122,7 +122,7 @@ fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, Mode
     }
 }
 
-/// Checks what surrounds the body; gives everything before the checksum, the checksum and the
+/// Checks header and checksum. Returns everything before the checksum, the checksum and the
 /// version.
 fn frame(bytes: &[u8]) -> Result<(&[u8], u32, u16), ModelError> {
     if bytes.len() < MAGIC.len() || bytes[..MAGIC.len()] != MAGIC {
@@ -233,7 +233,7 @@ fn preset(reader: &mut Reader<'_>) -> Result<Preset, ModelError> {
         })
 }
 
-/// A preset's name as the file holds it.
+/// A preset's name as stored in the file.
 pub(super) fn padded_name(preset: Preset) -> [u8; NAME_LENGTH] {
     let mut padded = [0; NAME_LENGTH];
     let name = preset.name().as_bytes();

@@ -1,8 +1,8 @@
-//! The model file: a quantized network with its input scaling, the film run forwards, and the
-//! conditions they were made under.
+//! Holds the model file: a quantized network with its input scaling, the film run forwards, and the
+//! conditions that they were made for.
 //!
 //! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves
-//! it sound before it can be used. It may lie anywhere; kernels run one that lies at a multiple of
+//! it sound before use. The file may lie at any address; kernels run it if that is a multiple of
 //! four ([`AlignedFile`]). Feature `encode` adds the writer, `encode::ModelSpec`. Both follow
 //! `docs/model-file.md`.
 
@@ -42,9 +42,9 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 /// The most layers a model may have.
 pub const MAX_LAYERS: usize = 8;
-/// Outputs that say a force, the first ones of every model.
+/// Number of outputs that give the force, the first ones of every model.
 pub const OUTPUTS: usize = 3;
-/// Outputs that say where the tip is, after those of the force.
+/// Number of outputs that give the tip's place, after those of the force.
 pub const PLACE_OUTPUTS: usize = 2;
 
 /// A model, borrowed from the bytes of its file and proven sound.
@@ -56,13 +56,13 @@ pub struct Model<'a> {
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// What the outputs are.
+    /// The meaning of the outputs.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
     pub range: CalibratedRange,
-    /// How well it knows them.
+    /// How uncertain its forces are.
     pub uncertainty: Uncertainty,
-    /// The film run forwards, which betters the network's answer.
+    /// The film run forwards, which improves the network's answer.
     pub forward: Option<Forward<'a>>,
     crc: u32,
     layers: [Layer<'a>; MAX_LAYERS],
@@ -80,20 +80,20 @@ pub struct InputScaling {
     pub shifts: [u8; FEATURES],
 }
 
-/// What the outputs of the last layer are.
+/// The meaning of the last layer's outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OutputKind {
     /// Fx, Fy, Fz in µN.
     ForceVector,
     /// α and β in thousandths of a degree, |F| in µN.
     AnglesMagnitude,
-    /// Fx, Fy, Fz in µN, and p_x, p_y in µm: the point of the film that the tip is on, by where it
-    /// rests, film frame.
+    /// Fx, Fy, Fz in µN, and p_x, p_y in µm: the point of the film under the tip, named by its
+    /// position at rest, film frame.
     ForceAndPlace,
 }
 
 impl OutputKind {
-    /// How many outputs there are: 3, or 5 with a place.
+    /// Number of outputs: 3, or 5 with a place.
     pub const fn count(self) -> usize {
         match self {
             OutputKind::ForceVector | OutputKind::AnglesMagnitude => OUTPUTS,
@@ -101,14 +101,14 @@ impl OutputKind {
         }
     }
 
-    /// Whether the place of the tip is among them.
+    /// Returns whether the outputs include the tip's place.
     pub const fn tells_place(self) -> bool {
         matches!(self, OutputKind::ForceAndPlace)
     }
 }
 
-/// The forces a model was trained or calibrated on: 0 to `magnitude`, both angles and both
-/// coordinates of the place to ± their limit.
+/// The forces that a model was trained or calibrated on: |F| from 0 to `magnitude`, both angles and
+/// both coordinates of the place within ± their limit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CalibratedRange {
     /// Largest |F|, > 0.
@@ -117,7 +117,7 @@ pub struct CalibratedRange {
     pub alpha: MilliDegrees,
     /// Largest |β|, 0–90°.
     pub beta: MilliDegrees,
-    /// Largest |p_x| and |p_y|, 1 to 1,000,000 µm; 0 in a model that does not tell places.
+    /// Largest |p_x| and |p_y|, 1 to 1,000,000 µm; 0 if the model has no place outputs.
     pub place: Micrometres,
 }
 
@@ -125,7 +125,7 @@ impl<'a> Model<'a> {
     /// Reads and proves a model file.
     ///
     /// # Errors
-    /// [`ModelError`] says what is wrong and where: not a model file, another version, cut or
+    /// [`ModelError`] names the fault and its position: not a model file, another version, cut or
     /// damaged, a value outside its range, or a row of weights whose sum could overflow.
     pub fn parse(bytes: &'a [u8]) -> Result<Model<'a>, ModelError> {
         layout::parse(bytes)
@@ -141,8 +141,8 @@ impl<'a> Model<'a> {
         self.layers.get(..self.layer_count).unwrap_or_default()
     }
 
-    /// True when its file lies at a multiple of four, so that kernels can run it. Every layer then
-    /// lies so, too.
+    /// True if its file begins at a multiple of four, so that kernels can run it. Every layer is
+    /// then aligned, too.
     pub fn is_aligned(&self) -> bool {
         let lies_so = |layer: &Layer<'_>| layer.weights.as_ptr().cast::<u32>().is_aligned();
         self.layers().iter().all(lies_so)

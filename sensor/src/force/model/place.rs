@@ -1,4 +1,4 @@
-//! What a model file holds of places: their range, and how well the model knows them.
+//! Reads and writes the model file's section on places: their range and uncertainty.
 
 use super::{ModelError, Uncertainty, reader::Reader, uncertainty::LARGEST_PLACE_UNCERTAINTY};
 #[cfg(any(test, feature = "encode"))]
@@ -8,7 +8,7 @@ use hivtac_terms::units::Micrometres;
 /// The largest range of places, µm: a metre.
 const LARGEST_PLACE: u32 = 1_000_000;
 
-/// Reads the range of places, and their uncertainties into the knots.
+/// Reads the range of places, and stores their uncertainties in the knots.
 pub(super) fn place(
     reader: &mut Reader<'_>,
     uncertainty: &mut Uncertainty,

@@ -1,8 +1,8 @@
-//! Little-endian values, checked as they are read.
+//! Reads little-endian values and checks them.
 
 use super::ModelError;
 
-/// Takes little-endian values off a byte slice, one after the other.
+/// Takes little-endian values from a byte slice, one after the other.
 pub(super) struct Reader<'a> {
     pub(super) bytes: &'a [u8],
     pub(super) offset: usize,
@@ -77,7 +77,7 @@ impl<'a> Reader<'a> {
         Ok(value)
     }
 
-    /// 0 to `high`.
+    /// Reads a value from 0 to `high`.
     pub(super) fn i32_in(
         &mut self,
         name: &'static str,
@@ -109,7 +109,7 @@ impl<'a> Reader<'a> {
         Ok(value)
     }
 
-    /// One byte that numbers the variants of a choice.
+    /// Reads one byte, an index into `choices`.
     pub(super) fn choice<T: Copy>(
         &mut self,
         name: &'static str,
@@ -130,7 +130,7 @@ impl<'a> Reader<'a> {
         self.u8_in(name, 0, "0").map(drop)
     }
 
-    /// Zeros up to a multiple of four.
+    /// Skips zeros up to a multiple of four.
     pub(super) fn pad(&mut self) -> Result<(), ModelError> {
         while !self.offset.is_multiple_of(4) {
             self.zero("padding")?;

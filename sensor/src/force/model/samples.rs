@@ -1,4 +1,4 @@
-//! Models for tests.
+//! Provides models for tests.
 
 use super::encode::{LayerSpec, ModelSpec};
 use super::*;
@@ -85,7 +85,7 @@ pub fn spec16(widths: &[u16], largest_activation: u16) -> ModelSpec {
     spec
 }
 
-/// Int16 weights for the features, int8 and seven bits for what comes after them.
+/// Int16 weights for the features, int8 weights and seven-bit activations for the other layers.
 fn layer(inputs: u16, outputs: u16, first: bool, last: bool) -> LayerSpec {
     let weights = usize::from(inputs) * usize::from(outputs);
     LayerSpec {
@@ -106,7 +106,7 @@ fn layer(inputs: u16, outputs: u16, first: bool, last: bool) -> LayerSpec {
     }
 }
 
-/// What a reader would see of `model`, as a specification.
+/// The specification that a reader of `model` would see.
 #[cfg(test)]
 pub(super) fn read_back(model: &Model<'_>) -> ModelSpec {
     let layers = model.layers().iter().map(|layer| LayerSpec {

@@ -4,7 +4,7 @@ use super::*;
 use proptest::prelude::*;
 use std::{string::ToString, vec, vec::Vec};
 
-/// Makes the checksum right again after bytes were changed.
+/// Corrects the checksum of changed bytes.
 pub(super) fn reseal(bytes: &mut [u8]) {
     let end = bytes.len() - 4;
     let crc = layout::CRC.checksum(&bytes[..end]);
@@ -366,7 +366,7 @@ proptest! {
     #[test]
     fn random_bytes_never_panic(mut bytes in prop::collection::vec(any::<u8>(), 0..600)) {
         let _ = Model::parse(&bytes);
-        // The same with everything right that would stop the reader early.
+        // The same with every field correct that would stop the reader early.
         if bytes.len() >= 16 {
             let length = bytes.len() as u32;
             bytes[..8].copy_from_slice(b"HVTM\x02\x00\x01\x00");

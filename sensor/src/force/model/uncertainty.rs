@@ -1,10 +1,10 @@
-//! How well a model knows its forces, and their places if it tells them: standard uncertainties
-//! over |F|, by linear interpolation between knots.
+//! Stores the uncertainty of a model's forces and places: standard uncertainties over |F|,
+//! interpolated linearly between knots.
 //!
-//! A standard uncertainty σ is stated such that 95 of 100 errors lie within what a normal
-//! distribution of that σ says: the angle between true and found force within [`DIRECTION_BOUND`] ·
-//! σ of the direction (two dimensions across the force), |F| within [`MAGNITUDE_BOUND`] · σ of |F|.
-//! Errors have long tails, so that this is not their root mean square.
+//! A standard uncertainty σ is chosen such that 95 of 100 errors are within the 95 % bound of a
+//! normal distribution of that σ. The angle between true and found force is within
+//! [`DIRECTION_BOUND`] · σ of the direction (two dimensions across the force), |F| within
+//! [`MAGNITUDE_BOUND`] · σ of |F|. Errors have long tails, so σ is not their root mean square.
 
 use super::{ModelError, reader::Reader};
 #[cfg(any(test, feature = "encode"))]
@@ -15,9 +15,9 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, UnsignedMicroNewtons, Unsig
 pub const LARGEST_UNCERTAINTY: MicroNewtons = MicroNewtons((1 << 30) - 1);
 /// The largest uncertainty of a place at a knot: a metre.
 pub const LARGEST_PLACE_UNCERTAINTY: Micrometres = Micrometres(1_000_000);
-/// Beyond this no direction is known: half a turn.
+/// Beyond this the direction is unknown: half a turn.
 pub(crate) const NO_DIRECTION: UnsignedMilliDegrees = UnsignedMilliDegrees(180_000);
-/// The widest distance of knots: the last one is then at 2,013 N.
+/// The largest distance of knots: the last knot is then at 2,013 N.
 const MAX_STEP_BITS: u8 = 27;
 
 /// Standard uncertainties of a model's force, over |F|.
@@ -25,28 +25,28 @@ const MAX_STEP_BITS: u8 = 27;
 pub struct Uncertainty {
     /// The distance of knots is 2 to the power of this, in µN; 0–27.
     pub step_bits: u8,
-    /// At |F| = 0, one distance, two distances …. Beyond the last one they are what they are there.
+    /// Knots at |F| = 0, one distance, two distances …. Beyond the last knot its values apply.
     pub knots: [UncertaintyKnot; Uncertainty::KNOTS],
 }
 
-/// Standard uncertainties at one |F|, those of forces 0 to [`LARGEST_UNCERTAINTY`].
+/// Standard uncertainties at one |F|; those of forces are 0 to [`LARGEST_UNCERTAINTY`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct UncertaintyKnot {
-    /// Of the force's part across itself, in two dimensions: over |F| it is the direction's
+    /// Of the force's part across itself, in two dimensions. Divided by |F| it is the direction's
     /// uncertainty in radians.
     pub across: MicroNewtons,
     /// Of |F|.
     pub along: MicroNewtons,
-    /// Of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 in a model that
-    /// does not tell places.
+    /// Of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 if the model has
+    /// no place outputs.
     pub place: Micrometres,
 }
 
 impl Uncertainty {
-    /// How many knots there are.
+    /// Number of knots.
     pub const KNOTS: usize = 16;
 
-    /// The same for every |F|.
+    /// The same uncertainties at every |F|.
     pub const fn constant(knot: UncertaintyKnot) -> Uncertainty {
         Uncertainty {
             step_bits: 0,
@@ -101,10 +101,10 @@ impl Uncertainty {
 
 /// across / whole as an angle, rounded to nearest, at most 180°; across < 2³⁰, whole < 2³¹.
 ///
-/// From 33 mN across on both lose their last bits, which changes the angle by less than 3.1 · 10⁻⁴
-/// of itself and keeps sums within 32 bits.
+/// From 33 mN across, both lose their last bits. That changes the angle by less than 3.1 · 10⁻⁴
+/// relative and keeps sums within 32 bits.
 fn angle(across: u32, whole: u32) -> UnsignedMilliDegrees {
-    /// A radian in m°, to 4 · 10⁻⁶ of itself.
+    /// A radian in m°, exact to 4 · 10⁻⁶ relative.
     const RADIAN: u32 = 57_296;
     let excess = 17_u32.saturating_sub(across.leading_zeros());
     let (across, whole) = (across >> excess, whole >> excess);
@@ -147,7 +147,7 @@ mod tests {
         }
     }
 
-    /// Knots at 0, 1,024 µN, 2,048 µN … of these values, growing by `rise` each.
+    /// Knots at 0, 1,024 µN, 2,048 µN … with values that begin at `from` and grow by `rise`.
     fn growing(from: i32, rise: i32) -> Uncertainty {
         Uncertainty {
             step_bits: 10,
@@ -230,7 +230,7 @@ mod tests {
                 prop_assert_eq!(direction, NO_DIRECTION);
                 return Ok(());
             }
-            // Half a µN of the interpolation and half an m°, then what is cut off.
+            // Half a µN by interpolation, half an m° by rounding, and the bits that are cut off.
             let degrees = |of: f64| (of / f64::from(magnitude)).to_degrees() * 1e3;
             let (found, exact) = (f64::from(direction.0), degrees(across).min(180_000.0));
             let slack = degrees(0.5) + 0.51 + 3.1e-4 * exact;

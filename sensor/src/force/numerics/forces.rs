@@ -1,4 +1,4 @@
-//! Vector and angles, one from the other, against `f64`.
+//! Measures the errors of vector to angles and back, against `f64`.
 
 use std::format;
 
@@ -6,7 +6,7 @@ use super::row;
 use crate::force::Polar;
 use hivtac_terms::units::{MicroNewtons, MilliDegrees};
 
-/// The shorter way round the circle.
+/// The difference of two angles, m°, the shorter way round the circle.
 fn apart(a: f64, b: f64) -> f64 {
     let off = (a - b).abs();
     off.min(360_000.0 - off)
@@ -18,7 +18,7 @@ fn errors(vector: [i32; 3]) -> [f64; 3] {
     let [x, y, z] = vector.map(f64::from);
     let sideways = x.hypot(z);
     let millidegrees = |radians: f64| radians.to_degrees() * 1e3;
-    // Where nothing acts along a stage's axis its angle is 0 by definition.
+    // An angle whose two components are both 0 is 0 by definition.
     let alpha = if sideways > 0.0 { x.atan2(-z) } else { 0.0 };
     let beta = if sideways > 0.0 || y != 0.0 {
         y.atan2(sideways)
@@ -91,7 +91,7 @@ fn angles_at_the_ends_of_the_range() {
         }
     }
     hold(worst);
-    // Larger than a number of the wire can be: limited, with its direction.
+    // Larger than the wire format can hold: |F| is limited, the direction kept.
     let corner = Polar::of_vector([MicroNewtons(i32::MIN); 3]);
     assert_eq!((corner.magnitude.0, corner.beta.0), (i32::MAX, -35_264));
     let tried =

@@ -1,6 +1,6 @@
-//! Worst cases of the sensing's arithmetic, measured and held against their bounds
+//! Measures the worst cases of the sensing's arithmetic, and compares them with their bounds
 //! (`docs/numerics.md`). Each test prints a row of that document's table: `cargo test --release -p
-//! hivtac-markers -p hivtac-force --lib numerics -- --nocapture`.
+//! hivtac-sensor --lib numerics -- --nocapture`.
 
 mod forces;
 mod rescaling;

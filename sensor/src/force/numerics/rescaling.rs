@@ -1,4 +1,4 @@
-//! Requantization against exact rational arithmetic, and accumulators at their ends.
+//! Measures requantization against exact rational arithmetic, and accumulators at their limits.
 
 use std::format;
 use std::vec::Vec;
@@ -10,9 +10,9 @@ use crate::force::network::Network;
 use crate::force::rescale::{rescale_input, rescale_sum};
 use hivtac_terms::units::Px;
 
-/// Multipliers that the exporter can produce with a shift: it makes them as large as their `bits`
-/// allow, and smaller ones only at the largest shift. All powers of two with their neighbours, and
-/// 2048 more, evenly spaced over the upper half.
+/// Multipliers that the exporter can produce with a shift. They are as large as their `bits` allow;
+/// smaller ones occur only at the largest shift. All powers of two with their neighbours, and 2048
+/// more, evenly spaced over the upper half.
 fn multipliers(bits: u32, shift: u8) -> Vec<u32> {
     let half = 1_u32 << (bits - 1);
     let last = half + (half - 1);
@@ -27,7 +27,7 @@ fn multipliers(bits: u32, shift: u8) -> Vec<u32> {
 }
 
 /// Values at the ends, at powers of two with their neighbours, and on both sides of where the
-/// product lies half way between two results.
+/// product is half way between two results.
 fn values(multiplier: u32, shift: u8, limit: i64) -> Vec<i64> {
     let mut all: Vec<i64> = (0..40)
         .flat_map(|power| [(1_i64 << power) - 1, 1 << power, (1 << power) + 1])
@@ -48,8 +48,8 @@ fn values(multiplier: u32, shift: u8, limit: i64) -> Vec<i64> {
     all
 }
 
-/// The error in units of the last place of what `found` is for value · multiplier / 2^shift;
-/// nothing where it is limited.
+/// The error of `found` for value · multiplier / 2^shift, in units of the last place; `None` if it
+/// is saturated.
 fn error(found: i64, value: i64, multiplier: u32, shift: u8, limits: [i64; 2]) -> Option<f64> {
     let exact = i128::from(value) * i128::from(multiplier);
     let rounded = (2 * exact + (1 << shift)) >> (shift + 1);
@@ -111,8 +111,8 @@ fn inputs_are_the_nearest_integer() {
     );
 }
 
-/// Every int8 weight at ±127 over 512 inputs of 127: the sum that the composite lanes of the
-/// kernels must hold, too.
+/// Every int8 weight at ±127 over 512 inputs of 127: the sum that the kernels' composite lanes must
+/// hold, too.
 #[test]
 fn the_widest_int8_sum_is_exact() {
     for sign in [-1, 1_i16] {
