@@ -1,4 +1,4 @@
-//! Blobs: 8-connected runs with exact integer moments.
+//! Holds a blob: 8-connected runs with exact integer moments.
 
 #[cfg(test)]
 use crate::markers::{moments::Moments, runs::Run, tables::Weights};
@@ -8,13 +8,14 @@ use hivtac_terms::units::Px;
 /// The moments of one blob, in whole pixels.
 ///
 /// They are exact for every frame of at most 800 × 800 pixels, the largest that the scanner takes.
-/// There, columns and rows are at most 799 and a blob has at most 640,000 pixels: Σx³ ≤ 640,000 ·
-/// 799³ < 2⁴⁹. A weight is at most 127: Σw ≤ 640,000 · 127 < 2²⁷ and Σw·x ≤ 2²⁷ · 799 < 2³⁷.
+/// Columns and rows are at most 799, and a blob has at most 640,000 pixels: Σx³ ≤ 640,000 · 799³ <
+/// 2⁴⁹. A weight is at most 127: Σw ≤ 640,000 · 127 < 2²⁷ and Σw·x ≤ 2²⁷ · 799 < 2³⁷.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Blob {
     /// Number of pixels.
     pub area: u32,
-    /// How many of them passed the threshold themselves; dilation added the others. At most `area`.
+    /// Number of pixels that passed the threshold themselves; dilation added the others. At most
+    /// `area`.
     pub passed: u32,
     /// Σx.
     pub sum_x: u64,
@@ -34,8 +35,8 @@ pub struct Blob {
     pub sum_xyy: u64,
     /// Σy³.
     pub sum_yyy: u64,
-    /// Σw, w being a pixel's weight ([`Pixels::weight`](crate::markers::tables::Pixels::weight)); 0 when
-    /// nothing is weighed.
+    /// Σw, w being a pixel's weight ([`Pixels::weight`](crate::markers::tables::Pixels::weight)); 0
+    /// if pixels are not weighed.
     pub weight: u32,
     /// Σw·x.
     pub weight_x: u64,
@@ -52,8 +53,8 @@ pub struct Blob {
 }
 
 impl Blob {
-    /// The blob of one run in row `y`, with columns and row below 800, and its weights. All of it
-    /// passed.
+    /// The blob of one run in row `y`, with columns and row below 800, and its weights. All its
+    /// pixels passed the threshold.
     #[cfg(test)]
     pub(crate) fn of_run(run: Run, y: u16, weights: Weights) -> Blob {
         let mut moments = Moments::of_run(run, y);
@@ -62,7 +63,7 @@ impl Blob {
         moments.blob()
     }
 
-    /// Adds the pixels of another blob of the same frame that shares none with this one.
+    /// Adds the pixels of another blob of the same frame; the two must not overlap.
     #[cfg(test)]
     pub(crate) fn add(&mut self, other: &Blob) {
         self.area += other.area;
@@ -85,15 +86,16 @@ impl Blob {
         self.y1 = self.y1.max(other.y1);
     }
 
-    /// The centroid (x, y), each rounded to the nearest step of Q16.16: off by at most
-    /// 1/131,072 px. Σx · 2¹⁶ ≤ 640,000 · 799 · 2¹⁶ < 2⁴⁵.
+    /// Returns the centroid (x, y), each rounded to the nearest step of Q16.16: its error is at
+    /// most 1/131,072 px. Σx · 2¹⁶ ≤ 640,000 · 799 · 2¹⁶ < 2⁴⁵.
     pub fn centroid(&self) -> (Px, Px) {
         let area = Divisor::new(self.area);
         let mean = |sum| mean(sum, self.area.max(1), &area);
         (mean(self.sum_x), mean(self.sum_y))
     }
 
-    /// The weighted centroid (x, y), rounded likewise; `None` without weights. Σw·x · 2¹⁶ < 2⁵³.
+    /// Returns the weighted centroid (x, y), rounded in the same way; `None` without weights. Σw·x
+    /// · 2¹⁶ < 2⁵³.
     pub fn weighted_centroid(&self) -> Option<(Px, Px)> {
         if self.weight == 0 {
             return None;
@@ -104,7 +106,7 @@ impl Blob {
     }
 }
 
-/// A mean rounded to the nearest step of Q16.16, `count` ≥ 1, by that count.
+/// A mean rounded to the nearest step of Q16.16; `by` divides by `count` ≥ 1.
 fn mean(sum: u64, count: u32, by: &Divisor) -> Px {
     Px(by.quotient((sum << Px::FRACTION_BITS) + u64::from(count / 2)) as i32)
 }
@@ -115,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    /// A blob of some runs of the largest frame.
+    /// A blob of several runs of the largest frame.
     fn blobs() -> impl Strategy<Value = Blob> {
         prop::collection::vec((0..800_u16, 0..800_u16, 0..800_u16), 1..20).prop_map(|runs| {
             let blob = |(a, b, y): (u16, u16, u16)| {

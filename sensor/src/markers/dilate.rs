@@ -1,10 +1,10 @@
-//! 3×3 dilation, zero to three times, as rows come in.
+//! Dilates the mask by 3×3, zero to three times, as rows arrive.
 //!
-//! n dilations by 3×3 are one by a square of 2n + 1: the last 2n + 1 rows one over the other, then
-//! along the row. As with OpenCV's default border, what lies outside the frame counts as unset.
+//! n dilations by 3×3 equal one by a square of 2n + 1 pixels: the last 2n + 1 rows or-ed, then
+//! spread along the row. As with OpenCV's default border, pixels outside the frame count as unset.
 //!
-//! Most rows of a frame are empty, and most words of the others: rows come several at a time, and
-//! what is looked at again are the words near one that is set in any of them.
+//! Most rows of a frame are empty, and most words of the others. So rows are taken several at a
+//! time, and only words near a set word of any of them are looked at again.
 
 #[cfg(armv7em)]
 use crate::markers::kernels::dilate_edges;
@@ -13,19 +13,19 @@ use crate::markers::runs::Edges;
 
 /// Most dilations.
 pub const MAX_DILATIONS: u8 = 3;
-/// Most rows that come in at a time.
+/// Most rows that are taken at a time.
 pub const MAX_ROWS: usize = 8;
-/// Rows that are still needed of those that came before, with the most dilations.
+/// Most earlier rows that are still needed.
 const MAX_KEPT: usize = 2 * MAX_DILATIONS as usize;
 
 /// The rows that the next output still needs.
 #[derive(Clone, Debug)]
 pub struct Dilation {
-    /// The last 2n rows, and behind them those that come in: ⌈width / 32⌉ words each.
+    /// The last 2n rows, followed by the incoming ones: ⌈width / 32⌉ words each.
     mask: [u32; (MAX_KEPT + MAX_ROWS) * MAX_WORDS],
-    /// Bit i is set when one of these rows may have a set bit in word i.
+    /// Bit i is set if one of these rows may have a set bit in word i.
     occupied: u32,
-    /// Bit i is set when row i of these has a set bit.
+    /// Bit i is set if row i of these has a set bit.
     set_rows: u32,
     /// n.
     radius: u8,
@@ -35,7 +35,7 @@ pub struct Dilation {
 }
 
 impl Dilation {
-    /// For no frame yet.
+    /// A dilation before its first frame.
     pub const fn new() -> Dilation {
         Dilation {
             mask: [0; (MAX_KEPT + MAX_ROWS) * MAX_WORDS],
@@ -60,13 +60,13 @@ impl Dilation {
         }
     }
 
-    /// Rows that the dilated ones are behind: as many empty rows bring out the last.
+    /// Number of rows by which the output lags; as many empty rows flush the last output.
     pub fn radius(&self) -> u8 {
         self.radius
     }
 
-    /// Where the next `rows` ≤ [`MAX_ROWS`] rows are to be written, all of their words, before they
-    /// are [looked at](Self::look). Bits beyond the width must be unset.
+    /// Returns the place for the next `rows` ≤ [`MAX_ROWS`] rows. All of their words must be
+    /// written before they are [looked at](Self::look). Bits beyond the width must be unset.
     #[inline(always)]
     pub fn incoming(&mut self, rows: usize) -> &mut [u32] {
         let kept = self.kept();
@@ -74,13 +74,12 @@ impl Dilation {
         incoming.get_mut(..rows * self.words).unwrap_or_default()
     }
 
-    /// Looks at the rows that were written, and that have a set bit somewhere: those of others
-    /// need not be looked at.
+    /// Looks at the rows that were written. Needed only if one of them has a set bit.
     pub fn look(&mut self, rows: usize) {
         let row_words = self.words.max(1);
         let (mut occupied, mut set_rows) = (0, 0);
         for (y, row) in self.incoming(rows).chunks_exact(row_words).enumerate() {
-            // Leading zeros are 32 of an empty word only: there is no branch in this loop.
+            // Leading zeros are 32 only for an empty word, so this loop has no branch.
             let shift_in = |empty, word: &u32| empty << 1 | word.leading_zeros() >> 5;
             let (first, pairs) = row.as_rchunks::<2>();
             let empty = pairs.iter().rev().fold(u32::MAX, |empty, [left, right]| {
@@ -94,19 +93,19 @@ impl Dilation {
         self.set_rows |= set_rows << self.kept_rows();
     }
 
-    /// Whether no row that is still needed has a set bit.
+    /// Returns whether all rows that are still needed are empty.
     pub fn is_empty(&self) -> bool {
         self.set_rows == 0
     }
 
-    /// Whether the dilated row of [`edges`](Self::edges) at `i` is empty.
+    /// Returns whether the dilated row of [`edges`](Self::edges) at `i` is empty.
     #[inline(always)]
     pub fn is_empty_row(&self, i: usize) -> bool {
         (self.set_rows >> i) & ((2 << self.kept_rows()) - 1) == 0
     }
 
-    /// The edges of a dilated row: for row `i` of those that were written, the row
-    /// [`radius`](Self::radius) rows above it. `near` is [that](Self::near) of all of them.
+    /// Finds the edges of a dilated row: the one that is [`radius`](Self::radius) rows above row
+    /// `i` of those that were written. `near` is the result of [`near`](Self::near).
     #[inline(always)]
     pub fn edges(&self, i: usize, near: &Near, edges: &mut Edges) {
         #[cfg(armv7em)]
@@ -120,7 +119,7 @@ impl Dilation {
         self.spread(i, near, edges);
     }
 
-    /// The edges of row `i` within its words `near`.
+    /// The edges of dilated row `i` within the words `near`.
     fn spread(&self, i: usize, near: &Near, edges: &mut Edges) {
         let rows = self.mask.get(i * self.words..).unwrap_or_default();
         let rows = rows.chunks_exact(self.words.max(1));
@@ -148,15 +147,15 @@ impl Dilation {
         edges.end(32 * self.words as u16);
     }
 
-    /// How many pixels of a run of the dilated row of [`edges`](Self::edges) at `i` were set
-    /// before, from its first column to the one behind its last.
+    /// Returns how many pixels of a run of dilated row `i` were set before dilation. The run is
+    /// given by its first column and the one behind its last.
     #[inline(always)]
     pub fn passed(&self, i: usize, [x0, end]: [u16; 2]) -> u32 {
         let first = (i + usize::from(self.radius)) * self.words + usize::from(x0 / 32);
         let columns = u32::from(end).wrapping_sub(u32::from(x0));
         let start = u32::from(x0 % 32);
         match self.mask.get(first..first + 2) {
-            // Most runs of a marker.
+            // Most runs of a marker take this branch.
             Some([word, next]) if (1..=32).contains(&columns) => {
                 let bits = word >> start | (next << 1) << (31 - start);
                 (bits << (32 - columns)).count_ones()
@@ -165,7 +164,7 @@ impl Dilation {
         }
     }
 
-    /// The set bits among so many from bit `start` of the mask's word `first` on.
+    /// The number of set bits among `columns` bits from bit `start` of the mask's word `first` on.
     #[inline(never)]
     fn passed_in_words(&self, first: usize, start: u32, columns: u32) -> u32 {
         let words = self.mask.get(first..).unwrap_or_default();
@@ -178,8 +177,8 @@ impl Dilation {
         words.iter().zip((0..end).step_by(32)).map(inside).sum()
     }
 
-    /// The words in which dilated rows may have set bits: from the first to before the last that is
-    /// next to an occupied one.
+    /// Returns the words in which dilated rows may have set bits: the occupied words and one on
+    /// each side.
     pub fn near(&self) -> Near {
         let first = self.occupied.trailing_zeros() as usize;
         let end = 32 - self.occupied.leading_zeros() as usize;
@@ -195,12 +194,12 @@ impl Dilation {
         }
     }
 
-    /// Moves on: of the rows that were kept or written, only the last 2n are still needed.
+    /// Keeps only the last 2n of the kept and written rows.
     pub fn advance(&mut self, rows: usize) {
         if self.is_empty() {
             return;
         }
-        // In all of them, words that are not occupied are empty.
+        // Words that are not occupied are empty in all rows.
         let first = self.occupied.trailing_zeros() as usize;
         let end = 32 - self.occupied.leading_zeros() as usize;
         for row in 0..self.kept_rows() {
@@ -223,13 +222,13 @@ impl Dilation {
         2 * usize::from(self.radius)
     }
 
-    /// Words of the rows that are kept.
+    /// Number of words of the kept rows.
     fn kept(&self) -> usize {
         self.kept_rows() * self.words
     }
 }
 
-/// One word of a row, spread by `radius` < 32 columns, given its neighbours.
+/// One word of a row, spread by `radius` < 32 columns; `left` and `right` are its neighbours.
 #[inline(always)]
 fn spread_word(left: u32, word: u32, right: u32, radius: u8) -> u32 {
     (1..=u32::from(radius)).fold(word, |bits, shift| {
@@ -249,7 +248,7 @@ mod tests {
     const WIDTH: u16 = 75;
     const HEIGHT: usize = 40;
 
-    /// A mask and the same after one, two and three dilations by OpenCV
+    /// A mask, followed by its one, two and three dilations by OpenCV
     /// (`tests/opencv/reference.py`).
     const OPENCV: &[u8; 4 * HEIGHT * 12] = include_bytes!("../../tests/opencv/dilated.bits");
 
@@ -260,7 +259,7 @@ mod tests {
         mask.unwrap().chunks_exact(12).map(row).collect()
     }
 
-    /// The runs of each dilated row, for rows that come in so many at a time.
+    /// The runs of each dilated row, if rows arrive `at_a_time`.
     fn dilated(rows: &[[u32; 3]], dilations: u8, at_a_time: usize) -> Vec<Vec<(u16, u16)>> {
         let late = usize::from(dilations);
         let below = std::iter::repeat_n(&[0; 3], late);

@@ -1,4 +1,4 @@
-//! How rows of each pixel format are read: RGB565 through a table, YUV422 and mono by themselves.
+//! Reads rows of each pixel format: RGB565 through a table, YUV422 and mono directly.
 
 use crate::markers::kernels::{threshold_cr, threshold_luma, weigh_luma};
 use crate::markers::runs::Run;
@@ -8,31 +8,31 @@ use hivtac_terms::threshold::{
     ByteOrder, HsvBox, Mono, PixelFormat, Threshold, ThresholdError, Yuv422,
 };
 
-/// Weight of a pixel at a threshold: half covered.
+/// Weight of a pixel at the threshold: half covered.
 const AT_THRESHOLD: i16 = 64;
 
-/// Reads rows of the format of a [`Threshold`]; those of RGB565 through a table `T`, which else is
-/// not used.
+/// Reads rows in the format of a [`Threshold`]. Only RGB565 uses the table `T`.
 #[derive(Clone, Debug)]
 pub struct Formats<T> {
     table: T,
     threshold: Threshold,
-    /// The weight of each luma, while pixels are mono.
+    /// The weight of each luma, if pixels are mono.
     luma: [u8; 256],
 }
 
 impl<T: Table> Formats<T> {
-    /// Accepts no pixel, until it is [`set`](Self::set).
+    /// Accepts no pixel until [`set`](Self::set).
     pub const CLOSED: Formats<T> = Formats {
         table: T::CLOSED,
         threshold: Threshold::Rgb565(HsvBox::RED),
         luma: [0; 256],
     };
 
-    /// Sets format and threshold. The byte order is that of RGB565; other formats have but one.
+    /// Sets format and threshold. The byte order applies to RGB565 only; other formats have only
+    /// one.
     ///
     /// # Errors
-    /// Those of [`Threshold::check`]; nothing is then changed.
+    /// Those of [`Threshold::check`]; then nothing is changed.
     pub fn set(&mut self, threshold: &Threshold, order: ByteOrder) -> Result<(), ThresholdError> {
         threshold.check()?;
         if let Threshold::Rgb565(hsv_box) = threshold {
@@ -47,7 +47,7 @@ impl<T: Table> Formats<T> {
         Ok(())
     }
 
-    /// The weights of a run of mono pixels, as [`Mono`] has them.
+    /// The weights of a run of mono pixels, equal to those of [`Mono`].
     #[inline(always)]
     fn weigh_mono(&self, row: &[u16], run: Run) -> Weights {
         let beyond = (usize::from(run.x1) + 1).min(2 * row.len());
@@ -113,18 +113,19 @@ impl<T: Table> Pixels for Formats<T> {
     }
 }
 
-/// More weight for each level of Cr that a pixel lies inside a threshold: 2.
+/// Additional weight per level of Cr inside the threshold: 2.
 const PER_CR: Q<2, i16> = Q::from_bits(8);
-/// More weight for each level of luma: 5/4.
+/// Additional weight per level of luma: 5/4.
 const PER_LUMA: Q<2, i16> = Q::from_bits(5);
 
-/// The weight of a pixel that lies inside a threshold, so much more than that of one at it.
+/// The weight of a pixel inside a threshold: that of a pixel at the threshold plus `more`.
 fn weight_inside(more: Q<2, i16>) -> u8 {
     (AT_THRESHOLD + more.floor()).clamp(0, i16::from(FULL_WEIGHT)) as u8
 }
 
 impl Pixels for Yuv422 {
-    /// Rows of an odd width end within a pair: its last pixel has no Cr, and is none of a marker.
+    /// A row of odd width ends within a pair. Its last pixel has no Cr, and never belongs to a
+    /// marker.
     fn row_length(&self, width: u16) -> usize {
         PixelFormat::Yuv422.row_length(width)
     }
@@ -140,8 +141,8 @@ impl Pixels for Yuv422 {
         })
     }
 
-    /// Of whole pairs: a dilation reaches into every other pair by one pixel only, and half of its
-    /// Cr would draw the centroid aside. No two runs of a dilated row share a pair, as a pair
+    /// Weighs whole pairs. A dilation covers only one pixel of every other pair, and half of its Cr
+    /// would shift the centroid. Two runs of a dilated row never share a pair, because a pair
     /// passes the threshold as a whole.
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let columns = run.x0 & !1..=run.x1 | 1;
@@ -156,7 +157,7 @@ fn weight_of(mono: &Mono, luma: u8) -> u8 {
     weight_inside(PER_LUMA * depth(mono, luma))
 }
 
-/// How far a luma lies inside the nearer limit, in levels; below 0 outside.
+/// How far a luma is inside the nearer limit, in levels; negative outside.
 fn depth(mono: &Mono, luma: u8) -> i16 {
     let luma = i16::from(luma);
     let above = match mono.low {
@@ -171,8 +172,8 @@ fn depth(mono: &Mono, luma: u8) -> i16 {
 }
 
 impl Pixels for Mono {
-    /// Rows have an even width: a `u16` holds two pixels, and a last one alone would leave a half
-    /// that is none.
+    /// The width must be even: a `u16` holds two pixels, and half of the last one would not be a
+    /// pixel.
     fn row_length(&self, width: u16) -> usize {
         PixelFormat::Mono.row_length(width)
     }
@@ -240,8 +241,8 @@ mod tests {
     }
 
     proptest! {
-        /// Through the table of weights a run is weighed as pixel by pixel, also where it ends
-        /// beyond the row.
+        /// The table of weights gives a run the weight of its pixels, also if it ends beyond the
+        /// row.
         #[test]
         fn mono_runs_are_weighed_as_their_pixels(
             row in prop::collection::vec(any::<u16>(), 1..=400),
@@ -263,7 +264,7 @@ mod tests {
         let row = [0, 200 << 8, 0, 150 << 8, 0, 162 << 8, 0, 90 << 8];
         let weigh = |x0, x1| Yuv422::RED.weigh(&row, Run { x0, x1 });
         assert_eq!(weigh(1, 4), weigh(0, 5));
-        // 64 + 2 · 38 is above the largest.
+        // 64 + 2 · 38 exceeds the largest weight.
         let (first, second, third) = (127, 64 - 2 * 12, 64);
         let sum_x = first + second * (2 + 3) + third * (4 + 5);
         let sum = 2 * (first + second + third);

@@ -1,14 +1,14 @@
-//! 8-connected labelling of runs in one pass over the rows, in fixed storage.
+//! Labels 8-connected runs in one pass over the rows, in fixed storage.
 //!
-//! Every run of the row before carries a *label*: the index of a slot in which its blob is summed
-//! up. A run of the current row takes the label of a run that it touches, and joins the labels of
-//! all that it touches; one that touches none opens a slot. At the end of the row, labels that it
-//! did not touch are finished: their blobs are kept if large enough, and their slots are free
-//! again, as are those of joined labels.
+//! Every run of the previous row carries a *label*: the index of a slot that sums up its blob. A
+//! run of the current row takes the label of a run that it touches, and joins the labels of all
+//! others that it touches. A run that touches no other opens a slot. At the end of the row, labels
+//! that the row did not touch are finished. Their blobs are kept if large enough, and their slots
+//! become free, as do those of joined labels.
 //!
-//! Slots never run out: those in use belong to distinct runs of the row before, or to runs of the
-//! current one that touch none of these. Seen along the row, all of them are disjoint and not even
-//! adjacent, so that there are at most ⌈width / 2⌉.
+//! Slots never run out. Those in use belong to distinct runs of the previous row, or to runs of the
+//! current one that touch none of these. Projected onto one row, all of them are disjoint and not
+//! even adjacent, so there are at most ⌈width / 2⌉.
 
 use heapless::Vec;
 
@@ -19,7 +19,7 @@ use crate::markers::moments::Moments;
 use crate::markers::runs::{Edges, Run};
 use crate::markers::tables::Weights;
 
-/// Most runs in a row, and most slots in use.
+/// Most runs of a row, and most slots in use.
 const MAX_RUNS: usize = (MAX_WIDTH as usize).div_ceil(2);
 
 /// Index of a slot.
@@ -42,27 +42,27 @@ impl Row {
     };
 }
 
-/// What is known of a frame's blobs after some of its rows. Keeps up to `BLOBS` finished ones.
+/// The blobs of a frame after some of its rows. Keeps up to `BLOBS` finished ones.
 #[derive(Clone, Debug)]
 pub struct Labeller<const BLOBS: usize> {
-    /// The row that was pushed last, and the one before it, in turn.
+    /// The last row that was pushed, and the one before it, in turn.
     rows: [Row; 2],
-    /// Which of them was pushed last.
+    /// Index of the last row that was pushed.
     last: usize,
     forest: Forest,
     kept: Vec<Blob, BLOBS>,
     min_area: u32,
     /// Runs that the frame may still have.
     runs_left: u32,
-    /// Whether it had more.
+    /// True if the frame had more runs than it may.
     exhausted: bool,
-    /// Whether the row that was pushed last has no run.
+    /// True if the last row that was pushed has no run.
     idle: bool,
     overflowed: bool,
 }
 
 impl<const BLOBS: usize> Labeller<BLOBS> {
-    /// For no frame yet.
+    /// A labeller before its first frame.
     pub const fn new() -> Self {
         Labeller {
             rows: [Row::EMPTY; 2],
@@ -77,8 +77,8 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         }
     }
 
-    /// Starts a frame in which blobs of fewer than `min_area` pixels are dropped. After a row with
-    /// which it has more than `max_runs` runs, nothing more of it is taken.
+    /// Starts a frame. Blobs of fewer than `min_area` pixels are dropped. Rows after the one that
+    /// exceeds `max_runs` runs are ignored.
     pub fn begin(&mut self, min_area: u32, max_runs: u32) {
         self.rows.iter_mut().for_each(|row| row.edges.clear());
         self.forest.clear();
@@ -90,9 +90,9 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.overflowed = false;
     }
 
-    /// Takes row `y` of the mask: the one of [`Dilation::edges`] at `i` and with `near`. Rows come
-    /// in order, from 0 to at most 799; empty ones may be left out while the labeller is
-    /// [idle](Self::is_idle). Gives the number of the row's pixels that were set before dilation.
+    /// Takes row `y` of the mask, which is the row of [`Dilation::edges`] at `i` and `near`. Rows
+    /// come in order, from 0 to at most 799; empty ones may be omitted while the labeller is
+    /// [idle](Self::is_idle). Returns how many of the row's pixels were set before dilation.
     pub fn push(&mut self, y: u16, dilation: &Dilation, i: usize, near: &Near) -> u32 {
         self.last = 1 - self.last;
         let (before, current) = last_two(&mut self.rows, self.last);
@@ -116,7 +116,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         all
     }
 
-    /// Weighs the runs of row `y`, which was pushed last.
+    /// Weighs the runs of row `y`, the last one that was pushed.
     #[inline(always)]
     pub fn weigh(&mut self, y: u16, weigh: impl Fn(Run) -> Weights) {
         let (_, Row { edges, labels }) = last_two(&mut self.rows, self.last);
@@ -128,12 +128,12 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         }
     }
 
-    /// Whether the frame has had more runs than it may.
+    /// Returns whether the frame has had more runs than it may.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted
     }
 
-    /// Whether no blob is open, so that an empty row changes nothing.
+    /// Returns whether no blob is open, so that an empty row changes nothing.
     pub fn is_idle(&self) -> bool {
         self.idle
     }
@@ -146,21 +146,22 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.label_row(height, |_| 0);
     }
 
-    /// The blobs kept so far, ordered by their lowest row, then by where they begin in it.
+    /// Returns the blobs kept so far, ordered by their lowest row, then by their first column in
+    /// it.
     pub fn kept(&self) -> &[Blob] {
         &self.kept
     }
 
-    /// Whether the storage was too small: blobs are then missing or cut.
+    /// Returns whether the storage was too small: blobs are then missing or cut.
     pub fn overflowed(&self) -> bool {
         self.overflowed || self.exhausted
     }
 
-    /// Gives the runs of the last row, `y`, their labels, and finishes blobs that end above it.
-    /// `passed` says how many pixels of a run were set before dilation.
+    /// Labels the runs of the last row, `y`, and finishes blobs that end above it. `passed` returns
+    /// how many pixels of a run were set before dilation.
     fn label_row(&mut self, y: u16, mut passed: impl FnMut([u16; 2]) -> u32) {
         let (before, current) = last_two(&mut self.rows, self.last);
-        // From the first run above on that can touch this one or a later one.
+        // From the first run above that can touch this run or a later one.
         let mut above = before.edges.runs().iter().zip(&before.labels);
         let mut joined = false;
         for (&[x0, end], label) in current.edges.runs().iter().zip(&mut current.labels) {
@@ -190,7 +191,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
             *label = root;
         }
         if joined {
-            // Nothing may point at labels that were joined to others.
+            // No run may keep a label that was joined to another.
             let count = current.edges.runs().len();
             for label in current.labels.iter_mut().take(count) {
                 *label = self.forest.find(*label);
@@ -199,8 +200,8 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         self.finish_untouched(y);
     }
 
-    /// Frees the labels of the row before the last, `y`, that were joined to others, and those that
-    /// it did not touch.
+    /// Frees those labels of the row before the last, `y`, that were joined to others or not
+    /// touched.
     fn finish_untouched(&mut self, y: u16) {
         let (Row { edges, labels }, _) = last_two(&mut self.rows, self.last);
         for &mut label in labels.iter_mut().take(edges.runs().len()) {
@@ -227,9 +228,9 @@ fn last_two(rows: &mut [Row; 2], last: usize) -> (&mut Row, &mut Row) {
     if last == 0 { (b, a) } else { (a, b) }
 }
 
-/// Labels the runs of the row `y` of the frame when each touches just one of those above, and each
-/// of these just one of them: the usual case. Otherwise does nothing and gives false. `passed` says
-/// how many pixels of a run were set before dilation.
+/// Handles the usual case: each run of row `y` touches exactly one of those above, and each of
+/// these exactly one of them. Otherwise returns false and does nothing. `passed` returns how many
+/// pixels of a run were set before dilation.
 #[inline(always)]
 fn continue_blobs(
     [above, runs]: [&[[u16; 2]]; 2],
@@ -248,7 +249,7 @@ fn continue_blobs(
         if !touch || !apart {
             return false;
         }
-        // Behind what touches these.
+        // The first columns behind both runs.
         free = [a[1] + 1, b[1] + 1];
     }
     let labels = labels.iter_mut().zip(above_labels);
@@ -266,9 +267,9 @@ fn continue_blobs(
 /// One entry of the union-find forest.
 #[derive(Clone, Copy, Debug)]
 struct Slot {
-    /// Itself when it is a root, [`FREE`] when it is free.
+    /// The slot itself if it is a root, [`FREE`] if it is free.
     parent: Label,
-    /// Over all that joined it, when it is a root.
+    /// Sums over all slots that joined it, if it is a root.
     moments: Moments,
 }
 
@@ -322,7 +323,7 @@ impl Forest {
 
     /// The root of a label; halves the path to it.
     fn find(&mut self, mut label: Label) -> Label {
-        // A label that there is not is its own root.
+        // A label without a slot is its own root.
         loop {
             let slots = &mut self.slots;
             let Some(parent) = slots.get(usize::from(label)).map(|slot| slot.parent) else {

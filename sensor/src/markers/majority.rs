@@ -1,12 +1,12 @@
-//! A majority over 3×3 pixels of the mask, as rows come in: specks and holes of up to four pixels
-//! vanish, and edges stay where they are.
+//! Replaces each mask bit by the majority of its 3×3 pixels, as rows arrive. Specks and holes of up
+//! to four pixels vanish, and edges stay in place.
 //!
-//! An opening would take away specks, too, but not those that touch a flat part of a marker's edge,
-//! and it would widen holes. What lies outside the frame counts as unset.
+//! An opening removes specks, too, but not those that touch a flat part of a marker's edge, and it
+//! widens holes. Pixels outside the frame count as unset.
 
 use crate::markers::mask::{MAX_WORDS, any_set, last_word_bits, words_of};
 
-/// The two rows before the next one.
+/// The two rows before the next one, and what was changed so far.
 #[derive(Clone, Debug)]
 pub struct Majority {
     rows: [[u32; MAX_WORDS]; 2],
@@ -15,7 +15,7 @@ pub struct Majority {
 }
 
 impl Majority {
-    /// For no frame yet.
+    /// A filter before its first frame.
     pub const fn new() -> Majority {
         Majority {
             rows: [[0; MAX_WORDS]; 2],
@@ -29,18 +29,18 @@ impl Majority {
         *self = Majority::new();
     }
 
-    /// Set pixels of the frame that were taken out.
+    /// Number of set pixels of the frame that were cleared.
     pub fn specks(&self) -> u32 {
         self.specks
     }
 
-    /// Unset pixels of the frame that were filled.
+    /// Number of unset pixels of the frame that were set.
     pub fn holes(&self) -> u32 {
         self.holes
     }
 
-    /// Replaces rows of `width` pixels, as they come in, by the majority around the pixels of the
-    /// row above each of them. Says whether any is set.
+    /// Replaces incoming rows of `width` pixels: each becomes the filtered row above it. Returns
+    /// whether any pixel is set.
     #[inline(never)]
     pub fn filter(&mut self, rows: &mut [u32], width: u16) -> bool {
         let mut any = false;
@@ -68,14 +68,14 @@ impl Majority {
     }
 }
 
-/// How many of a column's three pixels are set, in two bits for each column of a word.
+/// Number of set pixels of each column's three, in two bits for each column of a word.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     ones: u32,
     twos: u32,
 }
 
-/// Bits of two numbers and a carry, added: the sum's bits and what is carried.
+/// Adds three numbers bit by bit; returns the bits of the sum and the carries.
 fn added(a: u32, b: u32, c: u32) -> (u32, u32) {
     (a ^ b ^ c, (a & b) | (c & (a ^ b)))
 }
@@ -111,7 +111,7 @@ fn majority_row(
     for out in row {
         let right = sums.next().unwrap_or_default();
         let (before, after) = (moved(left, word), moved_back(word, right));
-        // p in two bits, and twice q in two bits: p + 2·q ≥ 5.
+        // p in two bits, and q, which counts twice, in two bits: p + 2·q ≥ 5.
         let (p0, p1) = added(before.ones, word.ones, after.ones);
         let (q0, q1) = added(before.twos, word.twos, after.twos);
         *out = (q1 & (q0 | p0 | p1)) | (q0 & p0 & p1);
@@ -171,7 +171,7 @@ mod tests {
                 let any = majority.filter(band, WIDTH as u16);
                 prop_assert_eq!(any, band.iter().any(|word| *word != 0));
             }
-            // A row comes out with the one below it; nothing lies above the first.
+            // A row comes out with the one below it; the row above the first is empty.
             prop_assert_eq!(&filtered[..WORDS], &[0; WORDS]);
             let found: Vec<[u32; WORDS]> = filtered[WORDS..].as_chunks().0.to_vec();
             prop_assert_eq!(found, expected);

@@ -1,4 +1,4 @@
-//! The mask of one row: bit i of word w is column 32·w + i.
+//! Defines the mask of one row: bit i of word w is column 32·w + i.
 
 /// Widest row, in pixels.
 pub const MAX_WIDTH: u16 = 800;
@@ -15,19 +15,19 @@ pub const fn last_word_bits(width: u16) -> u32 {
     u32::MAX >> ((32 - width % 32) % 32)
 }
 
-/// Whether a word is not 0.
+/// Returns whether any word is not 0.
 #[inline(always)]
 pub fn any_set(words: &[u32]) -> bool {
     words.iter().fold(0, |all, word| all | word) != 0
 }
 
-/// Words of a row beside each other.
+/// A range of adjacent words of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct Near {
-    /// Which word of the row is their first.
+    /// Index of the first word.
     pub first: usize,
-    /// How many.
+    /// Number of words.
     pub words: usize,
-    /// Those bits of the last one that lie in the row.
+    /// The bits of the last word that are inside the row.
     pub last: u32,
 }

@@ -1,4 +1,4 @@
-//! Pixels to four markers: integers, and single precision in `rules`.
+//! Turns pixels into four markers: in integers, and in single precision in `rules`.
 //!
 //! ```text
 //! rows ─threshold→ bit rows ─dilate→ runs ─label→ blobs (moments) ─rules→ 4 markers
@@ -6,13 +6,13 @@
 //!
 //! | module | subject |
 //! |---|---|
-//! | `tables`, `formats`, `screen` | which pixels pass the threshold, and what they weigh |
+//! | `tables`, `formats`, `screen` | which pixels pass the threshold, and their weights |
 //! | `mask`, `dilate`, `history`, `runs` | rows of bits, and runs of them |
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
-//! | `scanner` | from rows to blobs, as they come |
-//! | `majority` | specks and holes taken out of rows of bits |
+//! | `scanner` | from rows to blobs, as rows arrive |
+//! | `majority` | removes specks and holes from rows of bits |
 //! | `rules` | which four blobs are the markers, and whether to trust them |
-//! | `settings` | what must be told before the first frame |
+//! | `settings` | what must be set before the first frame |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
 
 pub mod blob;

@@ -1,5 +1,5 @@
-//! The moments of a blob while its runs come in: multiples of them, as they cost the fewest
-//! instructions for each run.
+//! Sums the moments of a blob run by run. Multiples of the moments are stored, which cost the
+//! fewest instructions per run.
 
 use crate::markers::blob::Blob;
 use crate::markers::runs::Run;
@@ -9,8 +9,8 @@ use crate::markers::tables::Weights;
 /// 800 pixels:
 ///
 /// - Σx of a run is n·c / 2, Σx² is n·(3c² + n² − 1) / 12, and Σx³ is n·c·(c² + n² − 1) / 8.
-/// - Of one run these fit `u32` as they are multiplied here, before a power of y: c ≤ 1599 − n, so
-///   that n·c < 2²⁰ and n·(3c² + n² − 1) < 2³¹; and so does n·y < 2²⁰.
+/// - For one run, these multiples fit `u32` before they are multiplied with a power of y: c ≤ 1599
+///   − n, so that n·c < 2²⁰ and n·(3c² + n² − 1) < 2³¹. So does n·y < 2²⁰.
 /// - Of a blob, twelve times Σx²·y is the largest: less than 12 · 2⁴⁹.
 #[derive(Clone, Copy, Debug)]
 pub struct Moments {
@@ -68,7 +68,7 @@ impl Moments {
         y1: 0,
     };
 
-    /// Of one run in row `y`.
+    /// The sums of one run in row `y`.
     #[inline(always)]
     pub fn of_run(run: Run, y: u16) -> Moments {
         let mut sums = Moments {
@@ -79,7 +79,7 @@ impl Moments {
         sums
     }
 
-    /// Adds a run in row `y`, the lowest one or the one below it.
+    /// Adds a run in row `y`, which must be the lowest row so far or the one below it.
     #[inline(always)]
     pub fn add_run(&mut self, run: Run, y: u16) {
         let (x0, x1, row) = (u32::from(run.x0), u32::from(run.x1), u32::from(y));
@@ -104,7 +104,7 @@ impl Moments {
         self.y1 = y;
     }
 
-    /// Adds the weights of pixels in row `y` that were added before.
+    /// Adds the weights of pixels in row `y`, which must have been added before.
     #[inline(always)]
     pub fn weigh(&mut self, weights: Weights, y: u16) {
         self.weight += weights.sum;
@@ -112,7 +112,7 @@ impl Moments {
         self.weight_y += u64::from(weights.sum) * u64::from(y);
     }
 
-    /// Adds what belongs to the same blob.
+    /// Adds the sums of a part of the same blob.
     pub fn add(&mut self, other: &Moments) {
         self.area += other.area;
         self.passed += other.passed;
@@ -134,7 +134,7 @@ impl Moments {
         self.y1 = self.y1.max(other.y1);
     }
 
-    /// As the moments themselves.
+    /// Returns the moments themselves.
     pub fn blob(&self) -> Blob {
         Blob {
             area: self.area,
@@ -159,7 +159,7 @@ impl Moments {
     }
 }
 
-/// A multiple of twelve divided by it. The factor is 1 / 3 modulo 2⁶⁴: cheaper than a division.
+/// Divides a multiple of twelve by twelve. The factor is 1 / 3 modulo 2⁶⁴: cheaper than a division.
 fn twelfth(multiple: u64) -> u64 {
     (multiple / 4).wrapping_mul(0xAAAA_AAAA_AAAA_AAAB)
 }

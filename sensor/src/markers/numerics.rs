@@ -1,5 +1,5 @@
-//! Worst cases of the moments: the largest frame, and the rounding of centroids, held against
-//! their bounds. Each test prints a row of `docs/numerics.md`.
+//! Measures the worst cases of the moments: the largest frame, and the rounding of centroids,
+//! against their bounds. Each test prints a row of `docs/numerics.md`.
 
 use std::{format, println};
 
@@ -16,7 +16,7 @@ const SIDE: u16 = 800;
 /// The largest weight of a pixel.
 const LARGEST_WEIGHT: u32 = 127;
 
-/// The largest frame with every pixel set and as red as can be.
+/// The largest frame with every pixel set and of the largest weight.
 fn full() -> Blob {
     let columns = u32::from(SIDE);
     let weights = Weights {
@@ -62,7 +62,7 @@ fn the_largest_frames_moments_are_exact() {
     );
 }
 
-/// Off in steps of 1/65,536 px.
+/// The error of a mean, in steps of 1/65,536 px.
 fn error(mean: Px, sum: u64, count: u64) -> f64 {
     let off = i128::from(mean.0) * i128::from(count) - (i128::from(sum) << Px::FRACTION_BITS);
     (off as f64 / count as f64).abs()

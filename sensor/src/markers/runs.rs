@@ -1,4 +1,4 @@
-//! Runs: maximal spans of set bits in a row.
+//! Finds runs: maximal spans of set bits in a row.
 
 use crate::markers::mask::MAX_WIDTH;
 
@@ -11,8 +11,8 @@ pub struct Run {
     pub x1: u16,
 }
 
-/// Calls `visit` with each edge of a word whose first column is `column`: where a bit differs from
-/// the one before it. `open` says whether the bit before the word is set.
+/// Calls `visit` with each edge of a word whose first column is `column`: each bit that differs
+/// from the previous one. `open` is true if the bit before the word is set.
 ///
 /// Edges are the set bits of `word ^ (word << 1)`: the first columns of runs and of gaps in turn. A
 /// word without an edge costs one test, whether it is empty or full.
@@ -27,7 +27,7 @@ pub fn for_each_edge(column: u16, word: u32, open: bool, mut visit: impl FnMut(u
 
 #[cfg(test)]
 /// Calls `visit` with each run of a row of mask words, from left to right. A row of w pixels has at
-/// most ⌈w / 2⌉.
+/// most ⌈w / 2⌉ runs.
 pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
     let mut open = None;
     let mut column = 0;
@@ -48,7 +48,7 @@ pub fn for_each_run(words: &[u32], mut visit: impl FnMut(Run)) {
     }
 }
 
-/// The edges of a row: where each of its runs begins, and the column behind its end.
+/// The edges of a row: the first column of each run, and the column behind its last.
 #[derive(Clone, Debug)]
 pub struct Edges {
     columns: [u16; MAX_WIDTH as usize],
@@ -56,7 +56,7 @@ pub struct Edges {
 }
 
 impl Edges {
-    /// Of an empty row.
+    /// The edges of an empty row.
     pub const fn new() -> Edges {
         Edges {
             columns: [0; MAX_WIDTH as usize],
@@ -64,28 +64,28 @@ impl Edges {
         }
     }
 
-    /// Begins another row.
+    /// Begins the next row.
     pub fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Takes the word whose first column is `column`. Words come from left to right; those that are
-    /// left out must be empty, and must not come right after one whose last bit is set. Edges
-    /// beyond the widest row are left out.
+    /// Takes the word whose first column is `column`. Words come from left to right. Omitted words
+    /// must be empty, and must not follow directly a word whose last bit is set. Edges beyond the
+    /// widest row are dropped.
     #[inline(always)]
     pub fn take(&mut self, column: u16, word: u32) {
         let open = !self.count.is_multiple_of(2);
         for_each_edge(column, word, open, |x| self.push(x));
     }
 
-    /// Takes all edges but for one at the row's end from `find`, which writes them and says how
-    /// many.
+    /// Takes all edges but one at the row's end from `find`, which writes them and returns their
+    /// number.
     #[cfg(armv7em)]
     pub fn fill(&mut self, find: impl FnOnce(&mut [u16; MAX_WIDTH as usize]) -> usize) {
         self.count = find(&mut self.columns).min(self.columns.len());
     }
 
-    /// Ends the row, which has so many columns.
+    /// Ends the row, which has `columns` columns.
     #[inline(always)]
     pub fn end(&mut self, columns: u16) {
         if !self.count.is_multiple_of(2) {
@@ -101,7 +101,7 @@ impl Edges {
         }
     }
 
-    /// First column of each run, and the one behind its last.
+    /// Returns the first column of each run, and the one behind its last.
     #[inline(always)]
     pub fn runs(&self) -> &[[u16; 2]] {
         let (edges, _) = self.columns.split_at(self.count.min(self.columns.len()));

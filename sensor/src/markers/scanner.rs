@@ -1,4 +1,4 @@
-//! Rows in, blobs out: threshold, dilation, runs and labels, without a frame in memory.
+//! Scans rows into blobs: threshold, dilation, runs and labels, without a frame in memory.
 
 use core::fmt;
 
@@ -13,10 +13,10 @@ use hivtac_terms::status::Status;
 
 pub use crate::markers::{dilate::MAX_DILATIONS, mask::MAX_WIDTH};
 
-/// Most rows of a frame: the moments of [`Blob`] are proven for it.
+/// Most rows of a frame; the moments of [`Blob`] are proven for it.
 pub const MAX_HEIGHT: u16 = 800;
 
-/// What a frame looks like and what to make of it.
+/// The size of a frame, and how to scan it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct ScanSettings {
     /// Columns, 1 to [`MAX_WIDTH`].
@@ -27,14 +27,14 @@ pub struct ScanSettings {
     pub dilations: u8,
     /// Blobs of fewer pixels, after dilation, are dropped.
     pub min_area: u32,
-    /// Whether the pixels of blobs are weighed: their weighted centroids are wanted.
+    /// True if the pixels of blobs are weighed, for weighted centroids.
     pub weighted: bool,
-    /// A frame of more runs is not looked at to its end: [`Status::BLOB_OVERFLOW`]. It bounds the
-    /// time that noise takes.
+    /// Scanning stops once a frame has more runs: [`Status::BLOB_OVERFLOW`]. That bounds the time
+    /// of a frame of noise.
     pub max_runs: u32,
-    /// Whether the mask is of the pixels that a marker covers at least half, whatever the light
-    /// ([`Pixels::mask_covered_rows`]), and only where the majority of 3×3 of them are: of a frame
-    /// with specks or little light.
+    /// True for a frame with specks or little light. The mask then has the pixels that a marker
+    /// covers at least half, at any light ([`Pixels::mask_covered_rows`]), filtered by the majority
+    /// of 3×3.
     pub cleaned: bool,
 }
 
@@ -74,7 +74,7 @@ impl fmt::Display for ScanError {
 impl core::error::Error for ScanError {}
 
 impl ScanSettings {
-    /// Says whether such a frame can be scanned.
+    /// Checks whether such a frame can be scanned.
     ///
     /// # Errors
     /// A width, height or number of dilations out of range.
@@ -92,45 +92,45 @@ impl ScanSettings {
     }
 }
 
-/// What one frame gave.
+/// The result of one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Scan<'a> {
-    /// The blobs of at least the minimum area, ordered by their lowest row, then by where they
-    /// begin in it.
+    /// The blobs of at least the minimum area, ordered by their lowest row, then by their first
+    /// column in it.
     pub blobs: &'a [Blob],
-    /// Pixels that passed the threshold, before dilation; of a frame of too many runs, as far as it
-    /// was looked at.
+    /// Number of pixels that passed the threshold, before dilation. In a frame with too many runs,
+    /// of the scanned part.
     pub set_pixels: u32,
-    /// Set pixels that [cleaning](ScanSettings::cleaned) took out.
+    /// Number of set pixels that [cleaning](ScanSettings::cleaned) cleared.
     pub specks: u32,
-    /// Unset ones that it filled.
+    /// Number of unset pixels that it set.
     pub holes: u32,
-    /// [`Status::FRAME_INCOMPLETE`] when rows were missing, too many or of another width,
-    /// [`Status::BLOB_OVERFLOW`] when there were more than `BLOBS` blobs or
-    /// [`ScanSettings::max_runs`] runs; either means that `blobs` is not the whole truth.
+    /// [`Status::FRAME_INCOMPLETE`] if rows were missing, too many or of another width.
+    /// [`Status::BLOB_OVERFLOW`] if there were more than `BLOBS` blobs or
+    /// [`ScanSettings::max_runs`] runs. With either, `blobs` is incomplete or wrong.
     pub status: Status,
 }
 
 /// Scans frames row by row and keeps up to `BLOBS` blobs of each.
 ///
-/// For each frame: [`begin`](Self::begin), [`push_rows`](Self::push_rows) with all rows from the
-/// top, one or more at a time as they arrive, and [`finish`](Self::finish). It holds a few rows of
-/// mask and of pixels and the sums of the blobs that the current row may still touch: below 68 KiB
-/// with 64 blobs, whatever the height, and 112 bytes for each blob more.
+/// For each frame call [`begin`](Self::begin), [`push_rows`](Self::push_rows) with all rows from
+/// the top, one or more at a time as they arrive, and [`finish`](Self::finish). A scanner holds a
+/// few rows of mask and of pixels, and the sums of the blobs that the current row may still touch.
+/// That is below 68 KiB with 64 blobs, whatever the height, and 112 bytes for each additional blob.
 #[derive(Clone, Debug)]
 pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
     majority: Majority,
     dilation: Dilation,
     labels: Labeller<BLOBS>,
-    /// The pixels of rows that the dilation still holds, when they are weighed and may not stay
-    /// where they are.
+    /// Copies of pixel rows that the dilation still holds, if pixels are weighed and their
+    /// originals may be gone.
     history: History,
     /// Rows taken so far.
     rows_in: u16,
     set_pixels: u32,
     status: Status,
-    /// Between `begin` and `finish`.
+    /// True between `begin` and `finish`.
     active: bool,
 }
 
@@ -158,10 +158,10 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// Starts a frame and forgets the one before.
+    /// Starts a frame and discards the previous one.
     ///
     /// # Errors
-    /// Those of [`ScanSettings::check`]; there is then no frame to push rows to.
+    /// Those of [`ScanSettings::check`]; then no frame is active.
     pub fn begin(&mut self, settings: ScanSettings) -> Result<(), ScanError> {
         self.active = false;
         self.status = Status::FRAME_INCOMPLETE;
@@ -180,8 +180,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         Ok(())
     }
 
-    /// Takes the next row of pixels, as they lie in memory. A row of another length, or one too
-    /// many, is left out and makes the frame incomplete.
+    /// Takes the next row of pixels, as they lie in memory. A row of another length, or beyond the
+    /// frame's height, is ignored and makes the frame incomplete.
     pub fn push_row(&mut self, pixels: &impl Pixels, row: &[u16]) {
         let length = pixels.row_length(self.settings.width);
         if row.len() == length {
@@ -192,21 +192,20 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// Takes the next rows of pixels, as they lie in memory one after the other. What is no whole
-    /// row, or too many, is left out and makes the frame incomplete. The more rows at a time, the
-    /// less each of them costs.
+    /// Takes the next rows of pixels, as they lie in memory one after the other. A part of a row,
+    /// or rows beyond the frame's height, are ignored and make the frame incomplete. The more rows
+    /// at a time, the lower the cost of each.
     ///
-    /// Where pixels are weighed, as many rows as there are dilations are copied, as the next ones
-    /// may need them.
+    /// If pixels are weighed, the last rows are copied, one for each dilation, because the next
+    /// rows may need them.
     pub fn push_rows(&mut self, pixels: &impl Pixels, rows: &[u16]) {
         self.push_whole(pixels, &[], rows, Stay::Gone);
     }
 
-    /// The same without copying: the rows that came last are still in memory when the next ones
-    /// come, and are then `above`: all of the frame, or at least as many as there are dilations,
-    /// one after the other; one more in a frame that is [cleaned](ScanSettings::cleaned). With
-    /// fewer, a frame whose pixels are weighed becomes incomplete where one of them would have been
-    /// needed.
+    /// As [`push_rows`](Self::push_rows), but without copying. `above` holds the last rows, which
+    /// must still be in memory, one after the other. Either all of the frame, or at least one row
+    /// for each dilation; one more if the frame is [cleaned](ScanSettings::cleaned). With fewer
+    /// rows, a frame whose pixels are weighed becomes incomplete if one of them is needed.
     pub fn push_rows_below(&mut self, pixels: &impl Pixels, above: &[u16], rows: &[u16]) {
         self.push_whole(pixels, above, rows, Stay::Here);
     }
@@ -224,7 +223,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.push_band(pixels, &band, count, stay);
     }
 
-    /// The next rows.
+    /// The band of the next rows.
     fn band<'p>(&self, pixels: &impl Pixels, rows: &'p [u16]) -> Band<'p> {
         Band {
             first: self.rows_in,
@@ -257,7 +256,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             self.take(pixels, band, rows, any);
             left -= rows;
         }
-        // What ends a frame is weighed when it is finished.
+        // The rows that end a frame are weighed when it is finished.
         let ends = |scanner: &Self| {
             let settings = &scanner.settings;
             scanner.rows_in == settings.height && (settings.cleaned || !scanner.is_quiet())
@@ -267,9 +266,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// Takes the next row as its mask: ⌈width / 32⌉ words; bits beyond the width are ignored. Its
-    /// pixels are unknown, so that nothing of it is weighed. Otherwise as
-    /// [`push_row`](Self::push_row).
+    /// Takes the next row as its mask of ⌈width / 32⌉ words; bits beyond the width are ignored. Its
+    /// pixels are unknown, so they are not weighed. Otherwise as [`push_row`](Self::push_row).
     pub fn push_mask_row(&mut self, words: &[u32]) {
         if self.room() == 0 || words.len() != words_of(self.settings.width) {
             self.status |= Status::FRAME_INCOMPLETE;
@@ -288,8 +286,8 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.take(&(), &Band::WITHOUT_PIXELS, 1, any);
     }
 
-    /// Ends the frame, whose rows were `pixels`; `()` when they came as masks. Without a frame (no
-    /// successful `begin` since the last `finish`), it repeats the last result.
+    /// Ends the frame, whose rows were `pixels`; `()` if they came as masks. Without an active
+    /// frame (no successful `begin` since the last `finish`) it repeats the last result.
     pub fn finish(&mut self, pixels: &impl Pixels) -> Scan<'_> {
         if self.active {
             self.active = false;
@@ -304,31 +302,32 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         }
     }
 
-    /// The blobs that are complete: after [`finish`](Self::finish) all of the frame, as in
+    /// Returns the blobs that are complete; after [`finish`](Self::finish) all of the frame, as in
     /// [`Scan::blobs`].
     pub fn blobs(&self) -> &[Blob] {
         self.labels.kept()
     }
 
-    /// Whether no blob is open: the rows so far may have shown all that the frame has.
+    /// Returns whether no blob is open: the rows so far may have shown the whole content of the
+    /// frame.
     #[inline(always)]
     pub fn is_settled(&self) -> bool {
         self.labels.is_idle()
     }
 
-    /// Rows that come out behind those that come in.
+    /// Number of rows by which the output lags behind the input.
     #[inline(always)]
     fn late(&self) -> u8 {
         self.dilation.radius() + u8::from(self.settings.cleaned)
     }
 
-    /// How many rows are still missing.
+    /// Number of rows that are still missing.
     fn room(&self) -> usize {
         let missing = self.settings.height.saturating_sub(self.rows_in);
         if self.active { usize::from(missing) } else { 0 }
     }
 
-    /// Takes the rows that were written to the dilation; `any` says whether a bit of them is set.
+    /// Takes the rows that were written to the dilation; `any` is true if one of their bits is set.
     fn take(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize, any: bool) {
         if !self.labels.is_exhausted() {
             if any {
@@ -341,17 +340,17 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.rows_in += rows as u16;
     }
 
-    /// Whether nothing is set nearby and no blob is open, as with most rows.
+    /// Whether no nearby row is set and no blob is open, as with most rows.
     #[inline(always)]
     fn is_quiet(&self) -> bool {
         self.dilation.is_empty() && self.labels.is_idle()
     }
 
-    /// Passes rows through the dilation to the labels, where the pixels of their runs are weighed.
+    /// Passes rows through the dilation to the labels, and weighs the pixels of their runs.
     fn label(&mut self, pixels: &impl Pixels, band: &Band<'_>, rows: usize) {
         let late = u16::from(self.late());
         let near = self.dilation.near();
-        // Nothing of the frame lies above its first row.
+        // The frame has no rows above its first one.
         let above = usize::from(late.saturating_sub(self.rows_in));
         for i in above.min(rows)..rows {
             let y = self.rows_in + i as u16 - late;
@@ -372,7 +371,7 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
         self.dilation.advance(rows);
     }
 
-    /// Brings out the rows that the dilation still holds, and the blobs that they end.
+    /// Flushes the rows that the dilation still holds, and the blobs that they end.
     fn flush(&mut self, pixels: &impl Pixels) {
         if self.rows_in < self.settings.height {
             self.status |= Status::FRAME_INCOMPLETE;
@@ -397,12 +396,12 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
     }
 }
 
-/// What becomes of the rows of a band.
+/// How long the rows of a band stay in memory.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Stay {
-    /// They may not be there any more when the next ones come.
+    /// They may be gone when the next ones come.
     Gone,
-    /// They stay until then, or no others come.
+    /// They stay until the next ones come, or these are the last.
     Here,
 }
 

@@ -1,5 +1,4 @@
-//! A table for processors with wide registers: most words of a mask are found empty without looking
-//! a pixel up.
+//! Screens pixels with wide registers: most words of a mask are found empty without a look-up.
 
 use crate::markers::mask::any_set;
 use crate::markers::tables::{ByteTable, Pixels, Table};
@@ -7,15 +6,15 @@ use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 
 /// Pixels of a word of the mask.
 const WORD: usize = 32;
-/// Keeps sums of the screen above zero: more than any channel.
+/// Keeps sums of the screen above zero: larger than any channel.
 const OFFSET: u16 = 64;
 
-/// A [`ByteTable`] behind a *screen*: a condition that every accepted colour meets, made of a few
-/// operations without branches or look-ups, which compilers turn into vector code. A word in which
-/// no pixel meets it is empty; in others the table decides on those that do. The masks are the
-/// table's, bit for bit.
+/// A [`ByteTable`] behind a *screen*: a condition that every accepted colour meets. It consists of
+/// a few operations without branches or look-ups, which compilers turn into vector code. A word in
+/// which no pixel meets the condition is empty; in other words the table decides on the pixels that
+/// do. The masks equal the table's, bit for bit.
 ///
-/// The microcontroller has no such registers, and is better served by the tables alone.
+/// The microcontroller has no such registers and is faster with the tables alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScreenedTable {
     table: ByteTable,
@@ -79,7 +78,8 @@ impl ScreenedTable {
         }
     }
 
-    /// Which of the candidates, bit i for pixel i, the table accepts; none beyond the pixels.
+    /// Returns those candidates, bit i for pixel i, that the table accepts; bits beyond the pixels
+    /// are unset.
     fn look_up(&self, pixels: &[u16], candidates: u32) -> u32 {
         let (mut accepted, mut left) = (0, candidates);
         while let Some(&raw) = pixels.get(left.trailing_zeros() as usize) {
@@ -93,13 +93,13 @@ impl ScreenedTable {
     }
 }
 
-/// Bit i is set where pixel i has an excess.
+/// Bit i of the result is set if pixel i has an excess.
 #[inline(always)]
 fn candidates(pixels: &[u16; WORD], excess: impl Fn(u16) -> u16) -> u32 {
     let flags = pixels.map(|raw| u8::from(excess(raw) != 0));
     let (eights, _) = flags.as_chunks::<8>();
-    // Flag i, in bit 8·i, moves to bit 56 + i by the factor's bit 56 − 7·i; no two terms meet, so
-    // nothing carries.
+    // The factor's bit 56 − 7·i moves flag i, in bit 8·i, to bit 56 + i. No two terms meet, so
+    // there are no carries.
     let packed = |eight: &[u8; 8]| {
         let bits = u64::from_le_bytes(*eight).wrapping_mul(0x0102_0408_1020_4080) >> 56;
         bits as u32
@@ -117,20 +117,20 @@ enum Channel {
     Blue,
 }
 
-/// c − ⌊c / 2^shift⌋ is above the larger of the other two channels by more than a limit: c, in 5
-/// bits as all of them, stands out.
+/// The condition: c − ⌊c / 2^shift⌋ exceeds the larger of the other two channels by more than a
+/// limit. All channels have 5 bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Screen {
-    /// The channel that stands out.
+    /// The channel c that stands out.
     channel: Channel,
     shift: u32,
-    /// [`OFFSET`] and the limit.
+    /// The limit plus [`OFFSET`].
     limit: u16,
     order: ByteOrder,
 }
 
 impl Screen {
-    /// Nothing meets it.
+    /// A condition that no colour meets.
     const CLOSED: Screen = Screen {
         channel: Channel::Red,
         shift: 1,
@@ -138,7 +138,7 @@ impl Screen {
         order: ByteOrder::Native,
     };
 
-    /// The screen that the fewest colours meet of those that all accepted ones meet.
+    /// Returns the screen that the fewest colours meet, of those that all accepted colours meet.
     fn of(table: &ByteTable, order: ByteOrder) -> Screen {
         let channels = [Channel::Red, Channel::Green, Channel::Blue];
         // With the last shift the channel itself is compared.
@@ -160,11 +160,10 @@ impl Screen {
             .unwrap_or(Screen::CLOSED)
     }
 
-    /// With the largest limit that all accepted colours exceed.
+    /// Returns the screen with the largest limit that all accepted colours exceed.
     fn fitted(self, table: &ByteTable) -> Screen {
         let accepted = (0..=u16::MAX).filter(|raw| table.accepts(*raw));
-        // With a limit of zero the excess is OFFSET more than the difference, and never cut off at
-        // zero.
+        // With a limit of zero the excess is the difference plus OFFSET, and never cut off at zero.
         let least = accepted.map(|raw| self.excess(raw)).min();
         Screen {
             limit: least.map_or(2 * OFFSET, |least| least - 1),
@@ -198,17 +197,18 @@ impl Screen {
         self.above(blue, red, green)
     }
 
-    /// Five bits of each.
+    /// The three channels, five bits each.
     #[inline(always)]
     fn channels(&self, raw: u16) -> [u16; 3] {
         let pixel = self.order.pixel(raw);
         [pixel >> 11, pixel >> 6 & 31, pixel & 31]
     }
 
-    /// By how much the channel stands out more than it must; 0 where it does not.
+    /// By how much the channel exceeds its limit; 0 if it does not.
     #[inline(always)]
     fn above(&self, channel: u16, a: u16, b: u16) -> u16 {
-        // Signed, as the vector units of older processors have only that maximum; all are below 32.
+        // Signed, because the vector units of older processors have only that maximum; all values
+        // are below 32.
         let other = (a as i16).max(b as i16) as u16;
         (channel - (channel >> self.shift) + OFFSET).saturating_sub(other + self.limit)
     }
@@ -265,7 +265,7 @@ mod tests {
     #[test]
     fn greys_do_not_pass_the_screen_of_red() {
         let (screened, _) = both(&HsvBox::RED, ByteOrder::Native);
-        // In five bits the darkest of them cannot be told from dark reds.
+        // In five bits the darkest greys cannot be distinguished from dark reds.
         for level in 4..32 {
             assert_eq!(screened.screen.excess(level << 11 | level << 6 | level), 0);
         }

@@ -1,4 +1,4 @@
-//! What a sensor must be told before its first frame.
+//! Holds the settings that a sensor needs before its first frame.
 
 use crate::markers::scanner::{ScanError, ScanSettings};
 use core::fmt;
@@ -7,9 +7,9 @@ use hivtac_terms::geometry::Geometry;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
 use hivtac_terms::units::Px;
 
-/// Pixels of a frame for each run that it may have. Four markers have a run for about a thousand;
-/// this leaves room for 2,000 specks at 800 × 600, and bounds what a frame of noise costs: three
-/// times a usual one.
+/// Pixels of a frame for each run that it may have. Four markers have one run per about a thousand
+/// pixels. The limit leaves room for 2,000 specks at 800 × 600, and bounds the cost of a frame of
+/// noise to three times a usual one.
 const PIXELS_PER_RUN: u32 = 64;
 /// Runs that any frame may have.
 const FEWEST_RUNS: u32 = 64;
@@ -19,28 +19,28 @@ const FEWEST_RUNS: u32 = 64;
 pub struct Settings {
     /// Lens, frame size and markers.
     pub geometry: Geometry,
-    /// Which pixels a marker may have, and with that the pixel format.
+    /// The colours of a marker's pixels, and with them the pixel format.
     pub threshold: Threshold,
-    /// How the bytes of an RGB565 pixel lie in a row.
+    /// Byte order of RGB565 pixels in a row.
     pub byte_order: ByteOrder,
     /// 3×3 dilations of the mask, 0–3.
     pub dilations: u8,
     /// Blobs of fewer pixels, after dilation, are dropped.
     pub min_area: u32,
-    /// How a marker's position is taken from its pixels.
+    /// How a marker's position is computed from its pixels.
     pub centroid: CentroidEstimator,
 }
 
-/// Why a sensor cannot be set so.
+/// Why settings are refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SettingsError {
     /// The frame cannot be scanned.
     Scan(ScanError),
-    /// The threshold means nothing.
+    /// The threshold is invalid.
     Threshold(ThresholdError),
-    /// Rows of this odd width cannot be of this format, which has pixels in pairs.
+    /// The width is odd, but this format has pixels in pairs.
     OddWidth(u16, PixelFormat),
-    /// [`Geometry::is_sound`] says no.
+    /// [`Geometry::is_sound`] is false.
     Geometry,
 }
 
@@ -58,7 +58,7 @@ impl Settings {
         }
     }
 
-    /// Says whether a sensor can be set so.
+    /// Checks whether a sensor can have these settings.
     ///
     /// # Errors
     /// The first setting that is out of its range.
@@ -76,7 +76,7 @@ impl Settings {
         }
     }
 
-    /// What the scanner must be told.
+    /// Returns the settings of the scanner.
     pub fn scan(&self) -> ScanSettings {
         let pixels = u32::from(self.geometry.width) * u32::from(self.geometry.height);
         ScanSettings {

@@ -1,4 +1,4 @@
-//! How a row of RGB565 pixels is read: through a table over all 65,536 values.
+//! Reads rows of RGB565 pixels through a table over all 65,536 values.
 
 use crate::markers::kernels::{threshold_bytes, weigh_bytes};
 use crate::markers::mask::words_of;
@@ -7,29 +7,29 @@ use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 
 pub use crate::markers::runs::Run;
 
-/// How the pixels of a row are read: which of them belong to a marker, and how much of each does.
+/// Reads the pixels of a row: which of them belong to a marker, and how much of each it covers.
 ///
 /// A row is a slice of `u16` as it lies in memory.
 pub trait Pixels {
-    /// `u16`s of a row of `width` pixels.
+    /// Number of `u16`s of a row of `width` pixels.
     fn row_length(&self, width: u16) -> usize;
 
     /// Thresholds a row: bit i of word w is pixel 32·w + i. `mask` has ⌈pixels / 32⌉ words; bits
-    /// beyond the row become unset. Says whether any is set.
+    /// beyond the row are cleared. Returns whether any bit is set.
     fn mask_row(&self, row: &[u16], mask: &mut [u32]) -> bool;
 
-    /// Thresholds several rows of `width` pixels, which lie one after the other. `mask` has
-    /// ⌈width / 32⌉ words for each. Says whether any bit is set.
+    /// Thresholds several rows of `width` pixels, one after the other in memory. `mask` has ⌈width
+    /// / 32⌉ words for each. Returns whether any bit is set.
     #[inline(always)]
     fn mask_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         if width.is_multiple_of(32) {
-            // One long row.
+            // All rows together are one long row.
             return self.mask_row(rows, mask);
         }
         self.mask_each_row(rows, width, mask)
     }
 
-    /// [`mask_rows`](Self::mask_rows) one row after the other, of any width.
+    /// [`mask_rows`](Self::mask_rows) row by row, for any width.
     #[inline(never)]
     fn mask_each_row(&self, rows: &[u16], width: u16, mask: &mut [u32]) -> bool {
         let rows = rows.chunks(self.row_length(width).max(1));
@@ -40,17 +40,17 @@ pub trait Pixels {
         any
     }
 
-    /// Masks several rows, as [`mask_rows`](Self::mask_rows) does, by the pixels that a marker
-    /// covers at least half, whatever the light; where that is not to be told, by the threshold.
+    /// Masks several rows as [`mask_rows`](Self::mask_rows) does, but sets the pixels that a marker
+    /// covers at least half, at any light. Formats that cannot determine this use the threshold.
     fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
         self.mask_rows(rows, width, mask);
     }
 
-    /// How much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0 beyond the
-    /// row.
+    /// Returns how much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0
+    /// beyond the row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
 
-    /// The weights of the pixels of a run, summed.
+    /// Returns the sum of the weights of a run's pixels.
     #[inline(never)]
     fn weigh(&self, row: &[u16], run: Run) -> Weights {
         let columns = (run.x0..=run.x1).map(|x| (u32::from(x), self.weight(row, x)));
@@ -58,7 +58,7 @@ pub trait Pixels {
     }
 }
 
-/// No pixels: rows that come as masks.
+/// No pixels: for rows that arrive as masks.
 impl Pixels for () {
     fn row_length(&self, _: u16) -> usize {
         0
@@ -76,17 +76,17 @@ impl Pixels for () {
 
 /// A table over all values of an RGB565 pixel, set to a threshold box.
 pub trait Table: Pixels {
-    /// A table that accepts nothing, to be [`set`](Self::set) later: for a `static`.
+    /// A table that accepts no pixel, to be [`set`](Self::set) later: for a `static`.
     const CLOSED: Self;
 
-    /// Compiles a box into this table, in place. It takes a few million instructions: once per
-    /// setting, never per frame.
+    /// Compiles a box into this table, in place. It takes a few million instructions: call it once
+    /// per setting, never per frame.
     ///
     /// # Errors
     /// Those of [`HsvBox::check`]; the table is then unchanged.
     fn set(&mut self, hsv_box: &HsvBox, order: ByteOrder) -> Result<(), ThresholdError>;
 
-    /// Whether the pixel that lies in memory as `raw` passes.
+    /// Returns whether a pixel passes; `raw` is its value in memory.
     fn accepts(&self, raw: u16) -> bool;
 }
 
@@ -94,7 +94,6 @@ pub trait Table: Pixels {
 pub const FULL_WEIGHT: u8 = 127;
 
 /// Sums of weights over the pixels of one run.
-///
 /// With weights of at most 127 and columns below 800 they fit `u32`: Σw·x ≤ 127 · 800 · 799 / 2 <
 /// 2²⁶.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -106,10 +105,10 @@ pub struct Weights {
 }
 
 impl Weights {
-    /// Of no pixel.
+    /// The sums of no pixels.
     pub const NONE: Weights = Weights { sum: 0, sum_x: 0 };
 
-    /// With one more pixel, in column `x` < 800.
+    /// Returns the sums with one more pixel, in column `x` < 800.
     pub const fn with(self, x: u32, weight: u8) -> Weights {
         Weights {
             sum: self.sum + weight as u32,
@@ -118,20 +117,25 @@ impl Weights {
     }
 }
 
-/// Red below this, of 255, is too little: three levels of five bits.
+/// Red below this, of 255, gives no weight: it is three levels of five bits.
 const DARKEST_RED: u8 = 24;
 
-/// How red a pixel (red in bits 15–11) is: ⌊80·(2r − g − b)/r⌋ − 28 of 8-bit channels, from 0 to
-/// [`FULL_WEIGHT`]; 0 for greys, and for what is nearly black: of three levels of red and less no
-/// ratio is to be had.
+/// Returns the redness of a pixel (red in bits 15–11): ⌊80·(2r − g − b)/r⌋ − 28 of 8-bit channels,
+/// from 0 to [`FULL_WEIGHT`]. It is 0 for greys and for nearly black pixels: with three levels of
+/// red or less the ratio is meaningless.
 ///
-/// Where film and marker are equally bright in red, as grey film and red tape are, (2r − g − b)/r
-/// grows linearly with the part of a pixel that the marker covers. Being a ratio, it does not
-/// depend on the light, so that a gradient of it does not shift centroids as it does with weights
-/// by a difference; 28 takes away what a slightly warm film has of it. Measured on rendered frames,
-/// root mean square error of centroids, QVGA and 800×600: 0.017 and 0.015 px; under a gradient of
-/// 60 %, 0.020 and 0.023 px. With r − (g + b)/2 it is 0.030 and 0.035 px, and 0.10 and 0.14 px
-/// under the gradient; with the mask alone 0.10 and 0.046 px.
+/// If film and marker are equally bright in red, as grey film and red tape are, (2r − g − b)/r
+/// grows linearly with the part of a pixel that the marker covers. A ratio does not depend on the
+/// light, so a gradient of light does not shift centroids; weights by a difference would.
+/// Subtracting 28 removes the redness of a slightly warm film.
+///
+/// Root mean square error of centroids on rendered frames, px:
+///
+/// | weights | QVGA | 800×600 | QVGA, gradient of 60 % | 800×600, gradient |
+/// |---|---|---|---|---|
+/// | redness | 0.017 | 0.015 | 0.020 | 0.023 |
+/// | r − (g + b)/2 | 0.030 | 0.035 | 0.10 | 0.14 |
+/// | mask alone | 0.10 | 0.046 | | |
 pub const fn redness(pixel: u16) -> u8 {
     let [red, green, blue] = rgb888(pixel);
     let excess = 2 * red as i32 - green as i32 - blue as i32;
@@ -149,15 +153,15 @@ pub const fn redness(pixel: u16) -> u8 {
     }
 }
 
-/// One byte per `u16` as it lies in memory: bit 0 is set where its colour lies in the box, bits 1–7
-/// are its [`redness`]. 64 KiB.
+/// One byte for each `u16` as it lies in memory: bit 0 is set if its colour is inside the box, bits
+/// 1–7 are its [`redness`]. 64 KiB.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ByteTable {
     bytes: [u8; 65_536],
 }
 
 impl ByteTable {
-    /// The table of a box. Large: on a microcontroller, [`set`](Table::set) one in place.
+    /// Returns the table of a box. Large: on a microcontroller, [`set`](Table::set) one in place.
     ///
     /// # Errors
     /// Those of [`HsvBox::check`].
@@ -167,18 +171,18 @@ impl ByteTable {
         Ok(table)
     }
 
-    /// Bit i is set where pixel i of up to four has bit 7 of its byte set.
+    /// Bit i of the result is bit 7 of the byte of pixel i, for up to four pixels.
     #[inline(always)]
     fn covered(&self, pixels: &[u16]) -> u32 {
         let mut bytes = [0; 4];
         let filled = bytes.iter_mut().zip(pixels);
         filled.for_each(|(byte, raw)| *byte = self.byte(*raw));
-        // Bit 8·i moves to bit 28 + i by the factor's bit 28 − 7·i; no two terms meet.
+        // The factor's bit 28 − 7·i moves bit 8·i to bit 28 + i; no two terms meet.
         let tops = (u32::from_le_bytes(bytes) >> 7) & 0x0101_0101;
         tops.wrapping_mul(0x1020_4080) >> 28
     }
 
-    /// The byte of the pixel that lies in memory as `raw`.
+    /// Returns the byte of a pixel; `raw` is its value in memory.
     #[inline(always)]
     pub const fn byte(&self, raw: u16) -> u8 {
         self.bytes[raw as usize]
@@ -212,7 +216,7 @@ impl Pixels for ByteTable {
         threshold_bytes(&self.bytes, row, mask)
     }
 
-    /// By bit 7 of a byte: weights of 64 and more, two thirds of what a marker has inside.
+    /// Tests bit 7 of a byte: weights of 64 and more, two thirds of that inside a marker.
     #[inline(never)]
     fn mask_covered_rows(&self, rows: &[u16], width: u16, mask: &mut [u32]) {
         let rows = rows.chunks(usize::from(width).max(1));

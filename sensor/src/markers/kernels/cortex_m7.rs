@@ -1,13 +1,13 @@
 //! Kernels for Cortex-M4 and M7, in assembly, scheduled for the M7's two issues a cycle.
 //!
 //! All of them lie in sections `.itcm.*`, which a linker script can put into the memory nearest to
-//! the core. The cycles said here are those of LLVM's model of the core
-//! (`llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7`, the block between a label and the
-//! branch back to it), with rows and tables in memory without wait states.
+//! the core. Cycles are those of LLVM's model of the core (`llvm-mca -mtriple=thumbv7em-none-eabihf
+//! -mcpu=cortex-m7`, the block between a label and the branch back to it), with rows and tables in
+//! memory without wait states.
 //!
-//! None of them touches the stack but for what it saves, only `hivtac_dilate_edges` has paths that
-//! depend on data, and all follow the procedure call standard: r0–r3, r12 and the flags are lost,
-//! the Q flag may be set.
+//! All kernels use the stack only to save registers, and follow the procedure call standard. Only
+//! `hivtac_dilate_edges` has paths that depend on data. They overwrite r0–r3, r12 and the flags,
+//! and may set the Q flag.
 
 #[cfg(target_abi = "eabihf")]
 use core::arch::asm;
@@ -26,24 +26,24 @@ global_asm!(include_str!("weigh_bytes.s"), options(raw));
 global_asm!(include_str!("weigh_luma.s"), options(raw));
 
 unsafe extern "C" {
-    /// Equals [`any_set`](crate::markers::mask::any_set), when what it gives is compared with 0: all words,
-    /// or-ed.
+    /// Returns all words, or-ed. Equals [`any_set`](crate::markers::mask::any_set) if the result is
+    /// compared with 0.
     ///
     /// *Contract.* `count`: a positive multiple of sixteen, of words.
     ///
     /// *Schedule.* Sixteen words: 35 instructions in 18 cycles.
     fn hivtac_dilate_any_set(words: *const u32, count: usize) -> u32;
 
-    /// Equals `Dilation::edges` for one dilation: the edges of a dilated row, but for one at its
-    /// end.
+    /// Equals `Dilation::edges` for one dilation: returns the edges of a dilated row, without one
+    /// at the row's end.
     ///
-    /// Words that are empty, as are their neighbours, cost one test. In others the bits that differ
-    /// from the one before are found from the left by CLZ, mirrored.
+    /// A word that is empty, like its neighbours, costs one test. In other words CLZ finds, in
+    /// mirrored order from the left, the bits that differ from the previous bit.
     ///
     /// *Contract.* `rows`: `words` ≥ 1 words, the same of the row `stride` bytes behind, and of the
-    /// one behind that; the words beside them in these rows are empty. `column`: that of the first
-    /// word. Writes at most 32 edges for each word, and gives where the next would go. `last`: the
-    /// bits of the last word that are in the row.
+    /// one behind that; the words before and after them in these rows are empty. `column`: that of
+    /// the first word. Writes at most 32 edges for each word, and returns where the next would go.
+    /// `last`: the bits of the last word that are in the row.
     ///
     /// *Schedule.* 12 cycles for an empty word, about 20 for another, and 5 for each edge.
     fn hivtac_dilate_edges(
@@ -55,9 +55,9 @@ unsafe extern "C" {
         last: u32,
     ) -> *mut u16;
 
-    /// Equals `portable::threshold_bytes` for whole words of the mask. Gives all of them, or-ed.
+    /// Equals `portable::threshold_bytes` for whole words of the mask. Returns all of them, or-ed.
     ///
-    /// BFI puts bit 0 of a pixel's byte into its place in the word, whatever the other bits are.
+    /// BFI puts bit 0 of a pixel's byte into its place in the word and ignores the other bits.
     ///
     /// *Contract.* `pixels`: 32 for each of `words` words of the mask, a positive multiple of two.
     /// `table`: 65,536 bytes. Writes the words from `mask` on.
@@ -71,11 +71,11 @@ unsafe extern "C" {
         words: usize,
     ) -> u32;
 
-    /// Equals `portable::threshold_cr` for whole words of the mask. Gives all of them, or-ed. USUB8
-    /// compares the Cr of four pairs with the lowest, and SEL chooses the bits of those that are
-    /// not below it.
+    /// Equals `portable::threshold_cr` for whole words of the mask. Returns all of them, or-ed.
+    /// USUB8 compares the Cr of four pairs with the lowest, and SEL chooses the bits of those that
+    /// are not below it.
     ///
-    /// *Contract.* `row`: 32 pixels for each word of the mask; it loads nothing else. `low` is the
+    /// *Contract.* `row`: 32 pixels for each word of the mask, and no other loads. `low` is the
     /// lowest Cr in all four bytes. Writes `mask` up to `end`, which lies a positive multiple of
     /// two words after it.
     ///
@@ -84,45 +84,47 @@ unsafe extern "C" {
     fn hivtac_threshold_cr(row: *const u16, low: u32, mask: *mut u32, end: *const u32) -> u32;
 
     /// Equals `portable::threshold_luma` for whole words of the mask. USUB8 subtracts the lowest
-    /// luma modulo 256, another one compares what is left with `span`.
+    /// luma modulo 256; a second USUB8 compares the rest with `span`.
     ///
     /// *No overflow.* The bits of four pixels are 1, 2, 4 and 8, and those of the next four 16
     /// times that: their sum is at most 255.
     ///
-    /// *Contract.* `row`: 16 `u16`, 32 pixels, for each word of the mask; they are loaded as words,
+    /// *Contract.* `row`: 16 `u16`, 32 pixels, for each word of the mask. They are loaded as words,
     /// which need not lie at a multiple of four (a core must not trap on that: as after reset) but
     /// are slower elsewhere. `low` and `span` are in all four bytes. Writes `mask` up to `end`,
     /// which lies a positive number of words after it.
     ///
-    /// *Schedule.* 32 pixels: 47 instructions in 36 cycles, 1.13 a pixel. 28 of them only go one a
-    /// cycle.
+    /// *Schedule.* 32 pixels: 47 instructions in 36 cycles, 1.13 a pixel. 28 of them cannot be
+    /// paired with another in a cycle.
     fn hivtac_threshold_luma(row: *const u16, low: u32, mask: *mut u32, end: *const u32, span: u32);
 
-    /// Equals `portable::threshold_luma` for whole words of the mask, from a luma of 0 to a highest
-    /// one below 255, of which there are `limit` in all four bytes, with 0 among them.
+    /// Equals `portable::threshold_luma` for whole words of the mask, for lumas from 0 to a largest
+    /// one below 255. `limit` is the number of these lumas, 0 included, in all four bytes.
     ///
     /// *No overflow.* UHSUB8 halves a difference of nine bits, so that its top bit is the sign. The
-    /// products that are added up have bits 0 and 4 of a byte in different places of the word.
+    /// products that are added have bits 0 and 4 of a byte in different places of the word.
     ///
     /// *Contract.* As [`hivtac_threshold_luma`].
     ///
     /// *Schedule.* 32 pixels: 43 instructions in 24 cycles, 0.75 a pixel.
     fn hivtac_threshold_dark(row: *const u16, limit: u32, mask: *mut u32, end: *const u32);
 
-    /// Equals `portable::weigh_bytes`: gives Σw in the low word, and in the high one the sum of all
-    /// sums so far, from right to left.
+    /// Equals `portable::weigh_bytes`: returns Σw in the low word, and in the high one the sum of
+    /// all partial sums, from right to left.
     ///
-    /// *No overflow.* As said of [`Weights`](crate::markers::tables::Weights): pixels are at most 800.
+    /// *No overflow.* As stated at [`Weights`](crate::markers::tables::Weights): pixels are at most
+    /// 800.
     ///
     /// *Contract.* Reads the `count` pixels before `end`. `table`: 65,536 bytes.
     ///
     /// *Schedule.* Four pixels: 19 instructions in 11 cycles.
     fn hivtac_weigh_bytes(end: *const u16, table: *const u8, count: usize) -> u64;
 
-    /// Equals `portable::weigh_luma`: gives Σw in the low word, and in the high one the sum of all
-    /// sums so far, from right to left.
+    /// Equals `portable::weigh_luma`: returns Σw in the low word, and in the high one the sum of
+    /// all partial sums, from right to left.
     ///
-    /// *No overflow.* As said of [`Weights`](crate::markers::tables::Weights): pixels are at most 800.
+    /// *No overflow.* As stated at [`Weights`](crate::markers::tables::Weights): pixels are at most
+    /// 800.
     ///
     /// *Contract.* Reads the `count` bytes before `end`. `table`: 256 bytes.
     ///
@@ -130,8 +132,8 @@ unsafe extern "C" {
     fn hivtac_weigh_luma(end: *const u8, table: *const u8, count: usize) -> u64;
 }
 
-/// As [`portable::threshold_bytes`](super::portable::threshold_bytes) and whether any bit is set,
-/// for rows of 32 pixels for each word of a mask of pairs of words; `None` of others.
+/// As [`portable::threshold_bytes`](super::portable::threshold_bytes). Returns whether any bit is
+/// set; `None` unless the mask has an even number of words and the row 32 pixels for each.
 #[inline(always)]
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> Option<bool> {
     let words = mask.len();
@@ -144,8 +146,8 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> O
     Some(all != 0)
 }
 
-/// As [`portable::threshold_cr`](super::portable::threshold_cr) and whether any bit is set, for
-/// rows of 32 pixels for each word of a mask of pairs of words; `None` of others.
+/// As [`portable::threshold_cr`](super::portable::threshold_cr). Returns whether any bit is set;
+/// `None` unless the mask has an even number of words and the row 32 pixels for each.
 #[inline(always)]
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> Option<bool> {
     if !is_of_pairs(row, mask.len()) {
@@ -158,14 +160,14 @@ pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> Option<bool> {
     Some(all != 0)
 }
 
-/// Whether a row has 32 pixels for each of so many words, which are pairs.
+/// Whether a row has 32 pixels for each of `words` words, whose number is even and not 0.
 #[inline(always)]
 fn is_of_pairs(row: &[u16], words: usize) -> bool {
     words > 0 && words.is_multiple_of(2) && row.len() == 32 * words
 }
 
-/// Does the first words of a mask by a kernel of rows of pairs of words, and says for how many: all
-/// pairs for which the row has 32 pixels each.
+/// Computes the first words of a mask with a kernel for pairs of words. Returns their number: all
+/// pairs for which the row has 32 pixels for each word.
 pub fn first_pairs(
     row: &[u16],
     mask: &mut [u32],
@@ -180,7 +182,7 @@ pub fn first_pairs(
 }
 
 /// As [`portable::threshold_luma`](super::portable::threshold_luma) for the first words of the
-/// mask, and says for how many: all whole ones.
+/// mask. Returns their number: all whole words.
 pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> usize {
     let whole = whole_words(row, mask, 16);
     let range = whole.as_mut_ptr_range();
@@ -202,7 +204,7 @@ pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> usize
     whole.len()
 }
 
-/// Whether a word is not 0.
+/// Returns whether any word is not 0.
 #[inline(always)]
 pub fn any_set(words: &[u32]) -> bool {
     let (sixteens, rest) = words.as_chunks::<16>();
@@ -248,9 +250,9 @@ fn whole_words<'m>(row: &[u16], mask: &'m mut [u32], each: usize) -> &'m mut [u3
     mask.split_at_mut(count).0
 }
 
-/// The edges of a row of the mask, of `near` words of which `rows` begins with those of three rows
-/// that lie `row_words` apart; their number. Zero when `rows` is too short for that, or there is no
-/// room.
+/// Writes the edges of the words `near` of a dilated row, and returns their number. `rows` begins
+/// with these words of the first of three rows that lie `row_words` apart. Returns 0 if `rows` is
+/// too short, or there is no room.
 #[inline(always)]
 pub fn dilate_edges(
     rows: &[u32],
@@ -272,8 +274,8 @@ pub fn dilate_edges(
     (end as usize - begin as usize) / 2
 }
 
-/// As `libm::sqrtf`, which computes it bit by bit here. The compiler gives out no register of the
-/// floating-point unit, so that the number goes there and back.
+/// As `libm::sqrtf`, which here computes it bit by bit. The compiler does not assign registers of
+/// the floating-point unit to assembly, so the number is moved there and back.
 #[cfg(target_abi = "eabihf")]
 #[inline(always)]
 pub fn sqrt(square: f32) -> f32 {

@@ -1,8 +1,8 @@
-//! The hottest loops, by the fastest means that this processor has.
+//! Runs the hottest loops in the fastest way that this processor offers.
 //!
-//! Each function is the definition in portable Rust, of the same name in `portable`, or a kernel
-//! that gives the same bits: on a Cortex-M4 or M7 (targets `thumbv7em-*`) those of `cortex_m7`, the
-//! only file of this package that holds `unsafe`.
+//! Each function is either the definition of the same name in `portable`, or a kernel that gives
+//! the same bits. Kernels exist for Cortex-M4 and M7 (targets `thumbv7em-*`), in `cortex_m7`, the
+//! only file of `markers` that holds `unsafe`.
 
 #[cfg(armv7em)]
 #[allow(unsafe_code)]
@@ -16,7 +16,7 @@ pub use {
     portable::{weigh_bytes, weigh_luma},
 };
 
-/// A square root, to the nearest.
+/// A square root, rounded to nearest.
 #[inline(always)]
 pub fn sqrt(square: f32) -> f32 {
     #[cfg(all(armv7em, target_abi = "eabihf"))]
@@ -25,8 +25,8 @@ pub fn sqrt(square: f32) -> f32 {
     libm::sqrtf(square)
 }
 
-/// The mask of a row of pixels through a table of bytes, and whether anything is set: see
-/// `portable::threshold_bytes`.
+/// Computes the mask of a row of pixels through a table of bytes, and returns whether any bit is
+/// set. Defined by `portable::threshold_bytes`.
 #[inline]
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
@@ -48,7 +48,7 @@ fn threshold_bytes_in_parts(table: &[u8; 65_536], row: &[u16], mask: &mut [u32])
     any_set(mask)
 }
 
-/// The mask of a row of YUV422 by its Cr, and whether anything is set: see
+/// Computes the mask of a row of YUV422 by its Cr, and returns whether any bit is set. Defined by
 /// `portable::threshold_cr`.
 #[inline]
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32]) -> bool {
@@ -71,7 +71,8 @@ fn threshold_cr_in_parts(low: u8, row: &[u16], mask: &mut [u32]) -> bool {
     any_set(mask)
 }
 
-/// The mask of a row of mono pixels, and whether anything is set: see `portable::threshold_luma`.
+/// Computes the mask of a row of mono pixels, and returns whether any bit is set. Defined by
+/// `portable::threshold_luma`.
 pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32]) -> bool {
     #[cfg(armv7em)]
     let done = cortex_m7::threshold_luma(low, span, row, mask);

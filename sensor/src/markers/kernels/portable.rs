@@ -1,10 +1,10 @@
-//! The definition of every kernel, in portable Rust.
+//! Defines every kernel, in portable Rust.
 
 #[cfg(not(armv7em))]
 use core::ops::Range;
 
-/// The mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w + i.
-/// `mask` has ⌈pixels / 32⌉ words; bits beyond the row become unset. Starts with word `first`.
+/// Computes the mask of a row: bit i of word w is bit 0 of the byte that `table` has for pixel 32·w
+/// + i. `mask` has ⌈pixels / 32⌉ words; bits beyond the row are cleared. Starts with word `first`.
 pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], first: usize) {
     // Each bit is shifted in from the top; a shorter last word is moved down.
     let shift_in = |bits: u32, raw: &u16| bits >> 1 | u32::from(table[usize::from(*raw)]) << 31;
@@ -17,9 +17,9 @@ pub fn threshold_bytes(table: &[u8; 65_536], row: &[u16], mask: &mut [u32], firs
     }
 }
 
-/// Of the bytes that `table` has for the pixels of a run, bits 1–7 are weights: their sum, and the
-/// sum of all sums so far, from right to left: it counts each weight once for its own column and
-/// once for each one to the left of that.
+/// Bits 1–7 of a pixel's byte in `table` are its weight. Returns the sum of the weights of a run,
+/// and the sum of all partial sums from right to left. The latter counts each weight once for its
+/// own column, and once for each column of the run to the left.
 #[cfg(not(armv7em))]
 pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
     let weights = run.iter().rev().map(|raw| table[usize::from(*raw)] >> 1);
@@ -29,9 +29,8 @@ pub fn weigh_bytes(table: &[u8; 65_536], run: &[u16]) -> [u32; 2] {
     })
 }
 
-/// Of the weights that `table` has for the pixels of a run of a mono row, two in a `u16`: their
-/// sum, and the sum of all sums so far, as [`weigh_bytes`] has it. The run is `columns`; one that
-/// does not lie in the row has none.
+/// As [`weigh_bytes`], with the weights that `table` has for mono pixels, two in a `u16`. The run
+/// is `columns`; both sums are 0 if it is not wholly in the row.
 #[cfg(not(armv7em))]
 pub fn weigh_luma(table: &[u8; 256], row: &[u16], columns: Range<usize>) -> [u32; 2] {
     if columns.end > 2 * row.len() {
@@ -45,9 +44,9 @@ pub fn weigh_luma(table: &[u8; 256], row: &[u16], columns: Range<usize>) -> [u32
     })
 }
 
-/// The mask of a row of YUV422 (Y0 Cb Y1 Cr): bits 2·i and 2·i + 1 of a word are set where Cr of
-/// its pair i is at least `low`. `mask` has ⌈pixels / 32⌉ words; bits beyond the row, and of a
-/// pixel without its pair, become unset. Starts with word `first`.
+/// Computes the mask of a row of YUV422 (Y0 Cb Y1 Cr): bits 2·i and 2·i + 1 of a word are set if Cr
+/// of its pair i is at least `low`. `mask` has ⌈pixels / 32⌉ words; bits beyond the row, and of a
+/// pixel without its pair, are cleared. Starts with word `first`.
 pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32], first: usize) {
     for (word, pixels) in mask.iter_mut().zip(row.chunks(32)).skip(first) {
         let pairs = (0..).zip(pixels.chunks_exact(2));
@@ -58,9 +57,9 @@ pub fn threshold_cr(low: u8, row: &[u16], mask: &mut [u32], first: usize) {
     }
 }
 
-/// The mask of a row of mono pixels, two in a `u16`: a bit is set where its pixel is `low` to
-/// `low + span`, counted modulo 256. `mask` has ⌈pixels / 32⌉ words; bits beyond the row become
-/// unset. Starts with word `first`.
+/// Computes the mask of a row of mono pixels, two in a `u16`: a bit is set if its pixel is within
+/// `low` and `low + span`, modulo 256. `mask` has ⌈pixels / 32⌉ words; bits beyond the row are
+/// cleared. Starts with word `first`.
 pub fn threshold_luma(low: u8, span: u8, row: &[u16], mask: &mut [u32], first: usize) {
     for (word, pairs) in mask.iter_mut().zip(row.chunks(16)).skip(first) {
         *word = (0..).zip(pairs).fold(0, |bits, (i, pair)| {

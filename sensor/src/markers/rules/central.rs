@@ -1,26 +1,25 @@
-//! How the pixels of a blob lie around their mean: variances and third moments, in single
-//! precision.
+//! Computes how a blob's pixels are distributed around their mean: variances and third moments, in
+//! single precision.
 
 use crate::markers::blob::Blob;
 
 /// Central moments of a blob per pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Central {
-    /// E x², E xy, E y² and what a pixel has as it is a square, px². Below 800²/4 px².
+    /// E x², E xy, E y², plus the variance of a square pixel, px². Below 800²/4 px².
     pub variance: [f32; 3],
     /// E x³, E x²y, E xy², E y³, px³.
     pub third: [f32; 4],
 }
 
-/// A pixel is a square, not a point, px².
+/// Variance of a pixel along each axis, px²: it is a square, not a point.
 const PIXEL_VARIANCE: f32 = 1.0 / 12.0;
 
 impl Central {
-    /// Of a blob of at least one pixel, with one over its area.
+    /// Of a blob of at least one pixel; `by_area` is one over its area.
     ///
-    /// Sums are first taken about the whole pixel next to the mean, exactly: no term is beyond 3 ·
-    /// 640,000 · 799³ < 2⁵¹. About the mean, which is (a, b) away from that, they are then
-    /// corrected.
+    /// Sums are first taken exactly about the whole pixel next to the mean: no term exceeds 3 ·
+    /// 640,000 · 799³ < 2⁵¹. They are then corrected to the mean, which is (a, b) away.
     pub fn of_blob(blob: &Blob, by_area: f32) -> Central {
         // Below 2²⁹ each.
         let [sx, sy] = [blob.sum_x, blob.sum_y].map(|sum| sum as u32);
@@ -47,7 +46,7 @@ impl Central {
     }
 }
 
-/// From about a point that is (a, b) off the mean, px: E(x−a)² = E x² − a² and so on.
+/// Converts moments about a point that is (a, b) px off the mean: E(x−a)² = E x² − a² and so on.
 fn about_the_mean(
     [a, b]: [f32; 2],
     [xx, xy, yy]: [f32; 3],
@@ -55,7 +54,7 @@ fn about_the_mean(
 ) -> Central {
     let [vxx, vxy, vyy] = [xx - a * a, xy - a * b, yy - b * b];
     // E(x−a)³ = E x³ − a·(2·E x² + the variance) + a³, and E(x−a)²(y−b) = E x²y − 2·a·E xy − b·the
-    // variance along x + a²·b. The last terms, at most 1/8 px³, are left out.
+    // variance along x + a²·b. The last terms, at most 1/8 px³, are omitted.
     let third = [
         xxx - a * (xx + xx + vxx),
         xxy - (a + a) * xy - b * vxx,
@@ -68,8 +67,8 @@ fn about_the_mean(
     }
 }
 
-/// One within ±2⁶² in single precision, by two conversions of 32 bits, as the processor has none of
-/// 64. The lower word is taken with its sign, so that a small number is all in it.
+/// A number within ±2⁶² in single precision. It takes two 32-bit conversions, because the processor
+/// has none of 64 bits. The low word is signed, so that it holds a small number completely.
 fn rounded(sum: i64) -> f32 {
     let low = sum as i32;
     let high = ((sum - i64::from(low)) >> 32) as i32;
@@ -83,12 +82,12 @@ pub mod tests {
     use crate::markers::tables::Weights;
     use proptest::prelude::*;
 
-    /// With one over its area.
+    /// The moments of a blob.
     pub fn of_whole(blob: &Blob) -> Central {
         Central::of_blob(blob, 1.0 / blob.area as f32)
     }
 
-    /// The pixels inside, as a blob.
+    /// The blob of all pixels for which `inside` is true.
     pub fn blob(inside: impl Fn(f64, f64) -> bool) -> Blob {
         let mut sum: Option<Blob> = None;
         for y in 0..120_u16 {
@@ -145,7 +144,7 @@ pub mod tests {
         }
     }
 
-    /// Two pixels in opposite corners have the largest variance, and three the largest third
+    /// Two pixels in opposite corners have the largest variance; three have the largest third
     /// moment.
     #[test]
     fn what_fills_the_largest_frame_does_not_overflow() {
@@ -161,7 +160,7 @@ pub mod tests {
             near(found, expected);
         }
         corners.add(&pixel(0, 1));
-        // Of 799 px once and 0 px twice: 2/27 of the cube.
+        // 799 px once and 0 px twice: 2/27 of the cube.
         let expected = 799_f64.powi(3) * 2.0 / 27.0;
         for found in of_whole(&corners).third {
             assert!((f64::from(found) / expected - 1.0).abs() < 0.01, "{found}");
@@ -179,7 +178,7 @@ pub mod tests {
         for (found, expected) in central.variance.iter().zip([expected, 0.0, expected]) {
             near(*found, expected);
         }
-        // Symmetric: 2⁻²³ of what 400 px to the third are.
+        // Symmetric: the rounding error is 2⁻²³ of 400 px cubed.
         assert!(
             central.third.iter().all(|third| third.abs() < 8.0),
             "{central:?}"

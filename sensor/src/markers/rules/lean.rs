@@ -1,11 +1,11 @@
-//! Third moments: how far a shape leans to one side.
+//! Computes how far a shape leans to one side, from its third moments.
 //!
-//! An ellipse's third central moments are zero. What is cut off or sticks out leaves one. Scaled to
-//! a round shape by the diameters, E|d|²d is the part of it that a pixel grid hardly disturbs: a
-//! pixel more or less on the edge of a disc shifts its centroid and E|d|²d so that the two nearly
-//! cancel.
+//! The third central moments of an ellipse are zero; those of a shape that is cut off or bulges are
+//! not. Scaled to a round shape by the diameters, E|d|²d is the combination that a pixel grid
+//! hardly disturbs. One pixel more or less on the edge of a disc shifts its centroid and E|d|²d
+//! such that the two effects nearly cancel.
 
-/// Which way to look at a shape: along a direction and across it.
+/// The direction along and across which a shape is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Direction {
     /// cos², cos·sin, sin².
@@ -13,7 +13,7 @@ pub struct Direction {
 }
 
 impl Direction {
-    /// Of a vector that is not zero, and one over its square.
+    /// The direction of a vector that is not zero; `by_square` is one over its square.
     pub fn of([x, y]: [f32; 2], by_square: f32) -> Direction {
         let (cos, sin) = (x * by_square, y * by_square);
         Direction {
@@ -27,24 +27,23 @@ impl Direction {
         cc * p + (cs + cs) * q + ss * r
     }
 
-    /// The same across it.
+    /// The same across the direction.
     pub fn across(&self, [p, q, r]: [f32; 3]) -> f32 {
         let [cc, cs, ss] = self.products;
         ss * p - (cs + cs) * q + cc * r
     }
 
-    /// Of M, along it on one side and across it on the other.
+    /// M's mixed component: along the direction on one side, across it on the other.
     pub fn mixed(&self, [p, q, r]: [f32; 3]) -> f32 {
         let [cc, cs, ss] = self.products;
         cs * (r - p) + (cc - ss) * q
     }
 }
 
-/// E|d|²d of a shape, scaled to a round one: the square of its length, px².
+/// Returns the squared length of E|d|²d of a shape, scaled to a round one, px².
 ///
 /// `third` are its third moments, px³, and `by` are one over the variances along and across the
-/// direction, px⁻². A vector is as long whichever way it is looked at, so that |d|² alone is
-/// turned.
+/// direction, px⁻². The length of a vector does not depend on the axes, so only |d|² is rotated.
 pub fn squared_lean([xxx, xxy, xyy, yyy]: [f32; 4], direction: &Direction, by: [f32; 2]) -> f32 {
     let [cc, cs, ss] = direction.products;
     let [p, r] = [cc * by[0] + ss * by[1], ss * by[0] + cc * by[1]];
@@ -63,7 +62,7 @@ mod tests {
         tests::{blob, of_whole},
     };
 
-    /// px².
+    /// The lean of a blob, px².
     fn lean_of(blob: &Blob) -> f32 {
         let Central { variance, third } = of_whole(blob);
         let by = [variance[0], variance[2]].map(|it| 1.0 / it);

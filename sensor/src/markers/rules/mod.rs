@@ -1,38 +1,46 @@
-//! Four markers out of the blobs: correct or rejected, never silently wrong.
+//! Selects the four markers among the blobs: correct or rejected, never silently wrong.
 //!
-//! The rules rest on optics and on the pattern's geometry, not on how the film gives:
+//! The rules follow from optics and from the pattern's geometry, not from the film's stiffness:
 //!
-//! 1. *Candidates* (`shape`): blobs off the border, of a plausible area, filled like an ellipse.
+//! 1. *Candidates* (`shape`): blobs that do not touch the border, of a plausible area, filled like
+//!    an ellipse.
 //! 2. *Pattern* (`pattern`): four candidates, one in each quadrant around their own centre, that
-//!    make a near-square.
-//! 3. *Size*: a lens that is symmetric about its axis shows a circle about the axis as a circle, so
-//!    it magnifies *across* the radius by image radius over film radius, whatever the film's height
-//!    and tilt. A marker at distance r from the pattern's centre is therefore r·d/R wide across it,
-//!    plus what dilation and soft edges add.
-//! 4. *Trust* (`trust`): with a rest position, much tighter limits relative to it decide whether
-//!    there may be a force. What the pattern does at a film's symmetric answer to any force bounds
-//!    how far one marker may be displaced (strain); how little each image leans, is hollow or
-//!    skewed, how alike their colours are, and how many of its pixels passed the threshold
-//!    themselves, bounds what may be cut off, grown, hidden or holed.
+//!    form a near-square.
+//! 3. *Size*: a lens that is symmetric about its axis images a circle about the axis as a circle.
+//!    So it magnifies *across* the radius by image radius over film radius, whatever the film's
+//!    height and tilt. A marker at distance r from the pattern's centre is therefore r·d/R wide
+//!    across it, plus the width that dilation and soft edges add.
+//! 4. *Trust* (`trust`): limits relative to a rest position are much tighter and decide whether the
+//!    markers may give a force. The film answers any force symmetrically, so the pattern's strain
+//!    bounds the displacement of a single marker. Four properties of the images bound what may be
+//!    cut off, grown, hidden or holed: how little each image leans, is hollow or skewed; how alike
+//!    their colours are; how many pixels passed the threshold themselves.
 //!
-//! A rest position has none to be compared with. What shall become one ([`Found::may_rest`]) is
-//! judged by 4 against itself, and by how alike the four are: they are punched alike, and a film at
+//! A new rest position has no earlier one to be compared with. Rule 4 judges it against itself
+//! ([`Found::may_rest`]), and the four markers must be alike: they are punched alike, and a film at
 //! rest is flat.
 //!
-//! Exactly one set of four must pass 1 to 3; two are ambiguous, however different.
+//! Exactly one set of four must pass rules 1 to 3; two such sets are ambiguous, however different.
 //!
-//! What stays unseen at QVGA (`tests/tests/markers.rs` and `tests/tests/hard_cases.rs` assert it on
-//! rendered frames, and `hard-cases` of the tests prints a table): with weighted centroids and this
-//! unit's own rest, a marker that is covered, glares or has red grown on it is off by less than
-//! 0.3 px when it is accepted, as is a disc of its size in its place (0.04 mm away at most). At
-//! 800×600 every hard case is within 0.15 px, but JPEG of quality 70 and less: up to 0.2 px. Under
-//! a tip that sticks or slips the pattern may be strained more: 0.45 px, at 320×240 seldom 0.5 px
-//! of JPEG of quality 30. Binary centroids are off by up to 0.36 px on honest frames, which no rule
-//! can tell from a fault: there, 0.6 px for a covered marker, and 0.85 px for one under a red disc
-//! of nearly its size. At 800×600 a disc of a marker's size in its place is accepted up to 0.3 px
-//! away at small forces and 1.2 px under the largest sideways ones, which strain the film as much:
-//! such a disc looks like a marker in everything else. Without an own rest position the pattern may
-//! be strained by 5 px, for another unit's markers lie elsewhere.
+//! Largest errors of accepted markers, asserted on rendered frames by `tests/tests/markers.rs` and
+//! `tests/tests/hard_cases.rs`; `hard-cases` of the tests prints a table:
+//!
+//! | centroids, frame, case | largest error |
+//! |---|---|
+//! | weighted, QVGA, own rest: a marker covered, glaring, or with red grown on it | 0.3 px |
+//! | the same: a disc of a marker's size in its place, at most 0.04 mm away | 0.3 px |
+//! | weighted, 800×600: every hard case | 0.15 px |
+//! | weighted, 800×600: JPEG of quality 70 and less | 0.2 px |
+//! | weighted, under a tip that sticks or slips | 0.45 px |
+//! | the same, seldom, at 320×240: JPEG of quality 30 | 0.5 px |
+//! | binary, honest frames, which no rule can distinguish from a fault | 0.36 px |
+//! | binary: a covered marker | 0.6 px |
+//! | binary: a marker under a red disc of nearly its size | 0.85 px |
+//! | 800×600: a disc of a marker's size in its place, small forces | 0.3 px |
+//! | the same, largest sideways forces, which strain the film as much | 1.2 px |
+//! | without an own rest position, as another unit's markers lie elsewhere | 5 px of strain |
+//!
+//! A disc of a marker's size looks like a marker in everything but the pattern's strain.
 
 mod central;
 mod lean;
@@ -54,7 +62,7 @@ use hivtac_terms::units::Px;
 use pattern::Pattern;
 use shape::{RadialShape, Shape, nominal_edge};
 
-/// Four markers, how their images look, and the pattern they make.
+/// Four markers, the properties of their images, and their pattern.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// Markers 0–3.
@@ -66,16 +74,15 @@ pub struct Found {
 }
 
 impl Found {
-    /// Whether these are the images of four whole markers on a film at rest, by themselves: against
-    /// the rest position that they would be.
+    /// Returns whether these are the images of four whole markers on a film at rest. They are
+    /// compared with the rest position that they would become.
     pub fn may_rest(&self, settings: &Settings) -> bool {
         let trust = Trust::new(settings, &self.markers, true, Reading::UNTOUCHED);
         let areas = self.markers.map(|marker| marker.area);
         trust.judge(self) == Status::OK && trust::are_equal(&settings.geometry, areas)
     }
 
-    /// The same images, whose markers make the pattern that they make elsewhere: little farther
-    /// than they are wide.
+    /// Returns the same images with markers at other places, moved by little more than their width.
     pub fn moved_to(&self, markers: [Marker; 4]) -> Found {
         Found {
             pattern: Pattern::of_centroids(markers.map(|marker| (marker.x, marker.y))),
@@ -85,16 +92,16 @@ impl Found {
     }
 }
 
-/// What a rest position is to judge of a marker's image.
+/// The properties of a marker's image that are compared with a rest position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Image {
-    /// As the pattern's centre sees it.
+    /// Shape relative to the pattern's centre.
     radial: RadialShape,
     /// [`Shape::area`].
     area: u32,
     /// [`Shape::passed`].
     passed: u32,
-    /// Its width by the optics, without what the mask adds, px.
+    /// Its width by the optics, without the width that the mask adds, px.
     expected: f32,
     /// [`Shape::hollow`].
     hollow: f32,
@@ -104,28 +111,28 @@ struct Image {
     density: f32,
 }
 
-/// More candidates than this are not sorted out: 8 make 70 sets of four.
+/// Most candidates; frames with more are refused. 8 candidates make 70 sets of four.
 const MAX_CANDIDATES: usize = 8;
-/// A candidate has at least one part in this many of a marker's area at rest: markers only come
+/// A candidate has at least this part of a marker's area at rest (1 over this): markers only come
 /// nearer.
 const SMALLEST_PART: u32 = 3;
-/// A candidate has at most this many times a marker's area at rest: at twice the rest's distance
-/// from the axis it has less than four times, before dilation adds its share.
+/// A candidate has at most this many times a marker's area at rest. At twice the distance from the
+/// axis it has less than four times the area, before dilation adds its share.
 const LARGEST_MULTIPLE: u32 = 8;
-/// Candidates fill their ellipse at least so far. A disc has 0.97 to 1 at any size and tilt, a half
-/// disc 0.95, two touching discs 0.88, a crescent less.
+/// Smallest fill of a candidate's ellipse. A disc has 0.97 to 1 at any size and tilt, a half disc
+/// 0.95, two touching discs 0.88, a crescent less.
 const LEAST_FILL: f32 = 0.93;
-/// How far a marker may be from the optical law in width: threshold, light and blur are unknown
-/// before there is a rest position, and under a tip far off the middle the pattern's centre is not
-/// on the axis.
+/// Largest relative deviation of a marker's width from the optical law. Before there is a rest
+/// position, threshold, light and blur are unknown; under a tip far off the middle the pattern's
+/// centre is not on the axis.
 const SIZE_TOLERANCE: f32 = 0.375;
-/// Narrowest marker, along the radius over across it: foreshortened by distance and steepest film.
+/// Smallest width along the radius over that across it: foreshortened by distance and the steepest
+/// film.
 const LEAST_ASPECT: f32 = 0.199;
-/// Widest: round, and the noise of a small picture.
+/// Largest such ratio: a round marker, and the noise of a small picture.
 const LARGEST_ASPECT: f32 = 1.152;
 
-/// Finds the markers among the blobs of a frame. Holds all that follows from the settings before
-/// there is a frame.
+/// Finds the markers among the blobs of a frame. Holds all numbers that follow from the settings.
 #[derive(Clone, Debug)]
 pub struct Finder {
     /// Columns and rows of a frame.
@@ -137,14 +144,14 @@ pub struct Finder {
     /// A marker's width across the radius over its distance from the middle: see
     /// [`Geometry::across`](hivtac_terms::geometry::Geometry::across).
     across: f32,
-    /// What the mask adds to it, px.
+    /// Width that the mask adds, px.
     edge: f32,
     areas: (u32, u32),
     centroid: CentroidEstimator,
 }
 
 impl Finder {
-    /// For frames that are scanned so.
+    /// For frames that are scanned with these settings.
     pub fn new(settings: &Settings) -> Finder {
         let geometry = &settings.geometry;
         let edge = nominal_edge(settings.dilations);
@@ -161,13 +168,12 @@ impl Finder {
         }
     }
 
-    /// The four markers among `blobs`.
+    /// Returns the four markers among `blobs`.
     ///
     /// # Errors
     /// [`Status::MARKERS_MISSING`] with fewer than four candidates; [`Status::MARKERS_IMPLAUSIBLE`]
-    /// when four of them make the pattern but their sizes do not fit it;
-    /// else [`Status::MARKERS_AMBIGUOUS`]: two sets fit, or none does, or there are too many
-    /// candidates.
+    /// if four of them form the pattern but their sizes do not fit it; otherwise
+    /// [`Status::MARKERS_AMBIGUOUS`]: two sets fit, none fits, or there are too many candidates.
     pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
         let mut candidates = Vec::<Shape, MAX_CANDIDATES>::new();
         for blob in blobs {
@@ -203,7 +209,8 @@ impl Finder {
         Shape::of_blob(blob, self.centroid).filter(|shape| shape.fill >= LEAST_FILL)
     }
 
-    /// Plausible area, and no pixel on the border: what touches it is cut.
+    /// Whether its area is plausible and it has no pixel on the border: a blob that touches the
+    /// border is cut.
     fn may_be_marker(&self, blob: &Blob) -> bool {
         (self.areas.0..=self.areas.1).contains(&blob.area)
             && blob.x0 > 0
@@ -235,7 +242,8 @@ impl Finder {
         })
     }
 
-    /// A marker's image, when its size fits its distance from the pattern's centre.
+    /// Returns a marker's image; `None` if its size does not fit its distance from the pattern's
+    /// centre.
     fn image(&self, shape: &Shape, pattern: &Pattern) -> Option<Image> {
         let radial = shape.about(pattern.center)?;
         let expected = radial.distance * self.across;
@@ -255,7 +263,7 @@ impl Finder {
     }
 }
 
-/// Every way to take four of `count` things, in order.
+/// Every way to take four of `count` items, in order.
 fn sets_of_four(count: usize) -> impl Iterator<Item = [usize; 4]> {
     (0..count).flat_map(move |a| {
         (a + 1..count).flat_map(move |b| {

@@ -1,5 +1,5 @@
-//! How the image of one marker looks: its moments as an ellipse's, and what the optics says of
-//! them.
+//! Describes the image of one marker: its moments as those of an ellipse, along and across the
+//! radius.
 
 use super::{
     central::Central,
@@ -11,7 +11,7 @@ use crate::markers::kernels::sqrt;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::units::Px;
 
-/// A blob's centroid and how its pixels lie around it.
+/// A blob's centroid, and the distribution of its pixels around it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shape {
     /// Centroid, column.
@@ -22,16 +22,16 @@ pub struct Shape {
     pub area: u32,
     /// [`Blob::passed`].
     pub passed: u32,
-    /// Area over that of the ellipse with the same moments. 1 for an ellipse, less for anything
-    /// else.
+    /// Area over that of the ellipse with the same moments: 1 for an ellipse, less for any other
+    /// shape.
     pub fill: f32,
-    /// What [`fill`](Self::fill) lacks of 1, times the mean variance, px². Pixels make it the same
+    /// (1 − [`fill`](Self::fill)) times the mean variance, px². The pixel grid makes it the same
     /// for discs of any size.
     pub hollow: f32,
     /// Distance of the centroid from the middle of the bounding box, the larger of x and y, px: 0
-    /// for an ellipse, more for one that is cut.
+    /// for an ellipse, more for a cut one.
     pub lopsided: f32,
-    /// Mean weight of its pixels; 0 when nothing was weighed.
+    /// Mean weight of its pixels; 0 if pixels were not weighed.
     pub density: f32,
     central: Central,
 }
@@ -43,35 +43,35 @@ pub struct RadialShape {
     pub distance: f32,
     /// Diameter across the radius.
     pub across: f32,
-    /// One over it.
+    /// One over `across`.
     pub by_across: f32,
     /// Diameter along the radius.
     pub along: f32,
-    /// Covariance of both directions over the variance across: 0 where the ellipse lies across or
-    /// along.
+    /// Covariance of both directions over the variance across: 0 if an axis of the ellipse points
+    /// along the radius.
     pub skew: f32,
-    /// The square of how far it leans to one side ([`squared_lean`]), px⁴.
+    /// The square of its lean to one side ([`squared_lean`]), px⁴.
     pub squared_lean: f32,
 }
 
 /// An ellipse's area is 4π times the root of its covariance's determinant.
 const FOUR_PI: f32 = 4.0 * core::f32::consts::PI;
-/// No blob's ellipse is smaller: it has at least a pixel. And no variance of one.
+/// Smallest ellipse and smallest variance of a blob: it has at least one pixel.
 const LEAST_AREA: f32 = 1.0;
 const LEAST_VARIANCE: f32 = 1.0 / 4_096.0;
-/// What soft edges add to a diameter: 0.8 px, as a pixel half covered by red passes.
+/// Width that soft edges add to a diameter: 0.8 px, because a pixel half covered by red passes.
 const SOFT_EDGE: Px = Px(52_429);
-/// What a dilation adds to it, px.
+/// Width that a dilation adds to a diameter, px.
 const DILATION_EDGE: i32 = 2;
 
-/// What the mask adds to a marker's diameter before more is known, px.
+/// Width that the mask adds to a marker's diameter before more is known, px.
 pub fn nominal_edge(dilations: u8) -> Px {
     SOFT_EDGE + Px::from_int(i32::from(dilations) * DILATION_EDGE)
 }
 
 impl Shape {
-    /// Of a blob of at least one pixel; `None` when its position cannot be told: no pixel has a
-    /// weight.
+    /// Of a blob of at least one pixel. Returns `None` if its position is unknown because no pixel
+    /// has a weight.
     pub fn of_blob(blob: &Blob, estimator: CentroidEstimator) -> Option<Shape> {
         let (x, y) = match estimator {
             CentroidEstimator::BinaryMask => blob.centroid(),
@@ -101,7 +101,7 @@ impl Shape {
         })
     }
 
-    /// About a centre; `None` about its own.
+    /// Returns the shape about a centre; `None` about its own centroid.
     pub fn about(&self, center: (Px, Px)) -> Option<RadialShape> {
         let [x, y] = offset((self.x, self.y), center);
         let square = x * x + y * y;
@@ -112,7 +112,7 @@ impl Shape {
         let Central { variance, third } = self.central;
         let along = larger(direction.along(variance), LEAST_VARIANCE);
         let across = larger(direction.across(variance), LEAST_VARIANCE);
-        // One division for two.
+        // One division instead of two.
         let by_both = 1.0 / (along * across);
         let (by_along, by_across) = (by_both * across, by_both * along);
         // An ellipse's diameter is four standard deviations.

@@ -1,11 +1,12 @@
-//! Whether four markers may make a force: how they compare with a rest position.
+//! Decides whether four markers may give a force, by comparing them with a rest position.
 //!
-//! The limits stand between what a load does to the markers and what a false, cut or half dark
-//! marker does. The first was measured on rendered frames of the film's curves at QVGA and 800×600,
-//! both presets: forces to 0.25 N tilted by up to 12°, tip offsets to 0.5 mm. Each limit's comment
-//! gives the largest value seen. Lengths do not grow with the frame where they come of the pixel
-//! grid. A model of presses in the middle would read presses far off it wrong: they are refused
-//! where they strain the pattern. One that tells places has wider limits ([`Reading`]).
+//! Each limit is between the effect of a load on the markers and that of a false, cut or half dark
+//! marker. The effect of loads was measured on rendered frames of the film's curves at QVGA and
+//! 800×600, both presets: forces to 0.25 N tilted by up to 12°, tip offsets to 0.5 mm. Each limit's
+//! comment gives the largest value seen. Lengths that come from the pixel grid do not grow with the
+//! frame. A model of presses in the middle would give wrong forces for presses far off it; they are
+//! refused because they strain the pattern. A model with place outputs has wider limits
+//! ([`Reading`]).
 
 use super::{
     Found, Image,
@@ -24,81 +25,84 @@ use hivtac_terms::threshold::PixelFormat;
 use hivtac_terms::units::Px;
 
 /// Strain of binary centroids against this unit's own rest, as the displacement of one marker that
-/// makes it, px (seen: 0.7 at QVGA, 0.26 at 800×600). Of weighted ones: [`Reading::displacement`].
-/// It is what a thing that stands in for a marker may be off.
+/// causes it, px (largest seen: 0.7 at QVGA, 0.26 at 800×600). For weighted ones:
+/// [`Reading::displacement`]. It bounds how far a false marker may be off.
 const STRAIN_BINARY: f32 = 0.7;
-/// Strain against a model's rest: another unit's markers are not quite where this one's are.
+/// Strain against a model's rest: another unit's markers are at slightly different places.
 const STRAIN_FOREIGN: f32 = 0.015;
-/// Turn against the rest's: the tangent of 5° (seen: 0.1°).
+/// Turn against the rest: the tangent of 5° (largest seen: 0.1°).
 const TURN: f32 = 0.087_489;
-/// Shift of the centre against the rest's, in parts of the rest's half side (seen: 0.11).
+/// Shift of the centre against the rest, relative to the rest's half side (largest seen: 0.11).
 const SHIFT: f32 = 0.352;
-/// Size against the rest's (seen: 1 to 1.71).
+/// Size relative to the rest (seen: 1 to 1.71).
 const SCALE: (f32, f32) = (0.852, 2.0);
-/// Width across the radius: off by [`Reading::width`] of it and so many px (seen: 0.3). Eaten or
-/// swollen edges.
+/// Width across the radius may deviate by [`Reading::width`] of it, and by this many px (largest
+/// seen: 0.3). Detects eaten or swollen edges.
 const WIDTH_PIXELS: f32 = 0.35;
-/// The narrowest marker's aspect over the widest's: 1 less 0.05 less 0.5 px of its width less 6
-/// times the taper less the shift over the rest's half side: the film is steeper on the side that
-/// comes nearer, and where an off-centre tip is. One marker eaten or cut along the radius.
+/// The narrowest marker's aspect over the widest's is at least 1 less 0.05, less 0.5 px of its
+/// width, less 6 times the taper, less the shift over the rest's half side. The film is steeper on
+/// the side that comes nearer, and where an off-centre tip is. Detects one marker eaten or cut
+/// along the radius.
 const ASPECT: f32 = 0.05;
 const ASPECT_PIXELS: f32 = 0.5;
 const ASPECT_TAPER: f32 = 6.0;
-/// Skew: 1 px of its width (seen: 0.91 px) and the taper. Eaten or cut on one side.
+/// Skew: 1 px of its width (largest seen: 0.91 px) and the taper. Detects a marker eaten or cut on
+/// one side.
 const SKEW_PIXELS: f32 = 1.0;
-/// Hollowness, px², with none to three dilations, which make a disc a little square (seen: 0.20,
-/// 0.20, 0.28 and 0.44). Dented, notched, grown.
+/// Hollowness, px², with none to three dilations, which make a disc slightly square (largest seen:
+/// 0.20, 0.20, 0.28 and 0.44). Detects a dented, notched or grown marker.
 const HOLLOW: [f32; 1 + MAX_DILATIONS as usize] = [0.22, 0.22, 0.31, 0.49];
-/// Pixels that passed the threshold themselves, before dilation: at least as many as an ellipse has
-/// whose diameters are smaller than the mask's by what dilation adds to them, 8/π px each time (it
-/// adds 2 px to the width and to the height of what it dilates, 8·r + 4 px to a disc's area), and
-/// by 0.328 px (seen: 0.27). What is less are holes, which dilation closes: white pixels, stripes,
-/// spots of light.
+/// Smallest number of pixels that passed the threshold themselves, before dilation: that of an
+/// ellipse with smaller diameters than the mask's. They are smaller by the part that dilation adds,
+/// 8/π px each time, and by 0.328 px (largest seen: 0.27). A dilation adds 2 px to width and
+/// height, 8·r + 4 px to a disc's area. Fewer pixels mean holes, which dilation closes: white
+/// pixels, stripes, spots of light.
 const DILATED: f32 = 8.0 / core::f32::consts::PI;
 const HOLES: f32 = 0.328;
-/// Lean: at most 0.3 px² for a marker as wide as at rest, and more as it is wider: the lens bends
-/// what comes near (seen: 0.16 near rest, 0.26 at 1.5 times its width). Cut or grown on one side.
+/// Lean: at most 0.3 px² for a marker as wide as at rest, in proportion to its width for a wider
+/// one: the lens bends near images (largest seen: 0.16 near rest, 0.26 at 1.5 times the width).
+/// Detects a marker cut or grown on one side.
 const LEAN: f32 = 0.3;
-/// Mean weight of a marker's pixels against that of all four: 0.015 and 12 px² over its width's
-/// square (seen at QVGA: more in 6 of 20,000 frames, 13.1 px² at most; at 800×600 less than 0.012
-/// in all). Striped, stained or glaring inside, where the dilated mask closes.
+/// Mean weight of a marker's pixels against that of all four: 0.015, and 12 px² over its width's
+/// square. Seen at QVGA: more in 6 of 20,000 frames, 13.1 px² at most; at 800×600 less than 0.012
+/// in all. Detects stripes, stains or glare inside a marker, where the dilated mask closes.
 const DENSITY: f32 = 0.015;
 const DENSITY_AREA: f32 = 12.0;
-/// What the mask adds to one marker's diameter at rest less what it adds to another's: 1 px (seen:
-/// 0.8 on units as people build them). One marker cut or grown.
+/// Largest difference between markers of the width that the mask adds to a diameter at rest, 1 px
+/// (largest seen: 0.8 on units as people build them). Detects one marker cut or grown.
 const EDGES_APART: f32 = 1.0;
-/// Centroid against bounding box: 0.6 px and 0.0313 of its width. Cut or grown on one side.
+/// Centroid against bounding box: 0.6 px and 0.0313 of its width. Detects a marker cut or grown on
+/// one side.
 const LOPSIDED_PIXELS: f32 = 0.6;
 const LOPSIDED: f32 = 0.0313;
 
-/// What four markers are compared with: a rest position, and all that follows from it before there
-/// is a frame.
+/// The rest position that four markers are compared with, and all numbers that follow from it.
 #[derive(Clone, Debug)]
 pub struct Trust {
     at_rest: Pattern,
-    /// What the mask added to each marker's diameters at rest, px.
+    /// Width that the mask added to each marker's diameters at rest, px.
     edges: [f32; 4],
     /// One over a marker's width at rest, px.
     by_rest_width: f32,
     /// One over half the pattern's side at rest, px.
     by_half_side: f32,
-    /// Limits of a marker's second moments that come of the pixel grid are so many times those of
-    /// other formats: YUV422 has one Cr for two columns.
+    /// Factor of the pixel format on limits of second moments that come from the pixel grid. YUV422
+    /// has one Cr for two columns.
     grid: f32,
-    /// The same of limits of means, which it hardly changes: nine eighths.
+    /// The same factor on limits of means, which the format hardly changes: nine eighths.
     grid_of_means: f32,
     /// Largest hollowness.
     hollow: f32,
-    /// By how much the diameters of the pixels that passed may be smaller than the mask's, px.
+    /// By how much the diameters of the passed pixels may be smaller than the mask's, px.
     rim: f32,
-    /// Strain as the displacement of one marker that makes it, px; `None` against a model's rest.
+    /// Strain as the displacement of one marker that causes it, px; `None` against a model's rest.
     displacement: Option<f32>,
     reading: Reading,
 }
 
 impl Trust {
-    /// For markers found with these settings that rest there; `own_rest` says whether that was
-    /// taken on this unit, and `reading` what presses.
+    /// For markers found with these settings, and this rest position. `own_rest` is true if it was
+    /// taken on this unit; `reading` is the kind of contact.
     pub fn new(settings: &Settings, rest: &[Marker; 4], own_rest: bool, reading: Reading) -> Trust {
         let geometry = &settings.geometry;
         let centroids = rest.map(|marker| (marker.x, marker.y));
@@ -134,7 +138,7 @@ impl Trust {
         }
     }
 
-    /// Says whether these markers may make a force: [`Status::OK`] or
+    /// Returns [`Status::OK`] if these markers may give a force, otherwise
     /// [`Status::MARKERS_IMPLAUSIBLE`].
     pub fn judge(&self, found: &Found) -> Status {
         let shift = distance(found.pattern.center, self.at_rest.center) * self.by_half_side;
@@ -145,7 +149,7 @@ impl Trust {
         }
     }
 
-    /// `shift` is that of the centre over the half side at rest, here and below.
+    /// Here and below, `shift` is the shift of the centre over the half side at rest.
     fn moved_plausibly(&self, now: &Pattern, shift: f32) -> bool {
         let rest = &self.at_rest;
         let change = |now: [f32; 2], rest: [f32; 2]| [now[0] - rest[0], now[1] - rest[1]];
@@ -170,8 +174,8 @@ impl Trust {
         let Some(displacement) = self.displacement else {
             return larger(STRAIN_FOREIGN, always);
         };
-        // A marker's distance from the centre is √2 half sides; displaced by δ it strains by δ over
-        // four of those, and tapers by √2 times as much: that part of a taper is no tip's.
+        // A marker's distance from the centre is √2 half sides. Displaced by δ it causes a strain
+        // of δ over four of those, and √2 times as much taper, which no tip causes.
         let displaced = displacement / (FOUR_DISTANCES * now.half_side);
         let tapered = larger(taper - displaced * core::f32::consts::SQRT_2, 0.0);
         let limit = displaced
@@ -213,7 +217,7 @@ impl Trust {
         let skew = self.grid * SKEW_PIXELS * radial.by_across
             + taper * self.reading.skew_by_taper
             + self.reading.skew_always;
-        // For a marker that the optics makes so wide now.
+        // For a marker that is wider than at rest by the optics.
         let wider = larger(expected * self.by_rest_width, 1.0);
         let bent = width * width * taper * self.reading.lean_by_taper;
         let lean = (LEAN * wider + bent) * (0.5 * (self.grid + 1.0));
@@ -225,14 +229,14 @@ impl Trust {
             && is_filled(image, self.rim, self.reading.holes)
     }
 
-    /// Whether a marker is as wide as the optics makes it: `expected`, and what the mask adds.
+    /// Whether a marker has the width `expected` by the optics, plus the width that the mask adds.
     fn width_fits(&self, expected: f32, radial: &RadialShape, edge: f32) -> bool {
         let excess = radial.across - edge - expected;
         excess.abs() <= expected * self.reading.width + self.grid_of_means * WIDTH_PIXELS
     }
 
-    /// Whether the mean weights are as alike as such a shift leaves them, and with the mask's edge
-    /// left out, too, where that is looked at. `by_width` is one over the narrowest's width.
+    /// Whether the mean weights are alike to the limit at this shift; if the reading asks for it,
+    /// also without the mask's edge. `by_width` is one over the narrowest marker's width.
     fn evenly_coloured(&self, found: &Found, shift: f32, by_width: f32) -> bool {
         let over_square = |area: f32| self.grid * area * (by_width * by_width);
         let densities = found.images.each_ref().map(|image| image.density);
@@ -250,18 +254,18 @@ impl Trust {
 
 /// Four times a marker's distance from the centre, in half sides.
 const FOUR_DISTANCES: f32 = 4.0 * core::f32::consts::SQRT_2;
-/// No length that is divided by is less, px.
+/// Smallest divisor that is a length, px.
 const LEAST_LENGTH: f32 = 1.0 / 65_536.0;
 
-/// Whether markers of these areas at rest are equal: discs of one size on a flat film, to whose
-/// diameters the mask adds the same.
+/// Returns whether markers of these areas at rest are equal: discs of one size on a flat film, to
+/// whose diameters the mask adds the same width.
 pub fn are_equal(geometry: &Geometry, areas: [u32; 4]) -> bool {
     let edges = areas.map(|area| edge_at_rest(geometry, geometry.rest_distance(), area));
     let least = edges.iter().copied().fold(f32::INFINITY, f32::min);
     edges.iter().all(|edge| edge - least <= EDGES_APART)
 }
 
-/// Whether four mean weights are alike, to 0.015 of them and `more`. Always without weights.
+/// Whether four mean weights are alike, to 0.015 of them and `more`; true without weights.
 fn are_alike(densities: [f32; 4], more: f32) -> bool {
     let [a, b, c, d] = densities;
     let sum = a + b + c + d;
@@ -271,27 +275,26 @@ fn are_alike(densities: [f32; 4], more: f32) -> bool {
         .all(|density| (4.0 * density - sum).abs() <= allowed)
 }
 
-/// The mean weight of a marker without what the mask adds around it, which weighs little and is a
-/// larger part of a narrow image: of an ellipse a by b, e/a + e/b when it adds e to both. Images of
-/// other aspects are comparable only so.
+/// The mean weight of a marker without the edge that the mask adds. The edge weighs little, and is
+/// a larger part of a narrow image: e/a + e/b of an ellipse a by b, if it adds e to both. Without
+/// it, images of different aspects are comparable.
 fn inner_density(image: &Image, edge: f32) -> f32 {
     let outer = edge * image.radial.by_across + edge / image.radial.along;
     image.density / larger(1.0 - outer, 0.125)
 }
 
-/// Whether enough pixels passed, for diameters that may be smaller by `rim` px, but for this part
-/// of them.
+/// Whether enough pixels passed, for diameters that are smaller by `rim` px, except for the part
+/// `holes`.
 fn is_filled(image: &Image, rim: f32, holes: f32) -> bool {
     let (across, along) = (image.radial.across, image.radial.along);
     let least = image.area as f32 * larger(across - rim, 0.0) * larger(along - rim, 0.0);
     image.passed as f32 * across * along >= least * (1.0 - holes)
 }
 
-/// What the mask added to a marker's diameters at rest, px.
+/// Returns the width that the mask added to a marker's diameters at rest, px.
 ///
-/// At rest the film is flat, and the optics gives the marker's image: t across the radius, q =
-/// t·sin θ·cos θ/θ along it. So (t + e)(q + e)·π/4 is the area: e = (√((t − q)² + 16·area/π) − t −
-/// q)/2.
+/// At rest the film is flat, and the optics give the marker's image: t across the radius, q = t·sin
+/// θ·cos θ/θ along it. So (t + e)(q + e)·π/4 is the area: e = (√((t − q)² + 16·area/π) − t − q)/2.
 fn edge_at_rest(geometry: &Geometry, distance: Px, area: u32) -> f32 {
     const SIXTEEN_OVER_PI: f32 = 16.0 / core::f32::consts::PI;
     let across = geometry.across(distance).to_f32();
