@@ -1,6 +1,6 @@
-//! From two pictures of the film, untouched and pressed, to a force:
-//! `cargo run -p hivtac-sensor --example force -- rest.png pressed.png`
-//! (pictures: `hivtac snapshot`, or `hivtac-studies scene`).
+//! Computes a force from two pictures of the film, untouched and pressed: `cargo run -p
+//! hivtac-sensor --example force -- rest.png pressed.png` (pictures: `hivtac snapshot`, or
+//! `hivtac-studies scene`).
 
 use std::error::Error;
 

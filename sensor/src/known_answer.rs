@@ -1,6 +1,6 @@
-//! A question to a model whose answer is known beforehand: whoever builds a program asks it on a
-//! computer, and the program asks it where it runs. Equal numbers say that weights, kernels and
-//! arithmetic work there.
+//! Checks a model with a question whose answer is known. The answer is computed on a computer when
+//! a program is built, and the program computes it again where it runs. Equal numbers prove that
+//! weights, kernels and arithmetic work there.
 
 use crate::force::features::Features;
 use crate::force::model::Model;
@@ -9,16 +9,16 @@ use crate::force::{self, Resting};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
-/// What a force says: α, β (m°), |F|, the vector (µN), two uncertainties (m°, µN), the place and
-/// its uncertainty (µm; 0 without a place).
+/// The numbers of a force: α, β (m°), |F|, the vector (µN), two uncertainties (m°, µN), the place
+/// and its uncertainty (µm; 0 without a place).
 pub type Answer = [i32; 11];
 
-/// Markers move from their common centre by one part in this many of their distance.
+/// Markers move away from their common centre by one part in this many of their distance.
 const OUTWARD: i32 = 8;
-/// And all of them along x.
+/// And all of them along x by this.
 const SIDEWARD: Px = Px(Px::ONE.0 / 2);
 
-/// What a model tells of the markers of its own rest position, moved a little outward, as a press
+/// Returns the model's force for the markers of its own rest position, moved outward, as a press
 /// moves them, and to the side. The same bits on every machine.
 pub fn of(model: &Model<'_>, network: &mut Network) -> Answer {
     let markers = moved(model);
@@ -72,7 +72,7 @@ mod tests {
         of(model, &mut Network::new())
     }
 
-    /// A press of some ten millinewtons, beside the film's middle.
+    /// A press of some ten millinewtons, off the film's middle.
     #[test]
     fn the_answer_is_a_press_with_a_place() {
         let [
@@ -94,8 +94,8 @@ mod tests {
         assert!(x != 0);
     }
 
-    /// One bit is another in the file, and its checksum is right: where a model comes of it, it
-    /// tells another force, unless the bit is of a contact elsewhere, as most of the tables are.
+    /// With one bit of the file changed and its checksum corrected, a model that still parses gives
+    /// a different force. Exception: bits about contacts elsewhere, as most bits of the tables are.
     #[test]
     fn another_model_has_another_answer() {
         let good = answer(&Model::parse(&FILE.0).unwrap());

@@ -1,4 +1,4 @@
-//! Pixels to force: the `no_std`, allocation-free pipeline of the HiVTac sensor.
+//! Turns pixels into a force: the `no_std`, allocation-free pipeline of the HiVTac sensor.
 //!
 //! ```text
 //! rows ─markers→ 4 markers ─force→ force + status
@@ -9,13 +9,13 @@
 //! | [`markers`] | pixels to four markers |
 //! | [`force`] | four markers to a force |
 //! | [`pipeline`] | both, for frame after frame, and the rest position in use |
-//! | [`tare`] | a rest position from frames of the untouched film, judged |
-//! | [`temporal`] | contact, slip, filter and creep: what frames tell one after another |
+//! | [`tare`] | a rest position from frames of the untouched film, checked |
+//! | [`temporal`] | contact, slip, filter and creep: from one frame to the next |
 //! | [`motion`] | how far the film moves while a frame is exposed |
-//! | [`known_answer`] | the question with a known answer that a model is asked before it is used |
+//! | [`known_answer`] | a question with a known answer, to check a model before use |
 //!
 //! Everything here gives the same bits on a microcontroller, in an emulator and on a host.
-//! It knows nothing of cameras, USB or files.
+//! It does not depend on cameras, USB or files.
 #![no_std]
 // Allowed in two files only: the kernels in assembly.
 #![deny(unsafe_code)]

@@ -1,24 +1,24 @@
-//! Markers at one common time: a rolling shutter sees those below later than those above.
+//! Moves markers to one common time: a rolling shutter sees the lower ones later.
 //!
-//! A row is exposed one line after the row above it, and a frame every so many lines. A marker that
-//! is seen in row y of one frame and in row y′ of the frame before has moved for L + y − y′ lines,
-//! L being the lines of a frame. By this velocity it is moved to the time of the frame's middle
-//! row: by (y − middle) / (L + y − y′) of what it has moved.
+//! A row is exposed one line after the row above it, and a frame every L lines. A marker seen in
+//! row y of one frame, and in row y′ of the previous frame, has moved for L + y − y′ lines. With
+//! this velocity it is moved to the time of the frame's middle row: by (y − middle) / (L + y − y′)
+//! of its motion.
 //!
-//! Two frames instead of one change a position's noise: the weights are 1 − c and c with c = (y −
-//! middle) / L while nothing moves, so that of markers 54 rows off the middle of 278 lines the
-//! upper ones have 1.21 times the noise and the lower ones 0.83 times.
+//! Using two frames instead of one changes a position's noise. At rest the weights are 1 − c and c,
+//! with c = (y − middle) / L. For markers 54 rows off the middle of 278 lines, the upper ones have
+//! 1.21 times the noise, the lower ones 0.83 times.
 
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
-/// What the markers of the frame before say of those of this one.
+/// The previous frame's markers, from which those of the current frame have moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
     /// Lines from frame to frame, blank ones included; `None` with a global shutter.
     lines: Option<u16>,
     before: Option<[Marker; 4]>,
-    /// What the frame under way showed, which may be looked at again.
+    /// The markers of the current frame, which may be looked at again.
     now: Option<[Marker; 4]>,
 }
 
@@ -30,7 +30,7 @@ impl Motion {
         now: None,
     };
 
-    /// A frame every so many lines, blank ones included, of which each exposes a row.
+    /// A frame every `lines` lines, blank ones included; each line exposes a row.
     pub const fn rolling(lines: u16) -> Motion {
         Motion {
             lines: Some(lines),
@@ -39,23 +39,23 @@ impl Motion {
         }
     }
 
-    /// The next frame does not follow the one before at once.
+    /// Call before a frame that does not immediately follow the previous one.
     pub fn forget(&mut self) {
         (self.before, self.now) = (None, None);
     }
 
-    /// The next frame begins.
+    /// Call at the beginning of each frame.
     pub fn begin_frame(&mut self) {
         self.before = self.now.take();
     }
 
-    /// The frame ended, and showed these markers or none.
+    /// Call at the end of each frame, with its markers if it showed any.
     pub fn ended(&mut self, seen: Option<&[Marker; 4]>) {
         self.now = seen.copied();
     }
 
-    /// Markers as they were while the middle row of a frame of so many rows was exposed; `None`
-    /// when they were where they are seen, or nothing tells.
+    /// Returns the markers as they were while the middle row of a frame of `rows` rows was exposed.
+    /// Returns `None` with a global shutter, or if the previous frame's markers are unknown.
     pub fn at_the_middle(&self, seen: &[Marker; 4], rows: u16) -> Option<[Marker; 4]> {
         let (lines, before) = (self.lines?, self.before.as_ref()?);
         let mut moved = *seen;
@@ -66,8 +66,8 @@ impl Motion {
     }
 }
 
-/// Coordinates are less than 2¹⁰ px, 2²⁶ in 1/65,536 px: products fit `i64` with 10 bits to spare.
-/// The divisor is more than 0 as a frame has more lines than rows.
+/// Coordinates are below 2¹⁰ px, 2²⁶ in 1/65,536 px: products fit `i64` with 10 bits to spare. The
+/// divisor is positive, because a frame has more lines than rows.
 #[inline(never)]
 fn move_to_the_middle(marker: &mut Marker, before: &Marker, rows: u16, lines: u16) {
     let middle = (i64::from(rows) - 1) << 15;
@@ -96,10 +96,10 @@ mod tests {
         }
     }
 
-    /// Where a marker is seen that moves steadily and passes (`x`, `y`) at time 0, in the frame
-    /// whose middle is `at` frames' time later.
+    /// Where a steadily moving marker is seen that passes `place` at time 0, in the frame whose
+    /// middle is `at` frame times later.
     fn seen(place: [f64; 2], velocity: [f64; 2], at: f64) -> Marker {
-        // The row in which it is seen decides when: y = y₀ + v·(at + (y − middle) / L).
+        // The row in which it is seen determines the time: y = y₀ + v·(at + (y − middle) / L).
         let middle = (f64::from(ROWS) - 1.0) / 2.0;
         let lines = f64::from(LINES);
         let y = (place[1] + velocity[1] * (at - middle / lines)) / (1.0 - velocity[1] / lines);

@@ -1,5 +1,4 @@
-//! Pictures of discs, for tests: drawn without light or noise, so that what a test asserts is
-//! exact.
+//! Draws pictures of discs for tests, without light or noise, so that assertions can be exact.
 
 use crate::force::forward::Drift;
 use crate::force::model::Model;
@@ -12,11 +11,11 @@ use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::ByteOrder;
 use std::{boxed::Box, vec, vec::Vec};
 
-/// Passes the default threshold.
+/// A pixel that passes the default threshold.
 pub const RED: u16 = 0xD8A3;
-/// Does not.
+/// A pixel that does not.
 pub const GREY: u16 = 0x8410;
-/// What soft edges add to a marker's diameter, px.
+/// Width that soft edges add to a marker's diameter, px.
 const SOFT_EDGE: f64 = 0.8;
 
 /// Rows of pixels.
@@ -26,17 +25,17 @@ pub struct Picture {
     pub pixels: Vec<u16>,
 }
 
-/// Where the markers are and how they look.
+/// The places and the look of the markers.
 #[derive(Clone, Copy, Debug)]
 pub struct Pattern {
     pub geometry: Geometry,
-    /// Of the pattern's centre from the picture's, px.
+    /// Shift of the pattern's centre from the picture's, px.
     pub shift: (f64, f64),
-    /// Times the distance at rest.
+    /// Distance from the centre relative to rest.
     pub scale: f64,
-    /// Degrees, x towards y.
+    /// Turn, degrees, x towards y.
     pub turn: f64,
-    /// Of the film, degrees: foreshortens the markers along the radius.
+    /// Tilt of the film, degrees: foreshortens the markers along the radius.
     pub tilt: f64,
     /// Displacement of each marker, px.
     pub displaced: [(f64, f64); 4],
@@ -60,7 +59,7 @@ impl Picture {
         self.paint_near(color, middle, self.width.max(self.height) as f64, inside);
     }
 
-    /// The same, but not beyond `reach` px of a point along x and y.
+    /// The same, limited to `reach` px around a point along x and y.
     pub fn paint_near(
         &mut self,
         color: u16,
@@ -87,7 +86,7 @@ impl Picture {
         });
     }
 
-    /// Runs the picture through a sensor.
+    /// Measures the picture with a sensor.
     pub fn feed(&self, sensor: &mut Sensor<'_>) -> Measurement {
         sensor.begin_frame();
         self.pixels
@@ -159,7 +158,7 @@ impl Pattern {
         picture
     }
 
-    /// The largest distance of a found marker from where it was drawn, px.
+    /// The largest distance of a found marker from its drawn place, px.
     pub fn error(&self, markers: &[Marker; 4]) -> f64 {
         let errors = markers.iter().enumerate().map(|(identity, marker)| {
             let (x, y) = self.center_of(identity);
@@ -192,7 +191,7 @@ pub fn rest_of(picture: &Picture, sensor: &mut Sensor<'_>) -> Rest {
         .unwrap()
 }
 
-/// A sensor that was tared on the pattern at rest.
+/// A sensor with a tare of the pattern at rest.
 pub fn tared(geometry: Geometry) -> Box<Sensor<'static>> {
     let mut sensor = sensor(geometry, None);
     let rest = rest_of(&Pattern::at_rest(geometry).draw(), &mut sensor);

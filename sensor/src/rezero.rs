@@ -1,21 +1,21 @@
-//! Where the untouched film rests: how far from its rest position, and re-zeroing, by which that
-//! follows.
+//! Finds where the untouched film rests: how far from its rest position, and re-zeroing, which
+//! follows it.
 //!
-//! Where the markers rest wanders with temperature and with what the film remembers of its loads.
-//! Frames in which all of them are within half a pixel of the rest position are of the untouched
-//! film, whether or not a force explains them: what touches it moves them farther. The mean of a
-//! second of such frames tells how far the rest is off.
+//! The markers' rest positions drift with temperature and with what the film remembers of its
+//! loads. Frames with all markers within half a pixel of the rest position show the untouched film,
+//! whether or not a force explains them: a touch moves the markers farther. The mean of a second of
+//! such frames gives the drift.
 //!
-//! While that has lasted for long enough, each coordinate of the rest position goes towards that
-//! mean by no more than a rate; never farther from where it was taken than a total.
+//! Once this has lasted long enough, each coordinate of the rest position follows that mean. It
+//! moves by at most a rate, and never farther from where it was taken than a total.
 //!
-//! A force that is too small to be a contact looks like drift. What grows no faster than the rate
-//! is followed, and so missing in every force from then on: up to the total, and no more. What
-//! grows faster becomes a contact and stays whole, but for what was followed until then. In the
+//! A force too small for a contact looks like drift. A force that grows no faster than the rate is
+//! followed, and is missing in every later force, up to the total. A force that grows faster
+//! becomes a contact and stays whole, except for the part that was followed until then. In the
 //! simulated sensor at 320×240 a straight press moves each coordinate by 2.6 px for its first mN,
-//! and by 0.1 px for each mN more at 0.1 N (`hivtac-studies scene film`). So the usual rate of
-//! 0.005 px a second is 2 µN a second at rest, and the usual total of 0.2 px takes 0.08 mN of a
-//! force of some mN, and at most 2 mN of one of 0.1 N.
+//! and by 0.1 px per mN at 0.1 N (`hivtac-studies scene film`). So the usual rate of 0.005 px a
+//! second is 2 µN a second at rest. The usual total of 0.2 px takes 0.08 mN of a force of a few mN,
+//! and at most 2 mN of one of 0.1 N.
 
 use crate::force::features::Features;
 use crate::force::forward::{Drift, Gravity, Markers};
@@ -25,48 +25,48 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::Rezero;
 use hivtac_terms::units::{MilliPx, Px};
 
-/// Frames are averaged for so long, µs.
+/// Time over which frames are averaged, µs.
 const MEAN_US: u64 = 1_000_000;
-/// A rest position is said to have moved when a coordinate was seen farther from it than this, px:
-/// 3 µm of film.
+/// The rest position counts as moved if a coordinate was seen farther from it than this, px: 3 µm
+/// of film.
 const MOVED_PX: f32 = 0.05;
-/// Frames farther apart than this do not follow each other: nobody knows what touched meanwhile.
+/// Frames farther apart than this do not follow each other: a touch in between would be unseen.
 const LONGEST_GAP_US: u64 = 100_000;
 /// Most frames of a mean: 65 s of frames of a millisecond. Sums are below 2⁴⁸.
 const MOST_FRAMES: u32 = 1 << 16;
 
-/// What a frame tells of the rest position.
+/// What a frame shows about the rest position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Told {
-    /// Nothing: no second of the untouched film ends with it.
+    /// No result: no second of the untouched film ends with this frame.
     Nothing,
-    /// How far the film rests from there.
+    /// A new drift: how far the film rests from the rest position.
     Drift,
-    /// The same, and re-zeroing moved it.
+    /// A new drift, and re-zeroing moved the rest position.
     Moved,
 }
 
-/// A rest position that forces are measured against, and what became of it since it was taken.
+/// A rest position that forces are measured against, and its changes since it was taken.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tare {
     /// As it was taken.
     taken: Rest,
-    /// Gravity then, in parts of g in the film's frame; `None` where nobody said.
+    /// Gravity then, in g, film frame; `None` if unknown.
     down: Option<Gravity>,
-    /// Where it is as gravity is now.
+    /// The taken position converted to today's gravity.
     hung: Rest,
     /// How far re-zeroing moved it from there: x and y of markers 0–3.
     moved: [Px; 8],
-    /// Where that is.
+    /// The result: the rest position in use.
     rest: Rest,
     /// How far the film may rest from that.
     drift: Drift,
-    /// Whether it was seen there.
+    /// True once the untouched film was seen.
     is_seen: bool,
     quiet: Option<Quiet>,
 }
 
-/// A time without a contact.
+/// A time in which the film was not touched.
 #[derive(Clone, Copy, Debug)]
 struct Quiet {
     since_us: u64,
@@ -74,7 +74,7 @@ struct Quiet {
     mean: Mean,
 }
 
-/// Frames that are averaged.
+/// A mean of frames.
 #[derive(Clone, Copy, Debug)]
 struct Mean {
     begun_us: u64,
@@ -92,7 +92,7 @@ impl Mean {
         }
     }
 
-    /// How far it is from a rest position, px.
+    /// The mean's difference from a rest position, px.
     fn beside(&self, rest: &Rest) -> [Q<16, i64>; 8] {
         let frames = i64::from(self.frames);
         let mut beside = self.sums;
@@ -104,7 +104,7 @@ impl Mean {
 }
 
 impl Tare {
-    /// A rest position that was taken under a gravity, if that is known, and from which the film
+    /// A rest position that was taken under a gravity, `None` if unknown, and from which the film
     /// may have drifted since.
     pub fn new(taken: Rest, drift: Drift, down: Option<Gravity>) -> Tare {
         Tare {
@@ -119,7 +119,7 @@ impl Tare {
         }
     }
 
-    /// Waits anew; what was followed stays.
+    /// Restarts the waiting time; re-zeroing so far is kept.
     pub fn begin_anew(&mut self) {
         self.quiet = None;
     }
@@ -129,12 +129,12 @@ impl Tare {
         &self.taken
     }
 
-    /// Gravity when it was taken.
+    /// Gravity when it was taken; `None` if unknown.
     pub fn down(&self) -> Option<Gravity> {
         self.down
     }
 
-    /// Says where it is as gravity is now; what was followed stays.
+    /// Sets the rest position under today's gravity; re-zeroing so far is kept.
     pub fn hang(&mut self, hung: Rest) {
         if self.hung != hung {
             self.hung = hung;
@@ -151,30 +151,30 @@ impl Tare {
         self.rest = self.hung.displaced(&px);
     }
 
-    /// The one that is measured against.
+    /// The rest position in use.
     pub fn rest(&self) -> &Rest {
         &self.rest
     }
 
-    /// How far re-zeroing moved the coordinate that it moved farthest.
+    /// By how much re-zeroing has moved the coordinate that it moved most.
     pub fn farthest(&self) -> Px {
         let far = self.moved.iter().map(|moved| Px(moved.0.abs()));
         far.max().unwrap_or_default()
     }
 
-    /// How far the film may rest from the one that is measured against.
+    /// How far the film may rest from the rest position in use.
     pub fn drift(&self) -> &Drift {
         &self.drift
     }
 
-    /// How far from there the untouched film was seen last: the coordinate that was farthest.
-    /// `None` until it was seen.
+    /// The largest distance of a coordinate from the rest position when the untouched film was last
+    /// seen; `None` if it has not been seen.
     pub fn seen(&self) -> Option<MilliPx> {
         let far = 1e3 * self.drift.farthest_px() + 0.5;
         self.is_seen.then_some(MilliPx(far as u16))
     }
 
-    /// [`Status::REZEROED`] and [`Status::REST_MOVED`].
+    /// Returns [`Status::REZEROED`] and [`Status::REST_MOVED`] if they apply.
     pub fn status(&self) -> Status {
         let mut status = Status::OK;
         if self.farthest() != Px(0) {
@@ -186,7 +186,7 @@ impl Tare {
         status
     }
 
-    /// Takes the features of a frame in which no contact is known, or none of any other frame.
+    /// Takes the features of a frame without a contact; `None` for any other frame.
     pub fn follow(
         &mut self,
         limits: Option<&Rezero>,
@@ -223,7 +223,7 @@ impl Tare {
         if let Some(limits) = limits.filter(is_long) {
             self.move_towards(limits, &there);
         }
-        // What was seen is no more what nobody saw.
+        // A seen drift replaces the uncertainty of an unseen one.
         (self.drift, self.is_seen) = (Drift::NONE, true);
         let seen_px = self.drift.seen_px.as_flattened_mut().iter_mut();
         for (seen, (there, moved)) in seen_px.zip(there.iter().zip(self.moved)) {
@@ -240,13 +240,13 @@ impl Tare {
         let (rate, total) = (steps(limits.rate), steps(limits.total));
         for (moved, there) in self.moved.iter_mut().zip(there) {
             let farther = (*there - Q::from(*moved)).clamp(-rate, rate);
-            // A total that was lowered is kept, too.
+            // Also limits earlier motion, if the total was lowered.
             *moved = Px::saturated((Q::from(*moved) + farther).clamp(-total, total));
         }
     }
 }
 
-/// px.
+/// Converts to px.
 fn steps(distance: MilliPx) -> Q<16, i64> {
     Q::from_bits(Q::<16, i64>::from_int(distance.0.into()).bits() / 1_000)
 }
@@ -291,7 +291,7 @@ mod tests {
         Features::of_markers(&shifted(right))
     }
 
-    /// A rest position that was taken, frame by frame.
+    /// Follows a rest position frame by frame.
     struct Followed {
         tare: Tare,
         time_us: u64,
@@ -306,7 +306,7 @@ mod tests {
             }
         }
 
-        /// For so many ms; of no features when something touches.
+        /// For this many ms; without features if something touches.
         fn for_ms(&mut self, ms: u64, features: Option<&Features>) {
             self.with(&LIMITS, ms, features);
         }
@@ -322,7 +322,7 @@ mod tests {
             }
         }
 
-        /// How far to the right it is, px.
+        /// Shift of the rest position to the right, px.
         fn right(&self) -> f64 {
             (self.tare.rest.features.centroids[0].0 - Px::from_int(100)).to_f64()
         }
@@ -368,14 +368,14 @@ mod tests {
         film.for_ms(10, None);
         film.for_ms(2_900, Some(&drifted));
         assert_eq!(film.right(), 0.0);
-        // A gap, of which nobody knows what happened in it.
+        // A gap, in which a touch would be unseen.
         film.time_us += LONGEST_GAP_US;
         film.for_ms(2_900, Some(&drifted));
         assert_eq!(film.right(), 0.0);
     }
 
-    /// A second tells how far the film rests from there, whether or not that moves; the rest that
-    /// is followed is no drift any more.
+    /// A second of frames shows how far the film rests from the rest position, whether or not that
+    /// moves. A followed drift is no longer a drift.
     #[test]
     fn how_far_the_film_was_seen_from_there_stays_until_it_is_seen_again() {
         let mut film = Followed::new();
@@ -388,7 +388,7 @@ mod tests {
         assert!((film.right() - 0.1).abs() < 1e-4 && far(&film) < 1e-4);
     }
 
-    /// Five millinewtons for ten minutes, of which the chip makes no force: beyond half a pixel.
+    /// Five millinewtons for ten minutes, for which the chip gives no force: beyond half a pixel.
     #[test]
     fn what_is_held_is_no_rest() {
         let mut film = Followed::new();
@@ -397,7 +397,8 @@ mod tests {
     }
 
     proptest! {
-        /// No force, however it grows, moves it faster than the rate or farther than the total.
+        /// No force, however it grows, moves the rest position faster than the rate or farther than
+        /// the total.
         #[test]
         fn rate_and_total_hold(
             shifts in proptest::collection::vec((-500_000i32..500_000, 0u64..4_000), 1..12),

@@ -1,16 +1,16 @@
-//! Tare: the rest position of this unit, measured as the mean of good frames.
+//! Measures the rest position of this unit, the tare, as the mean of good frames.
 //!
-//! Every force is measured against it, so a rest position that is wrong makes all forces wrong and
-//! none of them look so. It is refused unless
+//! Every force is measured against it. A wrong rest position makes all forces wrong, and none of
+//! them looks wrong. So it is refused unless
 //!
 //! 1. the images are those of whole markers ([`Sensor::tare_with`](crate::pipeline::Sensor)): a
-//!    film at rest is flat, so that optics says what four equal discs look like;
+//!    film at rest is flat, so optics give the images of four equal discs;
 //! 2. nothing moves: the frames scatter no more than noise does;
-//! 3. nothing touches the film, as the rest position from before tells, or that of the unit's
-//!    calibration; without either, as far as how exactly units are built lets it be seen;
-//! 4. the markers are as far from their centre as a film at rest shows them ([`Rest::fits`]).
+//! 3. nothing touches the film, compared with the previous rest position or the unit's calibration;
+//!    without either, only as far as the exactness of building units allows to see a touch;
+//! 4. the markers' distance from their centre fits a film at rest ([`Rest::fits`]).
 //!
-//! Who [insists](TareBuilder::insisting) does without 2 and 3.
+//! [Insisting](TareBuilder::insisting) skips 2 and 3.
 
 use crate::force::features::{FEATURES, Features};
 use crate::force::rest::Rest;
@@ -20,18 +20,18 @@ use hivtac_terms::marker::Marker;
 use hivtac_terms::root::rounded_root;
 use hivtac_terms::units::{MicroNewtons, Px};
 
-/// Most frames in a mean: the sums then stay far inside their types.
+/// Most frames of a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
 
-/// Coordinates and distances whose squares are summed up, px.
+/// Coordinates and distances whose squares are summed, px.
 type Coarse = Q<8, i64>;
 
 /// Largest standard deviation of a marker's coordinate over the frames: 0.25 px.
 const LARGEST_SCATTER: Coarse = Q::from_bits(64);
-/// What moved farther from where it was first is not steady, however far: 32 px.
+/// Limit of a coordinate's difference from the first frame: 32 px. Larger ones are unsteady anyway.
 const FAR: Coarse = Q::from_int(32);
 
-/// Why there is no rest position.
+/// Why a rest position is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Refusal {
     /// As many frames as were wanted show markers that are cut, grown, stained or unlike each
@@ -41,12 +41,11 @@ pub enum Refusal {
     Unsteady,
     /// The markers are nearer to or farther from their centre than a film at rest shows them.
     NotAtRest,
-    /// Something touches the film: the force that it looks like.
+    /// Something touches the film; the force that it looks like.
     Touched(MicroNewtons),
 }
 
-/// Sums up good frames until there are enough. All sums are exact; each mean is rounded once, half
-/// up.
+/// Sums good frames until there are enough. All sums are exact; each mean is rounded once, half up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TareBuilder {
     wanted: u16,
@@ -54,18 +53,19 @@ pub struct TareBuilder {
     taken: u16,
     implausible: u16,
     touched: u16,
-    /// The force of the touched frame that came last.
+    /// The force of the last touched frame.
     touch: MicroNewtons,
     features: [Q<16, i64>; FEATURES],
     areas: [u64; 4],
-    /// Coordinates of the first frame; sums of what the others differ by, and of its squares, px².
+    /// Coordinates of the first frame; sums of the differences of the others from it, and of their
+    /// squares, px².
     first: [Coarse; 8],
     differences: [Coarse; 8],
     squares: [Q<16, i64>; 8],
 }
 
 impl TareBuilder {
-    /// For a mean of `frames` good frames, 1 to [`MAX_FRAMES`]; `None` for any other number.
+    /// For a mean of `frames` good frames. Returns `None` unless that is 1 to [`MAX_FRAMES`].
     pub fn new(frames: u16) -> Option<TareBuilder> {
         let wanted = frames;
         let empty = TareBuilder {
@@ -84,7 +84,7 @@ impl TareBuilder {
         (1..=MAX_FRAMES).contains(&frames).then_some(empty)
     }
 
-    /// Takes frames as they come, though something moves or touches the film.
+    /// Accepts all frames, even if something moves or touches the film.
     #[must_use]
     pub fn insisting(self) -> TareBuilder {
         TareBuilder {
@@ -93,8 +93,9 @@ impl TareBuilder {
         }
     }
 
-    /// Takes the markers and features of a good frame. Gives the rest position of frames of this
-    /// geometry once there were enough, or why it is refused, and from then on the same again.
+    /// Adds the markers and features of a good frame. Once there are enough, returns the rest
+    /// position for this geometry, or why it is refused, and the same for every later frame;
+    /// otherwise `None`.
     pub fn add(
         &mut self,
         markers: &[Marker; 4],
@@ -107,33 +108,32 @@ impl TareBuilder {
         (self.taken == self.wanted).then(|| self.judge(geometry))
     }
 
-    /// Takes notice of a frame whose images are not those of whole markers. Says so once there were
-    /// as many as good ones are wanted.
+    /// Counts a frame whose images are not those of whole markers. Returns the refusal once there
+    /// were as many as good frames are wanted; otherwise `None`.
     pub fn add_implausible(&mut self) -> Option<Refusal> {
         self.implausible = self.implausible.saturating_add(1);
         (self.implausible >= self.wanted).then_some(Refusal::MarkersImplausible)
     }
 
-    /// Takes notice of a frame in which something touches the film with this force. Says so once
-    /// there were as many as good ones are wanted.
+    /// Counts a frame in which something touches the film with this force. Returns the refusal once
+    /// there were as many as good frames are wanted; otherwise `None`.
     pub fn add_touched(&mut self, touch: MicroNewtons) -> Option<Refusal> {
         self.touched = self.touched.saturating_add(1);
         self.touch = touch;
         (self.touched >= self.wanted).then_some(Refusal::Touched(touch))
     }
 
-    /// Whether frames are taken in which something touches the film.
+    /// Returns whether touched frames are accepted.
     pub fn insists(&self) -> bool {
         self.insists
     }
 
-    /// The force of the last frame in which something touched the film, if any.
+    /// The force of the last touched frame; `None` if no frame was touched.
     pub fn saw_touch(&self) -> Option<MicroNewtons> {
         (self.touched > 0).then_some(self.touch)
     }
 
-    /// The largest standard deviation of a marker's coordinate over the frames that were taken, to
-    /// 1/256 px.
+    /// The largest standard deviation of a marker's coordinate over the frames so far, to 1/256 px.
     pub fn spread(&self) -> Px {
         let frames = i64::from(self.taken.max(1));
         let largest = self.variances().max().unwrap_or_default();
@@ -142,12 +142,12 @@ impl TareBuilder {
         Px((scaled / frames) as i32)
     }
 
-    /// How many good frames are still wanted.
+    /// Number of good frames that are still wanted.
     pub fn remaining(&self) -> u16 {
         self.wanted - self.taken
     }
 
-    /// Whether a frame's images were not those of whole markers.
+    /// Returns whether a frame's images were not those of whole markers.
     pub fn saw_implausible(&self) -> bool {
         self.implausible > 0
     }
@@ -199,7 +199,7 @@ impl TareBuilder {
 
     fn mean(&self) -> Rest {
         let frames = i64::from(self.taken);
-        // Of no frames there is no mean.
+        // Without frames the mean is 0.
         let mean = |sum: i64| {
             (2 * sum + frames)
                 .checked_div_euclid(2 * frames)
@@ -237,7 +237,7 @@ mod tests {
         (markers, Features::of_markers(&markers))
     }
 
-    /// What a tare makes of frames that are so far to the right.
+    /// The result of a tare with frames shifted to the right by these distances.
     fn tare_of(frames: impl Iterator<Item = Px> + Clone) -> Result<Rest, Refusal> {
         let mut builder = TareBuilder::new(frames.clone().count() as u16).unwrap();
         let mut outcome = None;
@@ -298,7 +298,7 @@ mod tests {
         assert!(TareBuilder::new(MAX_FRAMES).is_some());
     }
 
-    /// A square wave's standard deviation is half of what it jumps.
+    /// A square wave's standard deviation is half of its jump.
     #[test]
     fn markers_that_move_are_refused_whether_they_jump_or_drift() {
         let jumping = |px: f64| (0..64).map(move |i| Px((px * 65_536.0) as i32 * (i % 2)));
@@ -309,7 +309,7 @@ mod tests {
         assert_eq!(tare_of(drifting), Err(Refusal::Unsteady), "1 px in all");
     }
 
-    /// Of a square wave of 0.2 px, and of one that jumps by more than is steady.
+    /// With a square wave of 0.2 px, and with one that is too large to be steady.
     #[test]
     fn the_spread_is_the_standard_deviation_and_who_insists_has_it_taken() {
         let spread = |jump: f64, insists: bool| {

@@ -1,4 +1,4 @@
-//! The threshold against OpenCV's own output for every pixel value (`opencv/reference.py`).
+//! Compares the threshold with OpenCV's own output for every pixel value (`opencv/reference.py`).
 
 use hivtac_sensor::markers::tables::{ByteTable, Table};
 use hivtac_terms::threshold::{ByteOrder, HsvBox};
@@ -20,7 +20,7 @@ const fn hsv_box(hue: [u8; 2], saturation: [u8; 2], value: [u8; 2]) -> HsvBox {
     }
 }
 
-/// Those of `BOXES` in the generator.
+/// The same boxes as `BOXES` in the generator.
 const REFERENCES: [Reference; 6] = [
     Reference {
         hsv_box: HsvBox::RED,

@@ -1,17 +1,16 @@
-//! Looking again: a frame that is refused may be disturbed by no more than specks or little light,
-//! and show its markers all the same.
+//! Looks a second time at a refused frame: specks or little light may be its only fault.
 //!
-//! A frame of which all rows can be had once more is then looked at by a mask that follows the
-//! light and has its specks taken out
-//! ([`ScanSettings::cleaned`](crate::markers::scanner::ScanSettings)). The same rules judge what it
-//! shows, and the contact must explain all eight coordinates of markers that are known less well:
-//! without a film run forwards there is no second look. What is not plain then stays refused, for
-//! the reason that it had at first.
+//! If all rows of the frame are available once more, they are scanned with a mask that follows the
+//! light and has its specks removed
+//! ([`ScanSettings::cleaned`](crate::markers::scanner::ScanSettings)). The same rules judge the
+//! result, and the contact must explain all eight coordinates of the markers, which are less
+//! certain. So there is a second look only with a film run forwards. If the second look fails, the
+//! frame stays refused for its first reason.
 //!
-//! A false marker has another chance to pass by that, and larger uncertainties explain more. So
-//! what the second look shows counts only where it shows, too, that specks or little light disturb
-//! the frame, or where frames are [noisy](NoiseLevel); a thing on the film, a reflection or several
-//! touches alone do not.
+//! A second look gives a false marker a second chance to pass, and larger uncertainties explain
+//! more. So its result counts only if it also shows that specks or little light disturb the frame,
+//! or if frames are [noisy](NoiseLevel). An object on the film, a reflection or several touches
+//! alone are not enough.
 //!
 //! [NoiseLevel]: crate::force::NoiseLevel
 
@@ -22,7 +21,7 @@ use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
 
-/// Reasons for which a frame is looked at again.
+/// Reasons for a second look.
 const AGAIN: Status = Status(
     Status::MARKERS_MISSING.0
         | Status::MARKERS_AMBIGUOUS.0
@@ -32,49 +31,50 @@ const AGAIN: Status = Status(
         | Status::IMAGE_DARK.0
         | Status::UNEXPLAINED.0,
 );
-/// Reasons for which no look helps.
+/// Reasons for which no second look helps.
 const NEVER: Status = Status(Status::NO_FORCE.0 & !AGAIN.0);
-/// A frame has specks when so many pixels are taken out of its mask, one in this many, at 320×240
-/// 32 (seen: 62 or more with 0.1 % of salt, 11 at most without, off the edges of markers).
+/// A frame has specks if at least one pixel in this many is removed from its mask: 32 at 320×240.
+/// Seen: 62 or more with 0.1 % of salt; without salt at most 11, from the edges of markers.
 const SPECKS_PART: u32 = 2_400;
-/// More specks than one in this many draw markers aside (seen: 0.33 px at 5 % of salt, 0.24 px at
-/// 3 %).
+/// More specks than one pixel in this many shift markers. Seen: 0.33 px at 5 % of salt, 0.24 px at
+/// 3 %.
 const MOST_SPECKS_PART: u32 = 40;
-/// So do holes in markers, more than one in this many of the mask's pixels: the light is too little
-/// for colours (seen: 0.013 of them at 0.2 of the light, 0.049 and more at 0.15).
+/// With more holes in markers than one in this many of the mask's pixels, the light is too weak for
+/// colours. Seen: 0.013 of the pixels at 0.2 of the light, 0.049 and more at 0.15.
 const HOLES_PART: u32 = 64;
-/// A frame is dim when fewer pixels pass the threshold than so many of four of the cleaned mask's
-/// (seen: half at 0.28 of the light, more than all in good light).
+/// A frame is dim if fewer pixels pass the threshold than this many fourths of the cleaned mask's
+/// pixels. Seen: half at 0.28 of the light, more than all in good light.
 const DIM_FOURTHS: u32 = 3;
-/// Frames are noisy when their noise is so many times as large as modelled.
+/// Frames are noisy if their noise is at least this many times the modelled noise.
 const NOISY: f32 = 2.0;
-/// Standard uncertainty of a coordinate of a marker of the cleaned mask beside that of noise:
-/// 0.08 px (seen: 0.05 px at a fifth of the light).
+/// Standard uncertainty of a coordinate of a marker in the cleaned mask, in addition to noise: 0.08
+/// px (largest seen: 0.05 px at a fifth of the light).
 pub(super) const BLUR: Px = Px(5_243);
 
-/// Which look at a frame is under way, or was the last.
+/// Which look at a frame is active, or was the last.
 #[derive(Clone, Debug)]
 pub(super) enum Look {
-    /// The usual one, after which none is wanted.
+    /// The first look; no second one is wanted.
     First,
-    /// The usual one; it gave this, and another may give more.
+    /// The first look gave this measurement, and a second one may give more.
     Wanted(Measurement),
-    /// By the cleaned mask.
+    /// The second look, with the cleaned mask.
     Again,
 }
 
-/// Another look under way, with what the first one gave: [`Sensor::finish_again`] ends it.
+/// A second look that is active, with the result of the first one: [`Sensor::finish_again`] ends
+/// it.
 #[derive(Debug)]
 #[must_use]
 pub struct Again {
     measurement: Measurement,
-    /// Pixels that passed the threshold.
+    /// Number of pixels that passed the threshold in the first look.
     set_pixels: u32,
 }
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// Begins another look at the frame that was finished last, if it may give a force: push all
-    /// rows of the frame again, and [finish](Self::finish_again) it.
+    /// Begins a second look at the last finished frame. Push all rows of the frame again, then call
+    /// [`finish_again`](Self::finish_again). Returns `None` if a second look cannot give a force.
     #[inline(never)]
     pub fn look_again(&mut self) -> Option<Again> {
         let Look::Wanted(measurement) = self.look else {
@@ -92,19 +92,19 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         self.scanner.begin(settings).ok().map(|()| again)
     }
 
-    /// Whether what the first look gave calls for another.
+    /// Returns whether the first look calls for a second one.
     pub(super) fn wants_again(&self, measurement: &Measurement) -> bool {
         let status = measurement.status;
         let resting = self.prepared.as_ref().map(|prepared| &prepared.resting);
         status.intersects(AGAIN) && !status.intersects(NEVER) && matches!(resting, Some(Some(_)))
     }
 
-    /// Ends another look: gives what it gave when that is a force, or else what the first one did.
+    /// Ends a second look. Returns its measurement if that has a force, otherwise the first one.
     #[inline(never)]
     pub fn finish_again(&mut self, again: Again) -> Measurement {
         let found = self.end_scan().and_then(|()| self.find_markers());
         let mut second = self.measurement(found);
-        // Where markers are tells the next frame how they move, even without a force.
+        // The markers' positions show their motion to the next frame, even without a force.
         if second.markers.is_some() {
             self.motion.ended(second.markers.as_ref());
         }
@@ -115,8 +115,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         second
     }
 
-    /// Whether specks that can be taken out, little light or noise are why the first look gave
-    /// nothing.
+    /// Whether removable specks, little light or noise are why the first look gave no force.
     fn is_disturbed(&mut self, first: &Again) -> bool {
         let Geometry { width, height, .. } = self.settings.geometry;
         let pixels = u32::from(width) * u32::from(height);

@@ -1,26 +1,26 @@
-//! Looking ahead: the force is worked out while the camera still sends the rows below the markers.
+//! Computes the force ahead, while the camera still sends the rows below the markers.
 //!
-//! When as many blobs are whole as there are markers, and none is open, what they make is worked
-//! out at once. If no other blob has come until the frame ends, that is its measurement, and
-//! nothing but the check is left to do after the last row. Otherwise it is worked out anew, as it
-//! depends on the blobs alone.
+//! Once at least four blobs are complete and no blob is open, their measurement is computed. If no
+//! other blob follows until the frame ends, it is the frame's measurement, and only that check is
+//! left after the last row. Otherwise it is computed anew. The measurement depends on the blobs
+//! alone.
 
 use super::{Measurement, Sensor};
 use crate::markers::tables::Table;
 
 /// The fewest blobs that can be markers.
 const FEWEST_BLOBS: usize = 4;
-/// Of more blobs nothing is worked out ahead: it bounds how often it is done in vain.
+/// With more blobs, nothing is computed ahead; that bounds how often it is done in vain.
 const MOST_BLOBS: usize = 8;
 
-/// What was worked out before the frame ended.
+/// The result of computing ahead.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Ahead {
-    /// Nothing shall be.
+    /// Computing ahead is disabled.
     Off,
-    /// Nothing yet.
+    /// No result yet.
     Nothing,
-    /// What the frame's first `blobs` blobs make.
+    /// The measurement of the frame's first `blobs` blobs.
     Worked {
         blobs: usize,
         measurement: Measurement,
@@ -28,7 +28,7 @@ pub(super) enum Ahead {
 }
 
 impl Ahead {
-    /// Of a frame with so many blobs.
+    /// Returns the measurement if the frame has exactly `count` blobs, otherwise `None`.
     pub fn measurement(&self, count: usize) -> Option<Measurement> {
         match self {
             Ahead::Worked { blobs, measurement } if *blobs == count => Some(*measurement),
@@ -36,7 +36,7 @@ impl Ahead {
         }
     }
 
-    /// Whether so many whole blobs are worth a look.
+    /// Whether `count` complete blobs are worth computing.
     #[inline(always)]
     fn wants(&self, count: usize) -> bool {
         let in_vain = match self {
@@ -49,7 +49,7 @@ impl Ahead {
 }
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// After each row or band.
+    /// Call after each row or band.
     #[inline(always)]
     pub(super) fn look_ahead(&mut self) {
         if self.scanner.is_settled() && self.ahead.wants(self.scanner.blobs().len()) {
@@ -76,7 +76,7 @@ mod tests {
 
     const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 160, 120);
 
-    /// All rows at once: what was worked out ahead can only be of the whole frame.
+    /// Pushes all rows at once: only the whole frame can have been computed ahead.
     fn fed_at_once(sensor: &mut Sensor<'_>, picture: &Picture) -> Measurement {
         sensor.begin_frame();
         sensor.push_rows(&picture.pixels);
@@ -120,7 +120,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
-        /// Discs anywhere, among them such as end in the last rows or come after the markers.
+        /// Discs anywhere, including ones that end in the last rows or come after the markers.
         #[test]
         fn every_frame_is_measured_as_if_it_had_come_at_once(
             discs in prop::collection::vec((0.0..160.0f64, 0.0..120.0f64, 1.0..14.0f64), 0..5),

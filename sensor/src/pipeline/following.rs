@@ -1,4 +1,5 @@
-//! From one frame to the next: contact, slip and filter, and where the untouched film rests.
+//! Follows the sensor from one frame to the next: contact, slip and filter, and where the untouched
+//! film rests.
 
 use super::{Measurement, Sensor};
 use crate::force::rest::Rest;
@@ -9,15 +10,15 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{TemporalError, TemporalSettings};
 use hivtac_terms::units::{MilliPx, Px};
 
-/// Frames that do not show where the film rests. Nothing needs to explain them; but the markers of
-/// another mask are no rest position's.
+/// Frames with these bits do not show where the film rests. The markers need not be explained; but
+/// those of the cleaned mask are not a rest position's.
 const NOT_AT_REST: Status = Status(
     Status::NO_FORCE.0 & !Status::UNEXPLAINED.0 | Status::FRAME_DISTURBED.0 | Status::CONTACT.0,
 );
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// Follows the frame that was finished last, of which `measurement` is, from those before it.
-    /// What a second of the untouched film tells of where it rests holds from the next frame on.
+    /// Follows the last finished frame, whose result is `measurement`, from those before it. If a
+    /// second of the untouched film shows where it rests, that applies from the next frame on.
     pub fn follow(&mut self, at: Moment, measurement: &Measurement) -> Followed {
         let mut followed = self.temporal.follow(at, measurement);
         let Some(tare) = &mut self.tare else {
@@ -37,15 +38,15 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         followed
     }
 
-    /// How forces are followed.
+    /// The settings by which forces are followed.
     pub fn temporal(&self) -> &TemporalSettings {
         self.temporal.settings()
     }
 
-    /// Sets that, between two frames; contact, slip and filter begin anew.
+    /// Sets these, between two frames; contact, slip and filter restart.
     ///
     /// # Errors
-    /// A setting outside its range; nothing is changed then.
+    /// A setting out of its range; then nothing is changed.
     pub fn set_temporal(&mut self, settings: TemporalSettings) -> Result<(), TemporalError> {
         self.temporal.set(settings)?;
         if let Some(tare) = &mut self.tare {
@@ -54,18 +55,18 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         Ok(())
     }
 
-    /// The rest position as it was taken, without what re-zeroing made of it.
+    /// The rest position as it was taken, without re-zeroing.
     pub fn taken(&self) -> Option<&Rest> {
         self.tare.as_ref().map(Tare::taken)
     }
 
-    /// How far from the rest position the untouched film was seen last: the coordinate of a marker
-    /// that was farthest. `None` until it was seen.
+    /// The largest distance of a marker's coordinate from the rest position when the untouched film
+    /// was last seen; `None` if it has not been seen.
     pub fn rest_seen(&self) -> Option<MilliPx> {
         self.tare.as_ref().and_then(Tare::seen)
     }
 
-    /// How far re-zeroing moved the coordinate of the rest position that it moved farthest.
+    /// By how much re-zeroing has moved the coordinate that it moved most.
     pub fn rezeroed(&self) -> Px {
         self.tare.as_ref().map_or(Px(0), Tare::farthest)
     }
@@ -98,7 +99,7 @@ mod tests {
         Moment { frame, time_us }
     }
 
-    /// Frames that nothing explains, of an untouched film that rests 0.1 px from there.
+    /// Frames that no force explains, of an untouched film that rests 0.1 px off the rest position.
     fn shows_drift(sensor: &mut Sensor<'_>) {
         let mut unexplained = frame(None, TENTH);
         unexplained.status |= Status::UNEXPLAINED;
@@ -131,8 +132,8 @@ mod tests {
         }
     }
 
-    /// Nothing explains the untouched frames, but they tell it, and neither a press nor another
-    /// model makes that forgotten; a tare does.
+    /// No force explains the untouched frames, but they show the drift. Neither a press nor a new
+    /// model discards it; a tare does.
     #[test]
     fn a_rest_that_moved_is_told_until_the_next_tare() {
         let mut sensor = tared();
@@ -155,7 +156,7 @@ mod tests {
         assert!(!followed.status.contains(Status::REST_MOVED));
     }
 
-    /// What nobody saw of a kept rest position is known once the film was seen.
+    /// The uncertainty of a kept rest position ends once the film was seen.
     #[test]
     fn what_was_seen_takes_the_place_of_what_nobody_saw() {
         let mut sensor = tared();
@@ -166,8 +167,8 @@ mod tests {
         assert!((drift.farthest_px() - 0.1).abs() < 1e-3, "{drift:?}");
     }
 
-    /// Markers that are seen in another way rest elsewhere, and a device that begins afresh has no
-    /// rest position.
+    /// Markers that are found differently rest elsewhere, and a newly configured device has no rest
+    /// position.
     #[test]
     fn a_rest_position_holds_for_frames_that_are_seen_as_before() {
         let mut sensor = tared();

@@ -1,4 +1,4 @@
-//! Which way the sensor is held: the film hangs by its own weight.
+//! Adapts to the way the sensor is held: the film hangs by its own weight.
 
 use super::Sensor;
 use crate::force::forward::{Gravity, Turned};
@@ -8,8 +8,8 @@ use crate::rezero::Tare;
 use hivtac_terms::down::{Direction, Down};
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// Says what is known of gravity from the next frame on; do it between two frames. Whatever was
-    /// known of the frames before stays: a finger that turns goes on gripping.
+    /// Sets what is known of gravity from the next frame on; call it between two frames. The
+    /// history of earlier frames is kept: a finger that turns goes on gripping.
     pub fn set_down(&mut self, down: Down) {
         if self.down != down {
             self.down = down;
@@ -24,13 +24,13 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         self.down
     }
 
-    /// Gravity when the rest position was taken, if that is known.
+    /// Gravity when the rest position was taken; `None` if unknown.
     pub fn down_when_taken(&self) -> Option<Direction> {
         let down = self.tare.as_ref().and_then(Tare::down)?;
         Some(Direction::of_unit(down))
     }
 
-    /// How the sensor was turned since its rest position was taken, where that matters.
+    /// How the sensor was turned since its rest position was taken; `None` if it is never turned.
     pub(super) fn turned(&self) -> Option<Turned> {
         let now = match self.down {
             Down::Fixed => return None,
@@ -50,8 +50,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         Some(forward.weight.as_ref()?.down)
     }
 
-    /// Whether the film may hang otherwise than when the rest position was taken, and nothing says
-    /// how.
+    /// Whether the film may hang differently than when the rest position was taken, by an unknown
+    /// amount.
     pub(super) fn is_weight_unknown(&self) -> bool {
         match self.turned() {
             None => false,
@@ -60,7 +60,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
     }
 
-    /// Brings the rest position to where the film hangs now.
+    /// Converts the rest position to today's gravity.
     pub(super) fn hang(&mut self) {
         let forward = self.fitting_model().and_then(|model| model.forward);
         let turned = self.turned();
@@ -75,7 +75,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         });
     }
 
-    /// The model's own rest position as it is where the film hangs now.
+    /// The model's own rest position under today's gravity.
     pub(super) fn rest_of_model(&self) -> Option<Rest> {
         let model = self.fitting_model()?;
         let forward = model.forward.as_ref();

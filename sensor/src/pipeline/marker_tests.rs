@@ -8,7 +8,7 @@ use std::boxed::Box;
 
 const QVGA: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
 
-/// The markers, if nothing but the missing model forbids a force.
+/// The markers, if only the missing model forbids a force.
 fn trusted(seen: &Measurement) -> Option<[Marker; 4]> {
     let forbidden = seen.status.0 & Status::NO_FORCE.0;
     (forbidden == Status::MODEL_MISSING.0).then(|| seen.markers.unwrap())
@@ -91,7 +91,7 @@ fn three_markers_are_not_four() {
     }
 }
 
-/// Dilation closes every second pixel in a marker's middle: mask and centroids stay what they are.
+/// Dilation closes every second pixel in a marker's middle: mask and centroids are unchanged.
 #[test]
 fn a_marker_with_holes_is_refused_although_its_mask_is_whole() {
     for (width, height) in [(160, 120), (320, 240), (800, 600)] {
@@ -234,7 +234,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// A disc beside the four, larger or smaller or of their size, never moves them.
+    /// A disc next to the four, larger, smaller or of their size, never moves them.
     #[test]
     fn a_fifth_disc_is_told_apart_or_refused(
         x in 0.0..320.0f64,
@@ -249,8 +249,8 @@ proptest! {
         }
     }
 
-    /// A disc in place of a hidden marker is refused, unless it covers most of where that was and
-    /// has its size.
+    /// A disc in place of a hidden marker is refused, unless it covers most of the marker's place
+    /// and has its size.
     #[test]
     fn a_stand_in_is_refused(
         hidden in 0usize..4,
@@ -295,7 +295,7 @@ proptest! {
         }
     }
 
-    /// All edges eaten or swollen alike: sizes then do not fit the distance.
+    /// All edges equally eaten or swollen: sizes then do not fit the distance.
     #[test]
     fn eaten_and_swollen_edges_are_refused(swollen in -8.0..8.0f64, scale in 1.0..1.4f64) {
         let pattern = Pattern { swollen, scale, ..Pattern::at_rest(QVGA) };
@@ -304,7 +304,7 @@ proptest! {
         prop_assert!(trusted(&seen).is_some() || swollen.abs() > 0.5, "{swollen}");
     }
 
-    /// One side of all markers in shadow: what is left is shifted, all the same way.
+    /// One side of all markers in shadow: the remainders are all shifted in the same direction.
     #[test]
     fn a_shadow_on_one_side_of_all_is_refused(direction in 0.0..360.0f64, depth in 2.5..14.0f64) {
         let pattern = Pattern::at_rest(QVGA);
@@ -336,7 +336,7 @@ proptest! {
     }
 }
 
-/// A copy of one sensor, for taring one takes longer than a test case.
+/// A copy of one sensor, because taring one takes longer than a test case.
 fn shared() -> Box<Sensor<'static>> {
     std::thread_local!(static TARED: Box<Sensor<'static>> = tared(QVGA));
     TARED.with(Clone::clone)

@@ -1,4 +1,4 @@
-//! Rows in, measurement out.
+//! Runs the whole pipeline: rows in, measurements out.
 
 mod again;
 mod ahead;
@@ -37,30 +37,31 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
 use hivtac_terms::units::Px;
 
-/// What one frame gave.
+/// The result of one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Measurement {
-    /// Why there is no force, or how far to trust it.
+    /// Why there is no force, or how far it can be trusted.
     pub status: Status,
-    /// The four markers where the frame shows them, when they were found.
+    /// The four markers where the frame shows them; `None` if they were not found.
     pub markers: Option<[Marker; 4]>,
-    /// Their features, at one time ([`Sensor::set_motion`]), exactly when there are markers.
+    /// Their features at one common time ([`Sensor::set_motion`]); present exactly if there are
+    /// markers.
     pub features: Option<Features>,
-    /// The force; `None` exactly when `status` has a bit of [`Status::NO_FORCE`].
+    /// The force; `None` exactly if `status` has a bit of [`Status::NO_FORCE`].
     pub force: Option<Force>,
 }
 
-/// A frame has more set pixels than one in this many: no four dots look like that.
+/// A frame is saturated if more than one pixel in this many is set: four dots set far fewer.
 const SATURATED_PART: u32 = 2;
 
-/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; looks pixels of RGB565
-/// up in a `T`.
+/// From rows to force, for one camera. Keeps up to `BLOBS` blobs of a frame; `T` is the table for
+/// RGB565 pixels.
 ///
-/// It holds all its storage, about 76 KiB and the table (64 KiB), so build it where it shall stay:
-/// in a `static` as [`Sensor::new`], which is `const`, and then [`configure`](Self::configure) it
-/// in place; nothing large crosses the stack. For each frame: [`begin_frame`](Self::begin_frame),
-/// [`push_rows`](Self::push_rows) with all rows from the top, one or more at a time as they arrive,
-/// and [`finish_frame`](Self::finish_frame).
+/// A sensor holds all its storage, about 76 KiB and the table (64 KiB). Build it where it shall
+/// stay: in a `static` as [`Sensor::new`], which is `const`, and [`configure`](Self::configure) it
+/// in place. Then nothing large crosses the stack. For each frame call
+/// [`begin_frame`](Self::begin_frame), [`push_rows`](Self::push_rows) with all rows from the top,
+/// one or more at a time as they arrive, and [`finish_frame`](Self::finish_frame).
 #[derive(Clone, Debug)]
 pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     settings: Settings,
@@ -79,7 +80,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     temporal: Temporal,
 }
 
-/// What follows from settings, model and tare before there is a frame.
+/// Everything that follows from settings, model and tare before there is a frame.
 #[derive(Clone, Debug)]
 struct Prepared {
     finder: Finder,
@@ -87,14 +88,14 @@ struct Prepared {
     trust: Option<Trust>,
     /// `None` without a film run forwards.
     resting: Option<Resting>,
-    /// The bits that every frame has, whatever it shows.
+    /// The status bits that every frame has, whatever it shows.
     standing: Status,
-    /// What is measured against.
+    /// The rest position that frames are measured against.
     rest: Option<Rest>,
 }
 
 impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
-    /// A sensor that sees nothing until it is configured: its threshold accepts no colour.
+    /// A sensor that is not configured; its threshold accepts no colour.
     pub const fn new() -> Self {
         Sensor {
             settings: Settings {
@@ -120,11 +121,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// Sets everything and forgets the tare. Without a model there are markers and features but no
-    /// force.
+    /// Sets settings and model, and discards the tare. Without a model there are markers and
+    /// features but no force.
     ///
     /// # Errors
-    /// A setting out of its range; nothing is then changed.
+    /// A setting out of its range; then nothing is changed.
     pub fn configure(
         &mut self,
         settings: Settings,
@@ -144,11 +145,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// The same, and keeps the rest position with all that became of it, when markers are seen as
-    /// before.
+    /// As [`configure`](Self::configure), but keeps the rest position with its drift and
+    /// re-zeroing, if the new settings find markers in the same way.
     ///
     /// # Errors
-    /// A setting out of its range; nothing is then changed.
+    /// A setting out of its range; then nothing is changed.
     pub fn reconfigure(
         &mut self,
         settings: Settings,
@@ -164,7 +165,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// What it is set to.
+    /// The settings in use.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -179,11 +180,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.settings.threshold
     }
 
-    /// Sets the threshold, effective from the next row; do it between frames. A model made with
-    /// another one gives no force then ([`Status::MODEL_MISMATCH`]).
+    /// Sets the threshold, effective from the next row; call it between frames. A model made with a
+    /// different threshold then gives no force ([`Status::MODEL_MISMATCH`]).
     ///
     /// # Errors
-    /// A threshold that means nothing; it is then unchanged.
+    /// An invalid threshold; then the old one stays.
     pub fn set_threshold(&mut self, threshold: Threshold) -> Result<(), ThresholdError> {
         self.pixels.set(&threshold, self.settings.byte_order)?;
         self.settings.threshold = threshold;
@@ -191,13 +192,15 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// Sets the rest position of this unit, from which the film may have drifted since it was
-    /// taken, or goes back to the model's. One that is not [sound](Rest::is_sound) is as none.
+    /// Sets the rest position of this unit, and how far the film may have drifted from it since it
+    /// was taken. With `None`, or if it is not [sound](Rest::is_sound), the model's rest position
+    /// is used.
     pub fn set_tare(&mut self, rest: Option<Rest>, drift: Drift) {
         self.set_tare_under(rest, drift, self.down.told());
     }
 
-    /// The same of one that was taken under this gravity, or where nobody said which.
+    /// As [`set_tare`](Self::set_tare), for a rest position that was taken under this gravity;
+    /// `None` if the gravity was unknown.
     pub fn set_tare_under(&mut self, rest: Option<Rest>, drift: Drift, down: Option<Direction>) {
         let rest = rest.filter(Rest::is_sound);
         let down = down.map(Direction::to_unit);
@@ -205,7 +208,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.begin_anew();
     }
 
-    /// The next frames are seen in another way: what was before says nothing of them.
+    /// Call when frames will be seen in a different way: earlier frames then say nothing about
+    /// them.
     fn begin_anew(&mut self) {
         self.temporal.begin_anew();
         if let Some(tare) = &mut self.tare {
@@ -222,37 +226,36 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// The model in use, when it is for these frames.
+    /// The model in use, if it was made for these settings.
     fn fitting_model(&self) -> Option<&Model<'m>> {
         let model = self.model.as_ref();
         model.filter(|model| model.conditions.are_of(&self.settings))
     }
 
-    /// The rest position of this unit that is measured against, when one was taken.
+    /// The rest position of this unit that is measured against; `None` if none was taken.
     pub fn tare(&self) -> Option<&Rest> {
         self.tare.as_ref().map(Tare::rest)
     }
 
-    /// Says when which row of a frame is exposed, and forgets the frame before. At first all are at
-    /// once.
+    /// Sets when each row of a frame is exposed, and discards the previous frame. Initially all
+    /// rows are exposed at once.
     pub fn set_motion(&mut self, motion: Motion) {
         self.motion = motion;
     }
 
-    /// The next frame does not follow the one before at once: how the markers move is not known,
-    /// nor what of a change is noise.
+    /// Call before a frame that does not immediately follow the previous one. The motion of the
+    /// markers, and the noise between the frames, are then unknown.
     pub fn forget_frame(&mut self) {
         self.motion.forget();
         self.noise.forget_frame();
     }
 
-    /// Starts a frame and forgets the one before, but for where its markers were and what they left
-    /// unexplained.
+    /// Starts a frame. Of the previous frame only the markers' positions and the residual are kept.
     pub fn begin_frame(&mut self) {
         self.motion.begin_frame();
         self.noise.begin_frame();
         self.look = Look::First;
-        // An error cannot happen after `configure`, and makes every frame incomplete before it.
+        // After `configure` there is no error; before it, every frame becomes incomplete.
         let _ = self.scanner.begin(self.settings.scan());
         self.ahead = Ahead::Nothing;
     }
@@ -263,30 +266,31 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.look_ahead();
     }
 
-    /// Takes the next rows of pixels, one after the other in memory: fewer of them are copied than
-    /// one by one.
+    /// Takes the next rows of pixels, one after the other in memory. Fewer of them are copied than
+    /// with single rows.
     pub fn push_rows(&mut self, rows: &[u16]) {
         self.scanner.push_rows(&self.pixels, rows);
         self.look_ahead();
     }
 
-    /// The same when the rows that came last are still in memory, one after the other, as `above`:
-    /// all of the frame, or at least as many as there are [`Settings::dilations`]. Nothing is
-    /// copied then ([`Scanner::push_rows_below`]).
+    /// As [`push_rows`](Self::push_rows), without copying ([`Scanner::push_rows_below`]). `above`
+    /// holds the last rows, which must still be in memory, one after the other: all of the frame,
+    /// or at least [`Settings::dilations`] rows.
     pub fn push_rows_below(&mut self, above: &[u16], rows: &[u16]) {
         self.scanner.push_rows_below(&self.pixels, above, rows);
         self.look_ahead();
     }
 
-    /// Measures a frame that lies in memory: all rows from the top, one after the other. A frame
-    /// that does not follow the one before wants [`forget_frame`](Self::forget_frame) first.
+    /// Measures a frame in memory: all rows from the top, one after the other. If the frame does
+    /// not follow the previous one, call [`forget_frame`](Self::forget_frame) first.
     pub fn measure_frame(&mut self, frame: &[u16]) -> Measurement {
         self.begin_frame();
         self.push_rows(frame);
         self.finish_frame()
     }
 
-    /// The same, and [looks again](Self::look_again) when that may help.
+    /// As [`measure_frame`](Self::measure_frame), and [looks again](Self::look_again) if that may
+    /// help.
     pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
         let measurement = self.measure_frame(frame);
         let Some(again) = self.look_again() else {
@@ -296,7 +300,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.finish_again(again)
     }
 
-    /// Ends the frame.
+    /// Ends the frame and returns its measurement.
     pub fn finish_frame(&mut self) -> Measurement {
         let measurement = self.measure_scanned();
         self.motion.ended(measurement.markers.as_ref());
@@ -317,7 +321,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.measurement(found)
     }
 
-    /// What follows from the markers.
+    /// Returns the measurement of these markers, or of a frame without.
     fn measurement(&mut self, found: Result<Found, Status>) -> Measurement {
         let (seen, mut status) = match &found {
             Ok(found) => (Some(found), Status::OK),
@@ -351,27 +355,27 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// How it reads pixels.
+    /// Returns how pixels are read.
     pub fn pixels(&self) -> &Formats<T> {
         &self.pixels
     }
 
-    /// The blobs of the frame that was finished last, at least [`Settings::min_area`] each.
+    /// Returns the blobs of the last finished frame, of at least [`Settings::min_area`] each.
     pub fn blobs(&self) -> &[Blob] {
         self.scanner.blobs()
     }
 
-    /// Works out anew what follows from settings, model and tare.
+    /// Computes everything that follows from settings, model and tare.
     fn prepare(&mut self) {
         self.hang();
         self.ahead = Ahead::Off;
         self.look = Look::First;
         self.noise = NoiseLevel::AS_MODELLED;
         let settings = &self.settings;
-        // What a model for other frames says of rest and contact does not hold here.
+        // The rest position and contact of a model for other frames do not apply here.
         let fitting = self.fitting_model();
         let rest = self.tare().copied().or_else(|| self.rest_of_model());
-        // The same tip presses, whether or not the model is for these frames.
+        // The tip is the same, whether or not the model is for these frames.
         let reading = self
             .model
             .as_ref()
@@ -413,7 +417,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         status
     }
 
-    /// Brings out the last blobs; says why the frame as a whole has no markers.
+    /// Ends the scan. Returns the reason as an error if the frame as a whole has no markers.
     fn end_scan(&mut self) -> Result<(), Status> {
         let geometry = &self.settings.geometry;
         let pixels = u32::from(geometry.width) * u32::from(geometry.height);
@@ -430,19 +434,19 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         Ok(())
     }
 
-    /// What a model says of a question whose answer is known; frames go on as if it had not been
-    /// asked.
+    /// Returns the model's answer to the question with a known answer. Measuring frames is not
+    /// affected.
     pub fn known_answer(&mut self, model: &Model<'_>) -> Answer {
         known_answer::of(model, &mut self.network)
     }
 
     fn find_markers(&self) -> Result<Found, Status> {
-        // Before it is configured nothing passes the threshold.
+        // Before it is configured, no pixel passes the threshold.
         let prepared = self.prepared.as_ref().ok_or(Status::IMAGE_DARK)?;
         prepared.finder.find(self.scanner.blobs())
     }
 
-    /// The force of a frame's features, unless `status` already forbids one.
+    /// Returns the force of a frame's features; `None` if `status` already forbids one.
     fn measure(
         &mut self,
         features: &Features,

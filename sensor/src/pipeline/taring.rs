@@ -1,4 +1,4 @@
-//! The frame that was measured, as one of those that make a rest position.
+//! Feeds measured frames to a tare.
 
 use super::{Look, Measurement, Sensor};
 use crate::force::rest::Rest;
@@ -8,24 +8,24 @@ use crate::tare::{Refusal, TareBuilder};
 use hivtac_terms::status::Status;
 use hivtac_terms::units::MicroNewtons;
 
-/// A change of the rest position that a press of this much explains is a touch: 0.3 mN.
+/// A press of at least this that explains a change of the rest position is a touch: 0.3 mN.
 const TOUCHED: MicroNewtons = MicroNewtons(300);
-/// The same of a unit of which nothing else is known: its markers may be glued as if by less. Seen
-/// of an untouched one in none of 1,500: 2.8 mN at most.
+/// The same for a unit of which nothing else is known: its gluing may look like a smaller press.
+/// Seen in 1,500 untouched units: at most 2.8 mN.
 const TOUCHED_OF_UNIT: MicroNewtons = MicroNewtons(4_000);
-/// The same when gravity pulled otherwise then, which is known to some tenths of that: 1 mN.
+/// The same if gravity pulled differently then. The effect of that is known to a few tenths: 1 mN.
 const TOUCHED_AND_TURNED: MicroNewtons = MicroNewtons(1_000);
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// Gives a tare the frame that was finished last, of which `measurement` is. A frame without
-    /// markers is passed over. Gives the rest position, which is not yet
-    /// [set](Sensor::set_tare), once there were enough good frames, or why there is none.
+    /// Adds the last finished frame, whose result is `measurement`, to a tare. A frame without
+    /// markers is skipped. Once enough good frames were added, returns the rest position, which is
+    /// not yet [set](Sensor::set_tare), or why it is refused; otherwise `None`.
     pub fn tare_with(
         &self,
         tare: &mut TareBuilder,
         measurement: &Measurement,
     ) -> Option<Result<Rest, Refusal>> {
-        // The blobs of another look are no rest position's.
+        // The blobs of a second look are not a rest position's.
         if matches!(self.look, Look::Again) {
             return None;
         }
@@ -33,13 +33,14 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let features = measurement.features.as_ref()?;
         let found = self.find_markers().ok()?;
         let geometry = &self.settings.geometry;
-        // Against the model's rest position every unit is touched.
+        // Relative to the model's rest position every unit looks touched.
         let is_touched = self.tare.is_some() && measurement.status.contains(Status::CONTACT);
         if is_touched && !tare.insists() {
             let touch = measurement.force.map(|force| force.magnitude);
             return tare.add_touched(touch.unwrap_or_default()).map(Err);
         }
-        // The images of a pressed film are not those of a flat one; that it is pressed matters.
+        // The images of a pressed film differ from those of a flat one; the press is the reason to
+        // report.
         let is_pressed = !Rest::of_markers(&found.markers).fits(geometry);
         if !is_pressed && !found.may_rest(&self.settings) {
             return tare.add_implausible().map(Err);
@@ -52,8 +53,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }))
     }
 
-    /// The press that explains how the markers moved since the rest position from before, or since
-    /// the calibration of this unit; without either, beside the model's, where no gluing does.
+    /// Returns the press that explains how the markers moved since the previous rest position, or
+    /// since this unit's calibration. Without either it is compared with the model's, where gluing
+    /// must not explain it. Returns `None` if there was no touch.
     fn touch(&self, rest: &Rest) -> Option<MicroNewtons> {
         let model = self.fitting_model()?;
         let (of_model, turned) = (self.rest_of_model()?, self.turned());

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use std::{boxed::Box, vec, vec::Vec};
 
 const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
-/// µN for a pixel, of the linear model below.
+/// µN per pixel in the linear model below.
 const PER_PIXEL: i32 = 10_000;
 
 /// A model whose Fx and Fy are the shift of the rectangle's centre, 10 mN a pixel, and Fz is
@@ -116,8 +116,8 @@ fn a_tare_that_cannot_be_is_none() {
     assert_eq!(sensor.tare(), None);
 }
 
-/// The pattern tapered along x and sheared, px at each marker: what a tip does that the film sticks
-/// to.
+/// The pattern tapered along x and sheared, px at each marker, as by a tip to which the film
+/// sticks.
 fn pulled(taper: f64, shear: f64) -> Pattern {
     let signs = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
     Pattern {
@@ -176,7 +176,7 @@ fn a_calibrated_unit_is_not_called_uncalibrated() {
     );
 }
 
-/// Fz is all of the force at rest; its uncertainty is the second number.
+/// At rest the force is all Fz; the second number is its uncertainty.
 #[test]
 fn a_contact_is_told_from_two_millinewtons_on_when_they_are_certain() {
     for (press, sigma, expected) in [
@@ -397,7 +397,7 @@ fn too_many_blobs_are_told() {
     assert_eq!(seen.markers, None);
 }
 
-/// Grey, red, or anything that a camera sends.
+/// Grey, red, or random pixels as a camera may send them.
 fn noisy(picture: &mut Picture, kind: u8, seed: u64) {
     let mut state = seed | 1;
     for pixel in &mut picture.pixels {
@@ -452,7 +452,7 @@ proptest! {
         prop_assert_eq!(seen.status.contains(Status::CONTACT), touched);
     }
 
-    /// Whatever lens, rest position and picture: an answer, and no overflow on the way.
+    /// Any lens, rest position and picture give an answer, without overflow.
     #[test]
     fn any_sound_sensor_survives_any_picture(
         (width, height) in (1u16..100, 1u16..100),

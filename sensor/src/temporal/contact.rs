@@ -1,7 +1,7 @@
-//! Whether something touches the film, with hysteresis.
+//! Decides whether something touches the film, with hysteresis.
 //!
-//! A contact begins with the limit's |F| when that is at least three times its standard
-//! uncertainty, or the frame's own status says that something touches the film: it leaves out how
+//! A contact begins when |F| reaches the upper limit and is certain: at least three times its
+//! standard uncertainty, or the frame's own status reports a contact. That status ignores how
 //! uncertain a film's strength is. It ends below the lower limit, or below half of that certainty.
 
 use super::ContactLimits;
@@ -9,24 +9,24 @@ use crate::force::CONTACT_SIGMAS;
 use crate::pipeline::Measurement;
 use hivtac_terms::status::Status;
 
-/// What was known is forgotten when no frame had a force for so long, µs.
+/// The state is discarded if no frame had a force for longer than this, µs.
 const FORGOTTEN_US: u64 = 100_000;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {
     is_touched: bool,
-    /// When the newest force was, µs.
+    /// Time of the newest force, µs.
     newest_us: u64,
 }
 
 impl Contact {
-    /// Nothing touches it.
+    /// No contact.
     pub const NONE: Contact = Contact {
         is_touched: false,
         newest_us: 0,
     };
 
-    /// Takes a frame; `None` when nobody knows, as it has no force.
+    /// Takes a frame and returns whether the film is touched; `None` if the frame has no force.
     pub fn follow(
         &mut self,
         limits: &ContactLimits,
@@ -34,7 +34,7 @@ impl Contact {
         measurement: &Measurement,
     ) -> Option<bool> {
         let force = measurement.force.as_ref()?;
-        // Where a unit's strength is uncertain, the frame's own status tells what is by noise.
+        // If a unit's strength is uncertain, the frame's own status judges by noise alone.
         let is_certain = measurement.status.contains(Status::CONTACT);
         let was_touched = self.is_touched && time_us.saturating_sub(self.newest_us) <= FORGOTTEN_US;
         let magnitude = force.magnitude.0.unsigned_abs();
@@ -54,7 +54,7 @@ mod tests {
     use crate::temporal::tests::{frame, pressed};
     use hivtac_terms::units::Px;
 
-    /// Whether each of forces, µN with standard uncertainty, a frame apart, is a contact.
+    /// Whether each of the forces, µN with standard uncertainty, a frame apart, is a contact.
     fn told(forces: &[(i32, u32)]) -> std::vec::Vec<bool> {
         let mut contact = Contact::NONE;
         let mut time_us = 0;
@@ -87,8 +87,8 @@ mod tests {
         assert_eq!(told(&extremes), [false, true, false]);
     }
 
-    /// How strong a unit's film is, may be as uncertain as its force is large: the frame's status
-    /// knows what is by noise.
+    /// A film's strength may be as uncertain as its force is large; the frame's status judges by
+    /// noise alone.
     #[test]
     fn a_film_of_unknown_strength_is_touched() {
         let mut seen = frame(Some(pressed(20_000, 20_000)), Px(0));

@@ -1,17 +1,17 @@
-//! What the film remembers of its loads, as the sensor undoes it.
+//! Removes from each force what the film remembers of its earlier loads.
 //!
-//! A linear viscoelastic film answers as the elastic one does to F + Σ part · q, where each q
-//! follows the load F with a time of its own (a Prony series of two terms: Park and Schapery, *Int.
-//! J. Solids Struct.* 36, 1999). So what a frame shows is such a sum, and F is what is left when
-//! the q of the forces before are taken off.
+//! A linear viscoelastic film responds like an elastic one to F + Σ part · q. Each q follows the
+//! load F with its own time constant (a Prony series of two terms: Park and Schapery, *Int. J.
+//! Solids Struct.* 36, 1999). A frame shows such a sum; subtracting the q of the earlier forces
+//! leaves F.
 //!
-//! A model's forces are right for loads that were held for a second: that is what a calibration
-//! reads. Of each q counts only how far it is beside where it is after that. That, times the part's
-//! standard uncertainty, is uncertain, and nothing is of a load that is held as those of the
-//! calibration were.
+//! A model's forces are right for loads that were held for a second, because a calibration reads
+//! them then. So only the difference between each q and its value after that second counts. This
+//! difference times the part's standard uncertainty is uncertain; for a load held as in the
+//! calibration it is 0.
 //!
-//! The load's moment about the film's middle lags as its components do, so that what remains acts
-//! where the loads were.
+//! The load's moment about the film's middle lags as its components do. So the remembered force
+//! acts where the loads were.
 
 use super::filter::both;
 use crate::force::{CONTACT_SIGMAS, Force, Place, Polar};
@@ -24,38 +24,38 @@ use hivtac_terms::units::{
 /// F_x, F_y, F_z, µN, and F_z·x, F_z·y, µN·mm.
 type Resultant = [f32; 5];
 
-/// A load of a calibration is read so long after it was put on, ms.
+/// Time between applying a load and reading it in a calibration, ms.
 const READ_MS: f32 = 1_000.0;
-/// That time is parted into 2⁶.
+/// That time is divided into 2⁶ steps.
 const HALVINGS: i32 = 6;
-/// Frames without a force: for so long the last one counts as held, µs, and then nothing presses.
+/// If frames have no force, the last force counts as held for this time, µs, then as 0.
 const HELD_US: u64 = 100_000;
-/// The film ends there, µm from its middle.
+/// Largest distance of a place from the film's middle: the film ends there, µm.
 const FARTHEST_UM: f32 = 20_000.0;
-/// m° of a radian.
+/// m° per radian.
 const MDEG: f32 = 57_295.78;
 
-/// What the film remembers.
+/// The film's memory of its loads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Memory {
     lagging: [Resultant; 2],
-    /// The newest force, and when that was, µs.
+    /// The newest force, and its time, µs.
     force: Resultant,
     force_us: u64,
     newest_us: Option<u64>,
 }
 
-/// What a frame's force comes to.
+/// A frame's force after correction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Undone {
-    /// Without what the film remembers.
+    /// The force without the film's memory.
     pub force: Force,
-    /// What is uncertain of |F| by that alone.
+    /// The uncertainty of |F| by the memory alone.
     pub sigma: UnsignedMicroNewtons,
 }
 
 impl Undone {
-    /// Whether it may be no more than what is not known of the film's memory.
+    /// Returns whether the force may be only the film's memory.
     pub fn is_remembered(&self) -> bool {
         let sigmas = u64::from(self.sigma.0) * u64::from(CONTACT_SIGMAS);
         u64::from(self.force.magnitude.0.unsigned_abs()) < sigmas
@@ -63,7 +63,7 @@ impl Undone {
 }
 
 impl Memory {
-    /// Of no load.
+    /// No load so far.
     pub const NONE: Memory = Memory {
         lagging: [[0.0; 5]; 2],
         force: [0.0; 5],
@@ -71,7 +71,7 @@ impl Memory {
         newest_us: None,
     };
 
-    /// Takes a frame's own force and gives what it comes to.
+    /// Takes a frame's own force and returns the corrected one.
     pub fn follow(&mut self, creep: &Creep, time_us: u64, own: Option<&Force>) -> Option<Undone> {
         let before_us = self.newest_us.replace(time_us).unwrap_or(time_us);
         let beside = own.map(|own| self.beside(&resultant(own)));
@@ -82,7 +82,7 @@ impl Memory {
                     *sum -= thousandths(part.0) * beside;
                 }
             }
-            // A film is pressed or left alone.
+            // A film is either pressed or not; it is never pulled.
             self.force = if force[2] < 0.0 { force } else { [0.0; 5] };
             self.force_us = time_us;
         } else if time_us.saturating_sub(self.force_us) > HELD_US {
@@ -93,7 +93,7 @@ impl Memory {
         Some(self.undone(creep, own, &beside))
     }
 
-    /// How far each q is beside where it is of a load that is read as it was calibrated.
+    /// Difference between each q and its value for a load that is read as in a calibration.
     fn beside(&self, seen: &Resultant) -> [Resultant; 2] {
         let mut beside = self.lagging;
         for (beside, time) in beside.iter_mut().zip(Creep::TIMES) {
@@ -105,7 +105,7 @@ impl Memory {
         beside
     }
 
-    /// Lets µs pass, by the implicit Euler rule.
+    /// Advances by this many µs, by the implicit Euler rule.
     fn pass(&mut self, after_us: u64) {
         let after_ms = after_us as f32 * 1e-3;
         for (lagging, time) in self.lagging.iter_mut().zip(Creep::TIMES) {
@@ -116,7 +116,7 @@ impl Memory {
         }
     }
 
-    /// The force with what is uncertain of it.
+    /// Returns the corrected force with its uncertainty.
     fn undone(&self, creep: &Creep, own: &Force, beside: &[Resultant; 2]) -> Undone {
         let vector = [self.force[0], self.force[1], self.force[2]];
         let mut force = match creep.is_measured() {
@@ -140,7 +140,7 @@ impl Memory {
         let uncertain = thousandths(creep.uncertain().0);
         let sigma = (uncertain * root(along)) as u32;
         let turned = uncertain * MDEG * root(across) / size.max(1.0);
-        // µm of mm; half of the square of a distance is each coordinate's.
+        // µm from mm; each coordinate has half of the squared distance.
         let far_um = 1e3 * uncertain * root(far / 2.0) / -vector[2].min(-1.0);
         let far_um = far_um.min(FARTHEST_UM);
         force.magnitude_sigma = UnsignedMicroNewtons(both(own.magnitude_sigma.0, sigma));
@@ -157,14 +157,14 @@ impl Memory {
     }
 }
 
-/// The square of the moment, µN·mm, that is not of the force at its place.
+/// The squared part of the moment, µN·mm, that is not due to the force acting at its place.
 fn place_mm(own: &Force, [right, down]: [f32; 2], z: f32) -> f32 {
     let [x, y] = own.place.map_or([0.0; 2], |place| mm(&place));
     let (right, down) = (right - z * x, down - z * y);
     right * right + down * down
 }
 
-/// A force of this resultant in the place of a frame's own.
+/// The frame's own force, replaced by this resultant.
 fn moved(own: &Force, resultant: &Resultant) -> Force {
     let [x, y, z, right, down] = *resultant;
     let cartesian = [x, y, z].map(|part| MicroNewtons(nearest(part)));
@@ -173,7 +173,7 @@ fn moved(own: &Force, resultant: &Resultant) -> Force {
         beta,
         magnitude,
     } = Polar::of_vector(cartesian);
-    // What is hardly a force is nowhere else.
+    // A negligible force keeps its place.
     let place = own.place.map(|place| match z < -1.0 {
         true => Place {
             x: SignedMicrometres(nearest(1e3 * right / z)),
@@ -202,7 +202,7 @@ fn mm(place: &Place) -> [f32; 2] {
     [place.x, place.y].map(|part| part.0 as f32 * 1e-3)
 }
 
-/// To which part of a load its q has come when that is read.
+/// The fraction of a load that its q has reached when the load is read.
 fn grown(time: Milliseconds) -> f32 {
     let time_ms = (time.0 as f32).max(1.0);
     let mut left = time_ms / (time_ms + READ_MS / (1 << HALVINGS) as f32);
@@ -225,7 +225,7 @@ fn length([x, y, z]: &[f32; 3]) -> f32 {
     root(x * x + y * y + z * z)
 }
 
-/// Of numbers below 2⁶³, to a whole one.
+/// The root of a number below 2⁶³, as an integer.
 fn root(square: f32) -> f32 {
     hivtac_terms::root::root(square as u64) as f32
 }
@@ -243,7 +243,7 @@ mod tests {
         parts: [SmallPermille(40), SmallPermille(100)],
     };
 
-    /// A film that creeps, calibrated by loads of a second, and its sensor.
+    /// A creeping film, calibrated with loads held for a second, and its sensor.
     struct Film {
         lagging: [f64; 2],
         memory: Memory,
@@ -259,7 +259,8 @@ mod tests {
             }
         }
 
-        /// What a force straight into the film, µN, comes to after so long, and what was seen.
+        /// Holds a force straight into the film, µN; returns the corrected force at the end and the
+        /// force that was seen.
         fn hold(&mut self, creep: &Creep, force: f64, seconds: f64) -> (Undone, f64) {
             let mut last = None;
             for _ in 0..(seconds * 1e6) as u64 / FRAME_US {
@@ -305,8 +306,8 @@ mod tests {
         }
     }
 
-    /// A load that is held as those of a calibration is as certain as without; one that is held
-    /// for long, or was taken off, is not, and what was seen too much is within it.
+    /// A load held as in a calibration is as certain as without creep. One that is held for long,
+    /// or was removed, is not, and the error is within its uncertainty.
     #[test]
     fn what_is_not_known_is_uncertain() {
         let mut film = Film::new();
@@ -334,7 +335,7 @@ mod tests {
     }
 
     proptest! {
-        /// Any forces at any times: never less uncertain than the frame's own.
+        /// For any forces at any times, a force never becomes more certain than the frame's own.
         #[test]
         fn no_force_becomes_more_certain(
             forces in proptest::collection::vec((any::<[i32; 3]>(), 0u64..u64::MAX / 32), 1..20),

@@ -1,17 +1,16 @@
-//! The filter of the force that is sent.
+//! Filters the force that is sent.
 //!
 //! *Low-pass*: y += (x − y)·dt / (τ + dt) with the time dt between two frames, the implicit Euler
-//! rule of τ·y' = x − y. It is stable at any frame rate, and of an input that grows steadily the
-//! output is exactly τ late. *Median of three*: of a steady input it is exactly a frame late.
+//! rule of τ·y' = x − y. It is stable at any frame rate, and lags exactly τ behind a steadily
+//! growing input. *Median of three*: it lags exactly one frame behind a steadily growing input.
 //!
-//! It begins anew with a frame that does not follow the one before at once, and with one after a
-//! frame without a force: that frame's own force is sent. So is the place that a contact begins
-//! with, for places before it mean nothing.
+//! The filter restarts with a frame that does not immediately follow the previous one, or that
+//! follows a frame without a force: then that frame's own force is sent. The place restarts at each
+//! contact, because earlier places are meaningless.
 //!
-//! The uncertainty that is stated is that of the frame's own force, and never less: it holds what
-//! is wrong in all frames alike, of which a filter takes nothing away. While a force changes, what
-//! is sent is late; how far it is from the frame's own force is added, by root of the sum of
-//! squares.
+//! The stated uncertainty is never below that of the frame's own force: it contains constant
+//! errors, which a filter does not reduce. While a force changes, the output lags. Its difference
+//! from the frame's own force is added by root of the sum of squares.
 
 use super::{Filter, Moment};
 use crate::force::{Force, Place, Polar};
@@ -24,18 +23,18 @@ use hivtac_terms::units::{
     UnsignedMilliDegrees,
 };
 
-/// Frames farther apart than this count as so far apart, µs: products then fit 64 bits.
+/// Frames farther apart than this count as this far apart, µs: products then fit 64 bits.
 const LONGEST_US: u64 = 1 << 20;
-/// So does a time constant, ms.
+/// Larger time constants count as this, ms.
 const LARGEST_MS: u32 = 1 << 20;
 
-/// Some components, filtered.
+/// Filters N components.
 #[derive(Clone, Copy, Debug)]
 struct Smoother<const N: usize> {
-    /// The frames before, newest first, and how many of them there are.
+    /// The previous frames, newest first, and their number.
     before: [[i32; N]; 2],
     count: u8,
-    /// A low-pass' output.
+    /// The low-pass output.
     smooth: [Q<8, i64>; N],
 }
 
@@ -46,7 +45,7 @@ impl<const N: usize> Smoother<N> {
         smooth: [Q::from_bits(0); N],
     };
 
-    /// Takes the next values, so many µs after those before.
+    /// Takes the next values, `after_us` after the previous ones, and returns the filtered ones.
     fn next(&mut self, filter: Filter, after_us: u64, now: [i32; N]) -> [i32; N] {
         let filtered = match filter {
             Filter::None => now,
@@ -86,7 +85,7 @@ impl<const N: usize> Smoother<N> {
     }
 }
 
-/// The filter of forces and their places.
+/// Filters forces and their places.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ForceFilter {
     force: Smoother<3>,
@@ -95,14 +94,14 @@ pub(super) struct ForceFilter {
 }
 
 impl ForceFilter {
-    /// Nothing to follow yet.
+    /// The state before the first frame.
     pub const EMPTY: ForceFilter = ForceFilter {
         force: Smoother::EMPTY,
         place: Smoother::EMPTY,
         newest: None,
     };
 
-    /// Takes a frame's own force and gives what is sent.
+    /// Takes a frame's own force and returns the force to send.
     pub fn follow(
         &mut self,
         filter: Filter,
@@ -140,7 +139,7 @@ impl ForceFilter {
     }
 }
 
-/// A filtered force for a frame's own one, with what lies between them in its uncertainty.
+/// A filtered force, whose uncertainty includes its difference from the frame's own force.
 fn late_force(own: &Force, cartesian: [MicroNewtons; 3], place: Option<Place>) -> Force {
     let Polar {
         alpha,
@@ -160,7 +159,7 @@ fn late_force(own: &Force, cartesian: [MicroNewtons; 3], place: Option<Place>) -
     }
 }
 
-/// The same of a place: half of the square of a distance is each coordinate's.
+/// The same for a place: each coordinate has half of the squared distance.
 fn late_place(own: &Place, [x, y]: [SignedMicrometres; 2]) -> Place {
     let [right, down] = [own.x.0.abs_diff(x.0), own.y.0.abs_diff(y.0)];
     let square = (u64::from(right).pow(2) / 2).saturating_add(u64::from(down).pow(2) / 2);
@@ -178,7 +177,7 @@ pub(super) fn both(a: u32, b: u32) -> u32 {
     rounded_root(sum).min(u64::from(MOST)) as u32
 }
 
-/// The angle between two vectors, m°, to 4 m°; 0 where one of them is none.
+/// The angle between two vectors, m°, to 4 m°; 0 if one of them is 0.
 fn angle_mdeg(a: &[MicroNewtons; 3], b: &[MicroNewtons; 3]) -> u32 {
     let (a, b) = (shortened(a), shortened(b));
     let ([ax, ay, az], [bx, by, bz]) = (a, b);
@@ -189,7 +188,7 @@ fn angle_mdeg(a: &[MicroNewtons; 3], b: &[MicroNewtons; 3]) -> u32 {
     atan2(i64::from(root(square)), dot).0.unsigned_abs()
 }
 
-/// Shifted until its largest component has 15 bits.
+/// Shifts a vector until its largest component has 15 bits.
 fn shortened(vector: &[MicroNewtons; 3]) -> [i64; 3] {
     let largest = vector
         .iter()
@@ -208,7 +207,7 @@ mod tests {
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    /// A frame, µs.
+    /// Time between frames, µs.
     const FRAME_US: u64 = 6_405;
 
     fn low_pass(ms: u32) -> Filter {
@@ -217,7 +216,7 @@ mod tests {
         }
     }
 
-    /// Fz of what is sent of forces straight into the film, µN, so many µs apart.
+    /// Fz of the output for forces straight into the film, µN, `frame_us` apart.
     fn sent(filter: Filter, frame_us: u64, forces: &[i32]) -> Vec<i32> {
         let mut state = ForceFilter::EMPTY;
         let frames = (1..).zip(forces);
@@ -329,7 +328,8 @@ mod tests {
     }
 
     proptest! {
-        /// Within what the frames were, never more certain than they, at any numbers.
+        /// For any numbers, the output is within the frames' range and never more certain than they
+        /// are.
         #[test]
         fn what_is_sent_lies_between_the_frames(
             filter in any_filter(),

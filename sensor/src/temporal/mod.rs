@@ -1,9 +1,9 @@
-//! From one frame's force to the next: what the film remembers, contact, slip, and the filter of
-//! what is sent.
+//! Follows forces from frame to frame: the film's memory of its loads, contact, slip, and the
+//! filter.
 //!
-//! Every decision is by the frames' own times, so that it is the same at any frame rate and across
-//! frames that were lost; state and work are bounded. Contact and slip are told from each frame's
-//! own force, whatever the filter does to what is sent.
+//! Every decision uses the frames' own times, so it is the same at any frame rate and across lost
+//! frames. State and work are bounded. Contact and slip depend on each frame's own force, not on
+//! the filtered force that is sent.
 
 mod contact;
 mod creep;
@@ -21,30 +21,30 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, SlipLimits, TemporalError, TemporalSettings};
 use slip::Slip;
 
-/// Which frame, and when it was exposed.
+/// A frame's number and exposure time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
-    /// Its number, which goes on by 1, modulo 2³².
+    /// Its number, which increases by 1 per frame, modulo 2³².
     pub frame: u32,
-    /// The middle of its exposure, µs; never back.
+    /// The middle of its exposure, µs; never decreases.
     pub time_us: u64,
 }
 
-/// What follows from a frame and those before it.
+/// The result of a frame and those before it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Followed {
-    /// The frame's status, with [`Status::CONTACT`] and [`Status::SLIP`] as they follow from all
-    /// frames; of [`Sensor::follow`](crate::pipeline::Sensor::follow) with [`Status::REZEROED`] and
-    /// [`Status::REST_MOVED`], too.
+    /// The frame's status, with [`Status::CONTACT`] and [`Status::SLIP`] decided from all frames.
+    /// [`Sensor::follow`](crate::pipeline::Sensor::follow) also sets [`Status::REZEROED`] and
+    /// [`Status::REST_MOVED`].
     pub status: Status,
-    /// The filtered force, exactly when the frame has one.
+    /// The filtered force; present exactly if the frame has a force.
     pub force: Option<Force>,
-    /// Whether a second of the untouched film told where it rests, which
-    /// [`Sensor::follow`](crate::pipeline::Sensor::follow) alone asks.
+    /// True if a second of the untouched film has just shown where it rests. Set by
+    /// [`Sensor::follow`](crate::pipeline::Sensor::follow) only.
     pub tells_rest: bool,
 }
 
-/// What is known of the frames before.
+/// The state that earlier frames left.
 #[derive(Clone, Debug)]
 pub struct Temporal {
     settings: TemporalSettings,
@@ -71,11 +71,11 @@ impl Temporal {
         &self.settings
     }
 
-    /// Sets them between two frames; contact, slip and filter begin anew, so that no frame is
+    /// Sets the settings, between two frames. Contact, slip and filter restart, so that no frame is
     /// judged by two settings.
     ///
     /// # Errors
-    /// A setting outside its range; nothing is changed then.
+    /// A setting out of its range; then nothing is changed.
     pub fn set(&mut self, settings: TemporalSettings) -> Result<(), TemporalError> {
         settings.check()?;
         self.settings = settings;
@@ -83,7 +83,7 @@ impl Temporal {
         Ok(())
     }
 
-    /// Forgets what was before: the next frames are seen in another way.
+    /// Discards the history: the next frames are seen in a different way.
     pub fn begin_anew(&mut self) {
         self.contact = Contact::NONE;
         self.slip = Slip::NONE;
@@ -105,7 +105,7 @@ impl Temporal {
             force: undone.map(|undone| undone.force),
             ..*measurement
         };
-        // What the film may only remember does not touch it.
+        // A force that may be only the film's memory is not a contact.
         if undone.is_some_and(|undone| undone.is_remembered()) {
             seen.status = Status(seen.status.0 & !Status::CONTACT.0);
         }

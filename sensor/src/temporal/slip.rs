@@ -1,22 +1,21 @@
-//! Whether what touches the film slips: its place on the film moves.
+//! Detects whether a contact slips: its place on the film moves.
 //!
-//! The place is a point of the film itself: it stays while the contact sticks, however far that
-//! takes the film along, and moves when the contact slips. Friction then pulls the film with a
-//! force along it, which is a part of the one into it: a place that moves without is none of a
-//! slip.
+//! The place is a point of the film itself. It stays while the contact sticks, however far the
+//! contact drags the film, and moves when it slips. Friction then pulls along the film with a part
+//! of the force into it. If a place moves without such a force, that is not a slip.
 //!
-//! A place is not exact. Its noise grows as the force falls, and what the model does not know of a
-//! unit shifts it with every change of the force; the stated uncertainty holds that. So a place has
-//! moved since an earlier frame when it did by
+//! A place has noise, which grows as the force falls. Model errors shift it with every change of
+//! the force; the stated uncertainty includes that. So a place counts as moved since an earlier
+//! frame if it moved by at least
 //!
 //! distance · (1 + 10 mN / |F|) + σ · (1/8 + |ΔF| / 2|F|)
 //!
-//! with the smaller |F| of the two frames, ΔF the vector between their forces and σ the place's
-//! stated uncertainty; and by three times the noise of the frames between, the mean length of the
-//! place's second differences, which a steady motion does not have. A slip begins with the second
-//! frame in a row that says so: when a force begins to change, a rolling shutter has one frame in
-//! which markers do not move as between the two before. While it slips, three fifths of the
-//! distance are enough.
+//! with the smaller |F| of the two frames, ΔF the vector between their forces, and σ the place's
+//! stated uncertainty. It must also have moved by three times the noise of the frames between: the
+//! mean length of the place's second differences, which are 0 in a steady motion. A slip begins
+//! with the second such frame in a row: when a force begins to change, a rolling shutter gives one
+//! frame whose markers do not move as before. While it slips, three fifths of the distance are
+//! enough.
 
 use super::SlipLimits;
 use crate::force::{Force, Place};
@@ -24,14 +23,14 @@ use hivtac_terms::division::Divisor;
 use hivtac_terms::root::root;
 use hivtac_terms::units::MicroNewtons;
 
-/// Frames that are remembered: 100 ms, the longest time of the limits, at 310 frames a second. At a
-/// higher rate it is the time of so many frames.
+/// Number of frames that are remembered: 100 ms, the longest time of the limits, at 310 frames a
+/// second. At a higher rate it is a shorter time.
 const FRAMES: usize = 32;
 /// |F| at which noise doubles the distance, µN.
 const DOUBLES_AT: u64 = 10_000;
-/// How many times the mean second difference a place must have moved.
+/// A place must have moved by this many mean second differences.
 const NOISES: u64 = 3;
-/// What of the distance is enough while it slips.
+/// Fraction of the distance that is enough while it slips.
 const GOES_ON: [u64; 2] = [3, 5];
 
 /// Force and place of a frame.
@@ -49,7 +48,7 @@ struct Seen {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slip {
     frames: [Seen; FRAMES],
-    /// How many of them there are, and where the next one goes.
+    /// Number of frames, and index of the next one.
     count: usize,
     next: usize,
     /// Whether the place had moved in the newest frame.
@@ -58,7 +57,7 @@ pub(super) struct Slip {
 }
 
 impl Slip {
-    /// Nothing is known.
+    /// No frames so far.
     pub const NONE: Slip = Slip {
         frames: [Seen {
             time_us: 0,
@@ -72,8 +71,8 @@ impl Slip {
         slips: false,
     };
 
-    /// Takes a frame and says whether its contact slips. A frame whose force or touch nobody knows
-    /// does not tell, and is passed over; where nothing touches, what was before is forgotten.
+    /// Takes a frame and returns whether its contact slips. A frame with unknown force, place or
+    /// contact is skipped; if the film is not touched, the history is discarded.
     pub fn follow(
         &mut self,
         limits: &SlipLimits,
@@ -102,7 +101,7 @@ impl Slip {
         self.slips
     }
 
-    /// Frames, newest first.
+    /// The frames, newest first.
     fn newest(&self) -> impl Iterator<Item = &Seen> {
         (1..=self.count).filter_map(|back| {
             let at = self.next.wrapping_add(FRAMES).wrapping_sub(back) % FRAMES;
@@ -137,8 +136,8 @@ impl Slip {
         })
     }
 
-    /// Mean length of the second differences of all places, µm; of fewer than three the largest
-    /// number.
+    /// Mean length of the second differences of all places, µm; with fewer than three places, the
+    /// largest number.
     fn noise(&self, now: &Seen) -> u64 {
         let places = || core::iter::once(now).chain(self.newest());
         let triples = places().zip(places().skip(1)).zip(places().skip(2));
@@ -155,7 +154,7 @@ impl Slip {
     }
 }
 
-/// Coordinates farther apart than this count as so far apart, µm: squares then fit 64 bits.
+/// Coordinates farther apart than this count as this far apart, µm: squares then fit 64 bits.
 const FAR: i64 = 1 << 30;
 
 /// Distance of two places, µm.
@@ -172,7 +171,7 @@ fn length(x: i64, y: i64) -> u32 {
     root((x * x + y * y) as u64)
 }
 
-/// By how much a place must have moved from one frame to another, µm.
+/// How far a place must have moved from one frame to another, µm.
 fn least_moved(distance: u64, now: &Seen, before: &Seen, place: &Place) -> u64 {
     let pairs = now.force.iter().zip(&before.force);
     let squares = pairs.map(|(now, before)| u64::from(now.abs_diff(*before).min(1 << 30)).pow(2));
@@ -185,7 +184,7 @@ fn least_moved(distance: u64, now: &Seen, before: &Seen, place: &Place) -> u64 {
         + smaller.quotient(sigma * change) / 2
 }
 
-/// Whether the force along the film is a large enough part of the one into it.
+/// Whether the force along the film is a large enough part of the force into it.
 fn is_pulled(force: &Force, limits: &SlipLimits) -> bool {
     let [x, y, z] = force.cartesian;
     let square = |part: MicroNewtons| u64::from(part.0.unsigned_abs()).pow(2);
@@ -219,8 +218,8 @@ mod tests {
 
     const PULLED: [i32; 3] = [30_000, 0, -100_000];
 
-    /// When a contact slips, µs, that moves at a speed, mm/s, after 0.3 s; frames so far apart, of
-    /// which every so many comes.
+    /// Times, µs, at which a contact slips that moves at a speed, mm/s, after 0.3 s. Frames are
+    /// `frame_us` apart; one in `every` arrives.
     fn slips(speed: f64, vector: [i32; 3], frame_us: u64, every: u64) -> Vec<u64> {
         let mut slip = Slip::NONE;
         let frames = (0..600_000 / frame_us).filter(|frame| frame % every == 0);
@@ -275,8 +274,8 @@ mod tests {
         (0..8).for_each(|_| assert!(!next(-900, true)));
     }
 
-    /// A press whose place settles by 240 µm while |F| grows tenfold, by a model that knows little
-    /// of the unit.
+    /// A press whose place settles by 240 µm while |F| grows tenfold, with a model that knows
+    /// little of the unit.
     #[test]
     fn what_the_model_does_not_know_does_not_slip() {
         let told = |sigma: u32| {

@@ -1,4 +1,4 @@
-//! Forces for the tests of this folder.
+//! Provides forces for the tests of this folder.
 
 use crate::force::{Force, Place, Polar};
 use hivtac_terms::units::{
@@ -45,7 +45,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalError, TemporalSettings};
 use hivtac_terms::units::{Milliseconds, Px};
 
-/// A frame with a force, of markers that stand so far to the right.
+/// A frame with a force, whose markers are shifted to the right by `right`.
 pub fn frame(force: Option<Force>, right: Px) -> Measurement {
     let markers = rest(right).markers();
     Measurement {
@@ -56,7 +56,7 @@ pub fn frame(force: Option<Force>, right: Px) -> Measurement {
     }
 }
 
-/// A rest position so far to the right.
+/// A rest position shifted to the right by `right`.
 pub fn rest(right: Px) -> Rest {
     let markers = [(100, 60), (210, 60), (210, 170), (100, 170)].map(|(x, y)| Marker {
         x: Px::from_int(x) + right,
@@ -128,8 +128,8 @@ fn settings_that_are_none_change_nothing_and_others_begin_anew() {
     assert!(!followed.status.contains(Status::CONTACT), "by its own |F|");
 }
 
-/// After a minute at 100 mN a film whose memory is not known may show millinewtons that are not
-/// there: no contact, until they are more than it may remember.
+/// After a minute at 100 mN, a film of unknown memory may show millinewtons that do not exist. They
+/// are not a contact until they exceed the possible memory.
 #[test]
 fn what_a_film_may_remember_is_no_contact() {
     let mut temporal = Temporal::new();

@@ -1,4 +1,4 @@
-//! Frames at the limits: full, empty, at every border, with the most runs and the most labels, the
+//! Tests frames at the limits: full, empty, at every border, with the most runs and labels, the
 //! largest.
 
 use crate::reference::{Mask, scan, settings};
@@ -172,7 +172,7 @@ fn a_full_house_is_no_overflow() {
         scan(&mut scanner, &mask, 0, 1).status,
         Status::BLOB_OVERFLOW
     );
-    // The next frame starts afresh.
+    // The next frame is not affected.
     assert_eq!(scan(&mut scanner, &mask, 0, 2).status, Status::OK);
 }
 
@@ -257,13 +257,13 @@ fn salt_does_not_fill_the_storage() {
     assert_eq!(checked::<4>(&mask, 200).len(), 4);
 }
 
-/// As many runs as a frame may have are all taken; one more ends it, and a frame after it knows
-/// nothing of that.
+/// A frame with exactly the allowed number of runs is scanned whole; one more run ends it, and the
+/// next frame is not affected.
 #[test]
 fn a_frame_of_more_runs_than_it_may_have_is_left() {
     let mask = Mask::from_fn(64, 20, |x, _| x % 2 == 0);
     let mut scanner = Scanner::<64>::new();
-    // The row with the run too many is the last one that is looked at.
+    // The row that exceeds the number of runs is the last one that is scanned.
     for (max_runs, status, set_pixels) in [
         (640, Status::OK, 640),
         (639, Status::BLOB_OVERFLOW, 640),

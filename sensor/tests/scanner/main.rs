@@ -1,5 +1,5 @@
-//! The scanner through its public face: against a pixel-by-pixel reference, at the limits, and on
-//! what it refuses.
+//! Tests the scanner through its public interface: against a pixel-by-pixel reference, at the
+//! limits, and with input that it refuses.
 
 mod extremes;
 mod random;

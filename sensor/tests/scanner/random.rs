@@ -1,4 +1,4 @@
-//! The scanner against a pixel-by-pixel reference on random masks.
+//! Compares the scanner with a pixel-by-pixel reference on random masks.
 
 use crate::reference::{Mask, scan, settings};
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
@@ -109,7 +109,7 @@ proptest! {
         prop_assert_eq!(scanner.finish(&table), scan(&mut by_mask, &mask, 1, 1));
     }
 
-    /// Whatever the bands in which rows arrive.
+    /// For any bands in which rows arrive.
     #[test]
     fn weights_are_those_of_the_blobs_pixels(
         width in 1..=70_usize,

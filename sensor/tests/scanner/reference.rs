@@ -1,5 +1,5 @@
-//! What the scanner should find, pixel by pixel: dilation by definition, blobs by flood fill,
-//! moments by summing.
+//! Computes what the scanner should find, pixel by pixel: dilation by definition, blobs by flood
+//! fill, moments by summing.
 
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::scanner::{Scan, ScanSettings, Scanner};
@@ -63,12 +63,12 @@ impl Mask {
         })
     }
 
-    /// The blobs in the scanner's order: by their lowest row, then by where they begin in it.
+    /// The blobs in the scanner's order: by their lowest row, then by their first column in it.
     pub fn blobs(&self, min_area: u32) -> Vec<Blob> {
         self.weighted_blobs(min_area, |_, _| 0)
     }
 
-    /// The same, their pixels weighed.
+    /// The same with weighed pixels.
     pub fn weighted_blobs(&self, min_area: u32, weight: impl Fn(usize, usize) -> u8) -> Vec<Blob> {
         let mut left = self.clone();
         let mut found = Vec::new();
@@ -88,7 +88,7 @@ impl Mask {
         blobs.filter(|blob| blob.area >= min_area).collect()
     }
 
-    /// Takes the 8-connected pixels around a set one out of the mask.
+    /// Removes the 8-connected pixels around a set one from the mask.
     fn flood(&mut self, x: usize, y: usize) -> Vec<(usize, usize)> {
         let mut pixels = vec![(x, y)];
         self.bits[y * self.width + x] = false;

@@ -1,4 +1,4 @@
-//! Frames, settings and boxes that do not fit: said, never guessed.
+//! Tests frames, settings and boxes that do not fit: they are reported, never guessed.
 
 use hivtac_sensor::markers::scanner::{ScanError, ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::{ByteTable, Table};
