@@ -1,24 +1,24 @@
-//! The angle of a vector in integers, by a table and a division.
+//! Computes the angle of a vector in integers, with a table and a division.
 //!
-//! Against exact arithmetic, over every input, [`atan2`] is off by at most 0.51 m° (0.5 of it is
-//! the rounding to whole m°); the tests assert it.
+//! Over every input, the error of [`atan2`] is at most 0.51 m°, of which 0.5 is the rounding to
+//! whole m°; the tests assert it.
 //!
-//! With a ≥ b ≥ 0 and k the whole number nearest to 64·b/a, atan(b/a) = atan(k/64) + atan z with
-//! z = (64·b − k·a)/(64·a + k·b). |z| ≤ 1/127, so that z − z³/3 is short of atan z by at most z⁵/5
-//! < 10⁻¹¹. Numbers of 31 bits lose less than 10⁻⁹.
+//! With a ≥ b ≥ 0 and k the integer nearest to 64·b/a, atan(b/a) = atan(k/64) + atan z with z =
+//! (64·b − k·a)/(64·a + k·b). Since |z| ≤ 1/127, z − z³/3 is below atan z by at most z⁵/5 < 10⁻¹¹.
+//! Numbers of 31 bits lose less than 10⁻⁹.
 
 use crate::division::Divisor;
 use crate::fixed::Q;
 use crate::units::MilliDegrees;
 
-/// Fractional bits of m° on the way.
+/// Fractional bits of intermediate m°.
 const BITS: u32 = 14;
-/// m° on the way, at most half a turn.
+/// Intermediate m°, at most half a turn.
 type Angle = Q<BITS, u32>;
 
 const QUARTER_TURN: Angle = Q::from_bits(90_000 << BITS);
 const HALF_TURN: Angle = Q::from_bits(180_000 << BITS);
-/// m°.
+/// A radian in m°.
 const RADIAN: Q<8, u64> = Q::from_bits(14_667_720);
 
 /// atan(k/64) in m° · 2¹⁴, rounded.
@@ -90,7 +90,8 @@ const STEPS: [u32; 65] = [
     737_280_000,
 ];
 
-/// The angle of (x, y) from the x axis towards y, −180,000 < angle ≤ 180,000 m°; 0 for (0, 0).
+/// Returns the angle of (x, y) from the x axis towards y, −180,000 < angle ≤ 180,000 m°; 0 for (0,
+/// 0).
 pub fn atan2(y: i64, x: i64) -> MilliDegrees {
     let [across, along] = normalized([y.unsigned_abs(), x.unsigned_abs()]);
     let acute = if across <= along {
@@ -107,7 +108,7 @@ pub fn atan2(y: i64, x: i64) -> MilliDegrees {
     })
 }
 
-/// Both shifted alike until the larger has 31 bits; zeros remain.
+/// Shifts both numbers equally until the larger has 31 bits; zeros remain.
 fn normalized(parts: [u64; 2]) -> [u32; 2] {
     let zeros = (parts[0] | parts[1]).leading_zeros();
     parts.map(|part| match zeros {
@@ -151,7 +152,7 @@ mod tests {
         assert!((RADIAN.bits() as f64 / 256.0 - 1f64.to_degrees() * 1e3).abs() < 2e-3);
     }
 
-    /// Error in m°, the short way round the circle.
+    /// Error in m°, the shorter way round the circle.
     fn error(y: i64, x: i64) -> f64 {
         let exact = (y as f64).atan2(x as f64).to_degrees() * 1e3;
         let error = (f64::from(atan2(y, x).0) - exact).abs();

@@ -1,45 +1,46 @@
-//! How a user sets the camera: exposure, gain, and how often it sends a frame.
+//! Defines a user's camera settings: exposure, gain, and frame rate.
 
 use crate::units::{Microseconds, Sixteenths};
 use core::fmt;
 
-/// How the camera is set. What is `None` is found by what the light needs, and then stays.
+/// The settings of the camera. Values that are `None` are chosen once to suit the light, and then
+/// stay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct CameraSettings {
-    /// How long each row is exposed, within [`RateLimits`].
+    /// Exposure of each row, within [`RateLimits`].
     pub exposure: Option<Microseconds>,
-    /// How much what was exposed is amplified, [`LEAST_GAIN`] to [`MOST_GAIN`].
+    /// Amplification, [`LEAST_GAIN`] to [`MOST_GAIN`].
     pub gain: Option<Sixteenths>,
-    /// How often it sends a frame.
+    /// Frame rate.
     pub rate: Rate,
 }
 
-/// How often a camera sends a frame, of what it can at most.
+/// Frame rate of a camera, relative to its highest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub enum Rate {
-    /// As often as it can.
+    /// The highest rate.
     #[default]
     Full,
-    /// Half as often: twice as much time for light.
+    /// Half of it: twice as much time for light.
     Half,
-    /// A quarter as often.
+    /// A quarter of it.
     Quarter,
 }
 
-/// Least gain.
+/// Smallest gain.
 pub const LEAST_GAIN: Sixteenths = Sixteenths(16);
-/// Most gain: beyond it noise costs more than light gains.
+/// Largest gain: beyond it noise costs more than light gains.
 pub const MOST_GAIN: Sixteenths = Sixteenths(64);
 
-/// What a camera can be set to at each of [`Rate::ALL`].
+/// A camera's limits at each of [`Rate::ALL`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -47,7 +48,7 @@ pub const MOST_GAIN: Sixteenths = Sixteenths(64);
 )]
 pub struct CameraLimits(pub [RateLimits; 3]);
 
-/// What a camera can be set to at one rate.
+/// A camera's limits at one rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -62,20 +63,20 @@ pub struct RateLimits {
     pub longest: Microseconds,
 }
 
-/// A setting that the camera does not take.
+/// The setting that the camera does not accept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum CameraError {
     /// [`CameraSettings::exposure`] is not within these limits.
     Exposure(RateLimits),
-    /// [`CameraSettings::gain`].
+    /// [`CameraSettings::gain`] is out of range.
     Gain,
 }
 
 impl Rate {
-    /// All of them, the most frames first.
+    /// All rates, highest first.
     pub const ALL: [Rate; 3] = [Rate::Full, Rate::Half, Rate::Quarter];
 
-    /// By how much frames take longer than at the full rate.
+    /// Factor by which frames take longer than at the full rate.
     pub const fn divisor(self) -> u32 {
         match self {
             Rate::Full => 1,
@@ -86,7 +87,7 @@ impl Rate {
 }
 
 impl RateLimits {
-    /// Of so many frames a second, with the shortest and the longest exposure.
+    /// Limits with this number of frames a second, and the shortest and the longest exposure.
     pub const fn new(frames_per_second: u16, [shortest, longest]: [Microseconds; 2]) -> RateLimits {
         RateLimits {
             frames_per_second,
@@ -97,7 +98,7 @@ impl RateLimits {
 }
 
 impl CameraLimits {
-    /// Those at a rate.
+    /// The limits at a rate.
     pub const fn at(&self, rate: Rate) -> RateLimits {
         let CameraLimits([full, half, quarter]) = *self;
         match rate {
@@ -107,10 +108,10 @@ impl CameraLimits {
         }
     }
 
-    /// Whether the camera can be set so.
+    /// Checks whether the camera accepts these settings.
     ///
     /// # Errors
-    /// The first setting that it does not take.
+    /// The first setting that it does not accept.
     pub fn check(&self, settings: &CameraSettings) -> Result<(), CameraError> {
         let limits = self.at(settings.rate);
         let can = |exposure| (limits.shortest..=limits.longest).contains(&exposure);

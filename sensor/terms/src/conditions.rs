@@ -1,6 +1,7 @@
-//! What changes the features of a frame beside its geometry and threshold, and what forces mean.
+//! Defines further conditions of a frame's features, in addition to geometry and threshold, and the
+//! meaning of α and β.
 
-/// How a marker's position is taken from its pixels.
+/// How a marker's position is computed from its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -10,8 +11,8 @@
 pub enum CentroidEstimator {
     /// The mean of its pixels in the mask (the paper's).
     BinaryMask,
-    /// The mean of the same pixels, each weighted with how much of it a marker covers: by the
-    /// redness of RGB565, the Cr of YUV422, the luma of mono.
+    /// The mean of the same pixels, each weighted by how much of it a marker covers: by the redness
+    /// of RGB565, the Cr of YUV422, the luma of mono.
     RednessWeighted,
 }
 
@@ -25,7 +26,7 @@ impl CentroidEstimator {
     }
 }
 
-/// What α and β label.
+/// The meaning of α and β.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ContactReading {
     /// The direction of the force on the film.

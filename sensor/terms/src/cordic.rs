@@ -1,14 +1,13 @@
-//! Sine and cosine of an angle in integers, by rotation in ever smaller steps (CORDIC).
+//! Computes sine and cosine of an angle in integers, by rotation in ever smaller steps (CORDIC).
 //!
-//! Against exact arithmetic, over every input, [`sin_cos`] is off by at most 4 · 2⁻³⁰; the tests
-//! assert it.
+//! Over every input, the error of [`sin_cos`] is at most 4 · 2⁻³⁰; the tests assert it.
 
 use crate::fixed::Q;
 use crate::units::MilliDegrees;
 
 /// Rotations. The last turns by 2⁻³¹ rad = 2.7 · 10⁻⁵ m°.
 const STEPS: usize = 32;
-/// Fractional bits of an angle while it is turned: 1 m° = 2²⁰.
+/// Fractional bits of the angle during the rotation: 1 m° = 2²⁰.
 const ANGLE_BITS: u32 = 20;
 const HALF_TURN: i64 = 180_000 << ANGLE_BITS;
 
@@ -47,13 +46,13 @@ const STEP_ANGLES: [i64; STEPS] = [
     56,
     28,
 ];
-/// Π cos(atan(2⁻ⁱ)) · 2⁶⁰: what every rotation by all steps divides a length by.
+/// Π cos(atan(2⁻ⁱ)) · 2⁶⁰, the inverse of the factor by which all steps together stretch a vector.
 const GAIN_INVERSE: i64 = 700_114_967_507_363_239;
 
-/// (sin, cos) of an angle.
+/// Returns (sin, cos) of an angle.
 pub fn sin_cos(angle: MilliDegrees) -> (Q<30>, Q<30>) {
     let turns = i64::from(angle.0).rem_euclid(360_000) << ANGLE_BITS;
-    // The steps reach ±99°: fold the other half of the circle onto this one.
+    // The steps reach ±99°: the other half of the circle is folded onto this one.
     let (mut left, flipped) = match turns {
         t if t <= HALF_TURN / 2 => (t, false),
         t if t <= HALF_TURN + HALF_TURN / 2 => (t - HALF_TURN, true),
@@ -69,7 +68,7 @@ pub fn sin_cos(angle: MilliDegrees) -> (Q<30>, Q<30>) {
             left += step_angle;
         }
     }
-    // Sizes of at most one, and a few steps more.
+    // At most 1, plus a few steps of rounding.
     let rounded = |value| Q::<60, i64>::from_bits(value).rounded_to().narrowed();
     let sign = if flipped { -1 } else { 1 };
     (rounded(y) * sign, rounded(x) * sign)

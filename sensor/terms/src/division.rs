@@ -1,23 +1,23 @@
-//! Exact quotients of 64 bits from 32-bit instructions, several times as fast on a Cortex-M as the
-//! compiler's library.
+//! Divides 64-bit numbers exactly with 32-bit instructions, several times as fast on a Cortex-M as
+//! the compiler's library.
 //!
-//! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, two words divided by d take
+//! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, dividing two words by d takes
 //! two products and two corrections (Möller and Granlund, *Improved division by invariant
-//! integers*, 2011, Algorithm 4). v itself takes two divisions of 32 bits and is made once for all
-//! that is divided by d.
+//! integers*, 2011, Algorithm 4). v itself takes two divisions of 32 bits, and is computed once for
+//! all dividends.
 
 /// A divisor, for any number of dividends.
 #[derive(Clone, Copy, Debug)]
 pub struct Divisor {
-    /// Shifted until its highest bit is set.
+    /// The divisor, shifted until its highest bit is set.
     normalized: u32,
     shift: u32,
-    /// v.
+    /// The v of Algorithm 4.
     reciprocal: u32,
 }
 
 impl Divisor {
-    /// Of a number that is at least 1; 0 divides as 1 does.
+    /// A divisor of at least 1; 0 divides as 1 does.
     #[inline(never)]
     pub fn new(divisor: u32) -> Divisor {
         let divisor = divisor.max(1);
@@ -30,11 +30,11 @@ impl Divisor {
         }
     }
 
-    /// ⌊`dividend` / divisor⌋.
+    /// Returns ⌊`dividend` / divisor⌋.
     #[inline(never)]
     pub fn quotient(&self, dividend: u64) -> u64 {
         let (high, low) = ((dividend >> 32) as u32, dividend as u32);
-        // What a shift to the left by 0 to 31 moves from a word into the one above.
+        // The bits that a left shift by 0 to 31 moves from a word into the next higher one.
         let carried = |word: u32| (word >> 1) >> (31 - self.shift);
         let (top, middle) = (carried(high), (high << self.shift) | carried(low));
         let (upper, rest) = if top == 0 && middle < self.normalized {
@@ -46,13 +46,14 @@ impl Divisor {
         u64::from(upper) << 32 | u64::from(lower)
     }
 
-    /// `dividend` / divisor, rounded towards zero as `/` does.
+    /// Returns `dividend` / divisor, rounded towards zero as `/` does.
     pub fn signed_quotient(&self, dividend: i64) -> i64 {
         let quotient = self.quotient(dividend.unsigned_abs()) as i64;
         if dividend < 0 { -quotient } else { quotient }
     }
 
-    /// Quotient and remainder of `high`·B + `low` by the normalized divisor, which is above `high`.
+    /// Quotient and remainder of `high`·B + `low` by the normalized divisor, which must be above
+    /// `high`.
     #[inline(always)]
     fn step(&self, high: u32, low: u32) -> (u32, u32) {
         let divisor = self.normalized;
@@ -72,10 +73,10 @@ impl Divisor {
     }
 }
 
-/// ⌊(B² − 1)/d⌋ − B = ⌊((B − 1 − d)·B + B − 1) / d⌋ for d of B/2 or more, a half word at a time.
+/// ⌊(B² − 1)/d⌋ − B = ⌊((B − 1 − d)·B + B − 1) / d⌋ for d of B/2 or more, computed by half words.
 #[inline(always)]
 fn reciprocal(divisor: u32) -> u32 {
-    // The upper half has its highest bit set, which the compiler is told here.
+    // The upper half always has its highest bit set; setting it here shows that to the compiler.
     let (upper, lower) = (divisor >> 16 | 1 << 15, divisor & 0xffff);
     // A digit from the divisor's upper half is at most 2 too large.
     let digit = |rest: u32| {
@@ -98,7 +99,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// Numbers of any length, and those next to powers of two.
+    /// Numbers of any length, and neighbours of powers of two.
     fn numbers() -> impl Strategy<Value = u64> {
         let any_length = (any::<u64>(), 0..64u32).prop_map(|(number, shift)| number >> shift);
         let next_to_powers =
@@ -115,7 +116,7 @@ mod tests {
         let by_formula = |divisor: u32| (u64::MAX / u64::from(divisor) - (1 << 32)) as u32;
         let lowest = 1u32 << 31;
         for near in 0..100_000 {
-            // From both ends, and around the places where a half word is full.
+            // From both ends, and near full half words.
             for divisor in [lowest + near, !near, lowest + (near << 14), !(near << 14)] {
                 assert_eq!(reciprocal(divisor), by_formula(divisor), "{divisor:#x}");
                 let spread = near.wrapping_mul(0x9e37_79b9) | lowest;

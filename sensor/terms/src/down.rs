@@ -1,4 +1,4 @@
-//! Which way the sensor is held: where gravity pulls on its film.
+//! Defines which way the sensor is held: where gravity pulls on its film.
 
 /// What is known of gravity on a sensor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -7,17 +7,17 @@
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub enum Down {
-    /// It pulls as when the rest position was taken: the sensor is never turned.
+    /// Gravity is as when the rest position was taken: the sensor is never turned.
     #[default]
     Fixed,
-    /// The sensor may be turned, and nobody says how.
+    /// The sensor may be turned, in an unknown way.
     Unknown,
-    /// It pulls this way.
+    /// Gravity pulls in this direction, set by the host.
     Told(Direction),
 }
 
 impl Down {
-    /// Where it pulls, where somebody said.
+    /// The direction, if it was set by the host.
     pub fn told(self) -> Option<Direction> {
         match self {
             Down::Told(direction) => Some(direction),
@@ -26,8 +26,8 @@ impl Down {
     }
 }
 
-/// A direction in the film's frame: x right and y down in the image, z away from the camera. Its
-/// length is one to 2 ‰, in thousandths.
+/// A direction in the film frame: x right and y down in the image, z away from the camera. A vector
+/// of length 1 to 2 ‰, in thousandths.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -37,18 +37,17 @@ pub struct Direction(pub [i16; 3]);
 
 /// Thousandths of a length of one.
 const ONE: f32 = 1000.0;
-/// The least and the largest square of a length: rounding is at most half a thousandth along each
-/// axis.
+/// Allowed square of the length: rounding changes each axis by at most half a thousandth.
 const SQUARES: core::ops::RangeInclusive<i32> = 996_000..=1_004_000;
 
 impl Direction {
-    /// Of a vector of length one.
+    /// The direction of a vector of length 1.
     pub fn of_unit(vector: [f32; 3]) -> Direction {
         let rounded = |part: f32| (ONE * part + 0.5_f32.copysign(part)) as i16;
         Direction(vector.map(rounded))
     }
 
-    /// Whether its length is one.
+    /// Returns whether the length is 1, within the rounding.
     pub fn is_sound(self) -> bool {
         let squares = self
             .0
@@ -57,7 +56,7 @@ impl Direction {
         SQUARES.contains(&squares.fold(0, i32::saturating_add))
     }
 
-    /// As a vector of length one.
+    /// Returns the direction as a vector of length 1.
     pub fn to_unit(self) -> [f32; 3] {
         self.0.map(|part| f32::from(part) / ONE)
     }

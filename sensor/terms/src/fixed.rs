@@ -1,11 +1,11 @@
-//! Fixed point: numbers whose type says how many of their bits are a fraction.
+//! Defines fixed-point numbers: the type states how many bits are a fraction.
 
 use core::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// A number in fixed point: an integer over 2^`F`. Its unit, when it has one, is said where it is
-/// declared. In memory, in messages and in files it is that integer.
+/// A fixed-point number: an integer over 2^`F`. Its unit, if it has one, is stated where it is
+/// declared. In memory, messages and files it is that integer.
 ///
-/// Operators are those of the integer: they overflow as it does.
+/// Operators are those of the integer, and overflow as it does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(transparent)]
 #[cfg_attr(
@@ -35,17 +35,17 @@ impl<const F: u32, T: Copy> Q<F, T> {
 macro_rules! integers {
     ($($integer:ty)*) => {$(
         impl<const F: u32> Q<F, $integer> {
-            /// The largest whole number that is not above it.
+            /// The largest integer that is not above it.
             pub const fn floor(self) -> $integer {
                 self.0 >> F
             }
 
-            /// The nearest whole number; halves round up. Adding the half must not overflow.
+            /// The nearest integer; halves round up. Adding the half must not overflow.
             pub const fn rounded(self) -> $integer {
                 (self.0 + const { 1 << (F - 1) }) >> F
             }
 
-            /// As floating point, for display, files and tests: exact up to 2⁵³ bits.
+            /// As floating point, for display, files and tests; exact up to 2⁵³.
             pub fn to_f64(self) -> f64 {
                 self.0 as f64 / (1_u64 << F) as f64
             }
@@ -62,32 +62,33 @@ impl<const F: u32> From<Q<F, i16>> for Q<F> {
 }
 
 impl<const F: u32> Q<F, i64> {
-    /// A whole number, |`whole`| < 2^(63 − `F`).
+    /// An integer, |`whole`| < 2^(63 − `F`).
     pub const fn from_int(whole: i64) -> Self {
         Q(whole << F)
     }
 
-    /// With fewer fractional bits, those beyond them cut off.
+    /// With fewer fractional bits; the others are cut off.
     pub const fn floor_to<const G: u32>(self) -> Q<G, i64> {
         Q(self.0 >> const { F - G })
     }
 
-    /// With fewer fractional bits, to nearest; halves round up. Adding the half must not overflow.
+    /// With fewer fractional bits, rounded to nearest; halves round up. Adding the half must not
+    /// overflow.
     pub const fn rounded_to<const G: u32>(self) -> Q<G, i64> {
         Q((self.0 + const { 1 << (F - G - 1) }) >> const { F - G })
     }
 
-    /// The same number in 32 bits, which must hold it.
+    /// The same number in 32 bits, which must be enough.
     pub const fn narrowed(self) -> Q<F> {
         Q(self.0 as i32)
     }
 
-    /// The sum, or the limit that it is beyond.
+    /// The sum, saturated at the limits.
     pub const fn saturating_add(self, other: Self) -> Self {
         Q(self.0.saturating_add(other.0))
     }
 
-    /// The difference, or the limit that it is beyond.
+    /// The difference, saturated at the limits.
     pub const fn saturating_sub(self, other: Self) -> Self {
         Q(self.0.saturating_sub(other.0))
     }
@@ -120,7 +121,7 @@ impl<const F: u32, T: Neg<Output = T>> Neg for Q<F, T> {
     }
 }
 
-/// Times a whole number.
+/// Multiplies by an integer.
 impl<const F: u32, T: Mul<Output = T>> Mul<T> for Q<F, T> {
     type Output = Self;
     fn mul(self, times: T) -> Self {
@@ -162,7 +163,7 @@ mod tests {
     }
 
     proptest! {
-        /// Against exact arithmetic: the error of a rounding is at most half a step of the result.
+        /// Compared with exact arithmetic, the rounding error is at most half a step of the result.
         #[test]
         fn fewer_bits_are_the_nearest(bits in -(1_i64 << 61)..1 << 61) {
             let exact = Q::<32, i64>::from_bits(bits);

@@ -1,4 +1,4 @@
-//! What a frame gives: a force on the film, and where it touches.
+//! Defines the result of a frame: a force on the film, and where it touches.
 
 use crate::units::{
     MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
@@ -20,20 +20,20 @@ pub struct Force {
     pub beta: MilliDegrees,
     /// |F| ≥ 0.
     pub magnitude: MicroNewtons,
-    /// (Fx, Fy, Fz): |F| in the direction of α and β. Where a model's angles are those of the
-    /// pressing direction (`stick`, `slip`), it is |F| along that.
+    /// (Fx, Fy, Fz): |F| in the direction of α and β. If a model's angles are those of the pressing
+    /// direction (`stick`, `slip`), the vector points along that.
     pub cartesian: [MicroNewtons; 3],
     /// Standard uncertainty of the direction, at most 180°: 95 of 100 true directions are within
     /// 1.731 times this angle of the one found.
     pub direction_sigma: UnsignedMilliDegrees,
-    /// Standard uncertainty of |F|: 95 of 100 are within 1.960 times this.
+    /// Standard uncertainty of |F|: 95 of 100 true values are within 1.960 times this.
     pub magnitude_sigma: UnsignedMicroNewtons,
-    /// Where the tip touches the film; `None` from a model that does not tell.
+    /// Where the tip touches the film; `None` if the model has no place outputs.
     pub place: Option<Place>,
 }
 
-/// The point of the film that the tip touches, by where it rests in the film frame: (0, 0) is the
-/// film's middle.
+/// The point of the film under the tip, named by its position at rest in the film frame; (0, 0) is
+/// the film's middle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -45,7 +45,7 @@ pub struct Place {
     /// Down in the image.
     pub y: SignedMicrometres,
     /// Standard uncertainty of each coordinate: the root of half the trace of their 2×2 covariance.
-    /// Where that is the same in all directions, 95 of 100 true places lie within 2.448 times this
-    /// length of the one found.
+    /// If the covariance is the same in all directions, 95 of 100 true places are within 2.448
+    /// times this distance of the one found.
     pub sigma: Micrometres,
 }

@@ -1,4 +1,5 @@
-//! What the sensing needs to know of lens and markers to tell a marker from another red thing.
+//! Defines the geometry of lens and markers, by which a marker is distinguished from other red
+//! objects.
 
 use crate::angle::atan2;
 use crate::cordic::sin_cos;
@@ -30,11 +31,11 @@ pub struct Geometry {
 /// The geometries that the project knows by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Preset {
-    /// The paper's camera: f = 2.1 mm, 150° across the frame's diagonal whatever its size.
+    /// The paper's camera: f = 2.1 mm, 150° across the frame's diagonal, whatever its size.
     Paper,
     /// The same lens on an OV7725: 640 × 480 pixels of 6 µm, binned or scaled to the frame's width.
     Ov7725,
-    /// A lens of 1.2 mm on an MT9V034, whose pixels of 6 µm are binned 2 × 2: 12 µm whatever part
+    /// A lens of 1.2 mm on an MT9V034, whose pixels of 6 µm are binned 2 × 2: 12 µm, whatever part
     /// of them is sent.
     Mt9v034,
 }
@@ -43,7 +44,7 @@ impl Preset {
     /// Every preset, in the order in which the model file numbers them.
     pub const ALL: [Preset; 3] = [Preset::Paper, Preset::Ov7725, Preset::Mt9v034];
 
-    /// The name in files, on the command line and in the hello.
+    /// Its name in files, on the command line and in the hello.
     pub const fn name(self) -> &'static str {
         match self {
             Preset::Paper => "paper",
@@ -52,7 +53,7 @@ impl Preset {
         }
     }
 
-    /// The preset of that name.
+    /// Returns the preset with this name; `None` if there is no such preset.
     pub fn from_name(name: &str) -> Option<Preset> {
         Preset::ALL.into_iter().find(|preset| preset.name() == name)
     }
@@ -72,7 +73,7 @@ impl FromStr for Preset {
     }
 }
 
-/// No preset has such a name.
+/// There is no preset with this name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct UnknownPreset;
 
@@ -85,16 +86,16 @@ impl fmt::Display for UnknownPreset {
 
 impl core::error::Error for UnknownPreset {}
 
-/// 6/(5π): a frame's diagonal, in pixels, to the focal length that makes it 150° (5π/6) wide.
+/// 6/(5π): converts a frame's diagonal, px, to the focal length that makes it 150° (5π/6) wide.
 const DIAGONAL_TO_FOCAL: Q<32, u64> = Q::from_bits(1_640_556_661);
-/// 2.1 mm / (640 · 6 µm): an OV7725 frame's width to its focal length, both in pixels. Exact.
+/// 2.1 mm / (640 · 6 µm): converts an OV7725 frame's width to its focal length, both in px. Exact.
 const OV7725_WIDTH_TO_FOCAL: Q<16> = Q::from_bits(35_840);
 /// 1.2 mm / 12 µm.
 const MT9V034_FOCAL: Px = Px::from_int(100);
 
-/// A metre: nothing here is larger.
+/// Largest measure: a metre.
 const LARGEST_MEASURE: Micrometres = Micrometres(1_000_000);
-/// A radian in m°, to 4 · 10⁻⁶ of itself.
+/// A radian in m°, exact to 4 · 10⁻⁶ relative.
 const RADIAN: i64 = 57_296;
 /// π/4.
 const QUARTER_PI: Q<30> = Q::from_bits(843_314_857);
@@ -123,8 +124,8 @@ impl Geometry {
         (half_span(self.width), half_span(self.height))
     }
 
-    /// Whether all measures are positive and none is beyond a metre, and the markers do not cover
-    /// each other.
+    /// Returns whether all measures are positive and at most a metre, and the markers do not
+    /// overlap.
     pub const fn is_sound(&self) -> bool {
         let diameter = self.marker_diameter.0;
         let radius = self.marker_radius.0;
@@ -136,8 +137,7 @@ impl Geometry {
             && self.film_distance.0 <= LARGEST_MEASURE.0
     }
 
-    /// Area of a marker's image at rest, px, rounded down, when the mask adds `edge` to its
-    /// diameters.
+    /// Area of a marker's image at rest, px, rounded down. The mask adds `edge` to its diameters.
     pub fn rest_area(&self, edge: Px) -> u32 {
         let across = self.across(self.rest_distance());
         let along = self.along_flat(self.rest_distance());
@@ -158,9 +158,9 @@ impl Geometry {
         ))
     }
 
-    /// Diameter, across the radius, of the image of a marker at `distance` from the axis:
-    /// distance·d/R. A lens that is symmetric about its axis shows a circle about the axis as a
-    /// circle, so this holds for any lens and any height or tilt of the film.
+    /// Diameter of a marker's image across the radius, at `distance` from the axis: distance·d/R. A
+    /// lens that is symmetric about its axis images a circle about the axis as a circle. So this
+    /// holds for any lens, and any height or tilt of the film.
     pub fn across(&self, distance: Px) -> Px {
         let product = i64::from(distance.0) * i64::from(self.marker_diameter.0);
         Px::saturated(Q::from_bits(
@@ -168,8 +168,8 @@ impl Geometry {
         ))
     }
 
-    /// Diameter, along the radius, of the image of a marker on a flat film: f·d·sin θ·cos θ/R with
-    /// θ = distance/f.
+    /// Diameter of a marker's image along the radius, on a flat film: f·d·sin θ·cos θ/R with θ =
+    /// distance/f.
     pub fn along_flat(&self, distance: Px) -> Px {
         let theta = i64::from(distance.0) * RADIAN / i64::from(self.focal.0.max(1));
         let theta = theta.clamp(1, 90_000);
@@ -181,9 +181,9 @@ impl Geometry {
     }
 }
 
-/// 2.1 mm over a pitch that makes the diagonal 150°: the pitch cancels out.
+/// 2.1 mm over a pixel pitch that makes the diagonal 150°: the pitch cancels out.
 const fn paper_focal(width: u64, height: u64) -> Px {
-    // In 1/65,536 px, as the root of 2³² times a square.
+    // In 1/65,536 px: the root of 2³² times a square.
     let diagonal = ((width * width + height * height) << 32).isqrt();
     Px(((diagonal * DIAGONAL_TO_FOCAL.bits() + (1 << 31)) >> 32) as i32)
 }

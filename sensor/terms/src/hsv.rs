@@ -1,8 +1,8 @@
-//! OpenCV's 8-bit HSV of an RGB565 pixel, in integers.
+//! Converts RGB565 pixels to OpenCV's 8-bit HSV, in integers.
 //!
 //! `cv2.cvtColor(…, COLOR_RGB2HSV)` on 8-bit pictures multiplies by tables of rounded reciprocals
-//! with twelve fractional bits. The same products are made here, so that the result is the same for
-//! every pixel; `tests/opencv.rs` holds all 65,536 of them against OpenCV's own output.
+//! with twelve fractional bits. The same products are used here, so every pixel gives the same
+//! result. `tests/opencv.rs` compares all 65,536 of them with OpenCV's own output.
 
 use crate::fixed::Q;
 
@@ -20,7 +20,7 @@ pub struct Hsv {
     pub value: u8,
 }
 
-/// The 8-bit red, green and blue of an RGB565 pixel (red in bits 15–11), by repeating the high bits
+/// The 8-bit red, green and blue of an RGB565 pixel (red in bits 15–11). The high bits are repeated
 /// below the low ones: black stays 0 and white becomes 255.
 pub const fn rgb888(pixel: u16) -> [u8; 3] {
     let red = (pixel >> 11) as u8;
@@ -52,8 +52,8 @@ impl Hsv {
     }
 }
 
-/// Hue in units of 1/180 turn: the position within the third around the largest channel. Where two
-/// are largest, both thirds give the same hue.
+/// Hue in units of 1/180 turn: the position within the third around the largest channel. If two
+/// channels are largest, both thirds give the same hue.
 fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
     let [r, g, b] = [i32::from(red), i32::from(green), i32::from(blue)];
     let sixths = match value {
@@ -62,11 +62,11 @@ fn hue([red, green, blue]: [u8; 3], value: u8, chroma: i32) -> u8 {
         _ => r - g + 4 * chroma,
     };
     let hue = (reciprocal(30, chroma) * sixths).rounded();
-    // Between −30 and 150 before a turn is added, and never so little below 0 that it becomes 180.
+    // From −30 to 150 before adding a turn, and never so close below 0 that the sum would be 180.
     (if hue < 0 { hue + 180 } else { hue }) as u8
 }
 
-/// `scale / divisor`, rounded to nearest (no quotient with a divisor below 256 is a tie); 0 for a
+/// `scale / divisor`, rounded to nearest (no quotient is a tie for divisors below 256); 0 for a
 /// divisor of 0.
 const fn reciprocal(scale: i32, divisor: i32) -> Q<SHIFT> {
     Q::from_bits(match divisor {

@@ -1,7 +1,8 @@
-//! The words that both ends share, each once: units, status, threshold, marker, force, and what a
-//! frame is like; and the integer arithmetic that the sensing's parts share.
+//! Defines the terms that device and host share, each once: units, status, threshold, marker,
+//! force, and properties of a frame. Also holds the integer arithmetic that the sensing's parts
+//! share.
 //!
-//! Feature `wire` lets messages carry them (`docs/wire.md`).
+//! Feature `wire` makes them part of messages (`docs/wire.md`).
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,9 +1,9 @@
-//! Markers: the four dots as an image shows them.
+//! Defines markers: the four dots as an image shows them.
 
 use crate::units::Px;
 
-/// One of the four dots. Its identity is its index: 0 upper left, 1 upper right, 2 lower right, 3
-/// lower left as the image shows them.
+/// One of the four dots. Its index is its identity: 0 upper left, 1 upper right, 2 lower right, 3
+/// lower left, as seen in the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -14,6 +14,6 @@ pub struct Marker {
     pub x: Px,
     /// Centroid, row.
     pub y: Px,
-    /// Pixels in the mask, after dilation.
+    /// Number of pixels in the mask, after dilation.
     pub area: u32,
 }

@@ -1,12 +1,12 @@
-//! Square roots of 64 bits from 32-bit instructions: exact, and several times as fast on a Cortex-M
-//! as the compiler's library.
+//! Computes square roots of 64 bits with 32-bit instructions: exact, and several times as fast on a
+//! Cortex-M as the compiler's library.
 //!
-//! Heron's rule from a root of eight bits: a root that is off by e becomes one that is off by
-//! e²/2√n. In units of the last place an error of at most 1 of 8 bits becomes at most 1 of 16, and
-//! that one at most 1 of 32; each quotient that is rounded down takes up to 1 off.
+//! Heron's rule, starting from a root of eight bits: an error e becomes e²/2√n. In units of the
+//! last place, an error of at most 1 in 8 bits becomes at most 1 in 16, and that one at most 1 in
+//! 32. Each quotient that is rounded down subtracts up to 1.
 
-/// √(256·m + 128) for m of 64 to 255, rounded to nearest: off the roots of 256·m to 256·m + 255 by
-/// at most 1.
+/// √(256·m + 128) for m of 64 to 255, rounded to nearest: within 1 of the roots of 256·m to 256·m +
+/// 255.
 const EIGHT_BITS: [u8; 192] = {
     let mut roots = [0; 192];
     let mut at = 0;
@@ -26,12 +26,12 @@ pub fn root(square: u64) -> u32 {
     if square == 0 {
         return 0;
     }
-    // An even shift makes it 2⁶² or more.
+    // An even shift makes it at least 2⁶².
     let shift = square.leading_zeros() & !1;
     let scaled = square << shift;
     let high = (scaled >> 32) as u32;
     let sixteen = sixteen_bits(high);
-    // 2¹⁵·sixteen + (scaled >> 17)/sixteen, a half word at a time: the dividend has 47 bits.
+    // 2¹⁵·sixteen + (scaled >> 17)/sixteen, divided by half words: the dividend has 47 bits.
     let (upper, lower) = (high >> 1, (scaled >> 17) as u32 & 0xffff);
     let first = upper / sixteen;
     let second = (upper - first * sixteen) << 16 | lower;
@@ -39,17 +39,17 @@ pub fn root(square: u64) -> u32 {
     corrected(estimate, scaled) >> (shift / 2)
 }
 
-/// √`high` of one that is 2³⁰ or more, off by at most 1: 2¹⁵ to 2¹⁶.
+/// √`high` for `high` ≥ 2³⁰, with an error of at most 1: 2¹⁵ to 2¹⁶.
 #[inline(always)]
 fn sixteen_bits(high: u32) -> u32 {
-    // The index is 0 to 191; every root has its highest bit set, and so is not 0.
+    // The index is 0 to 191. Every root has its highest bit set, so it is not 0.
     let index = ((high >> 24) as usize).wrapping_sub(64);
     let eight = u32::from(EIGHT_BITS.get(index).copied().unwrap_or_default()) | 0x80;
     (eight << 7) + (high >> 9) / eight
 }
 
-/// The root of a square of 2⁶² or more from one that is off by at most 1. The least root is 2³¹;
-/// what passes 2³² − 1 wraps and is set right.
+/// The root of a square ≥ 2⁶², from an estimate with an error of at most 1. The smallest root is
+/// 2³¹; an estimate beyond 2³² − 1 has wrapped and is corrected.
 fn corrected(estimate: u32, square: u64) -> u32 {
     let estimate = if estimate < 1 << 30 {
         u32::MAX
@@ -87,7 +87,7 @@ mod tests {
         (0..1 << 12).for_each(|below| check(u64::MAX - below));
     }
 
-    /// Next to squares of roots all over the range, and at the borders of the table's steps.
+    /// Neighbours of squares of roots over the whole range, and of the table's steps.
     #[test]
     fn next_to_squares() {
         let spread = (0..2_000_000u64).map(|at| at.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32);

@@ -1,6 +1,7 @@
-//! Why a sample has no force, or how far its force can be trusted (`docs/wire.md`).
+//! Defines the status of a sample: why it has no force, or how far its force can be trusted
+//! (`docs/wire.md`).
 
-/// A set of status bits; a receiver ignores bits it does not know.
+/// A set of status bits; a receiver ignores bits that it does not know.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -21,29 +22,28 @@ macro_rules! bits {
 bits! {
     /// Fewer than four markers were found: no force.
     MARKERS_MISSING = 0, "markers_missing";
-    /// More than one reading of the blobs as four markers is plausible, or none is: no force.
+    /// The blobs can be read as four markers in more than one plausible way, or in none: no force.
     MARKERS_AMBIGUOUS = 1, "markers_ambiguous";
-    /// More blobs than the fixed storage holds, or more runs than noise is given time for: no
+    /// More blobs than the fixed storage holds, or more runs than a frame of noise is allowed: no
     /// force.
     BLOB_OVERFLOW = 2, "blob_overflow";
     /// Areas or shapes of the four markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
-    /// |F| lies outside the range that the model was calibrated for, or the markers moved farther
-    /// than the model can take in.
+    /// |F| is outside the range that the model was calibrated for, or the markers moved farther than the model's inputs can represent.
     MAGNITUDE_OUT_OF_RANGE = 4, "magnitude_out_of_range";
-    /// The force is too small for its direction to mean much; its size is still good.
+    /// The force is too small for a reliable direction; its size is still good.
     DIRECTION_UNRELIABLE = 5, "direction_unreliable";
     /// Most of the image passed the threshold, or clipped: no force.
     IMAGE_SATURATED = 6, "image_saturated";
-    /// Nothing passed the threshold: no light, or the lens is covered; no force.
+    /// No pixel passed the threshold: no light, or the lens is covered; no force.
     IMAGE_DARK = 7, "image_dark";
     /// The frame had fewer or more rows, or rows of another width, than announced: no force.
     FRAME_INCOMPLETE = 8, "frame_incomplete";
-    /// At least one frame between this sample and the one before was exposed but not processed.
+    /// At least one frame between this sample and the previous one was exposed but not processed.
     FRAME_DROPPED = 9, "frame_dropped";
-    /// The camera interface overran since the sample before.
+    /// The camera interface overran since the previous sample.
     CAPTURE_OVERRUN = 10, "capture_overrun";
-    /// The camera had been silent and was started again since the sample before.
+    /// The camera was silent and was restarted since the previous sample.
     CAMERA_RESTARTED = 11, "camera_restarted";
     /// No rest position was taken on this unit: the model's own was used.
     TARE_MISSING = 12, "tare_missing";
@@ -58,23 +58,24 @@ bits! {
     CONTACT = 16, "contact";
     /// What touches the film slips ([`SlipLimits`](crate::temporal::SlipLimits)).
     SLIP = 17, "slip";
-    /// The direction lies outside the range that the model was calibrated for: too much force along
+    /// The direction is outside the range that the model was calibrated for: too much force along
     /// the film for the force into it.
     DIRECTION_OUT_OF_RANGE = 18, "direction_out_of_range";
-    /// The place of contact lies outside the range that the model was calibrated for.
+    /// The place of contact is outside the range that the model was calibrated for.
     PLACE_OUT_OF_RANGE = 19, "place_out_of_range";
     /// No single contact fits the positions of the four markers: no force.
     UNEXPLAINED = 20, "unexplained";
-    /// Re-zeroing moved the rest position from where it was taken.
+    /// Re-zeroing has moved the rest position from where it was taken.
     REZEROED = 21, "rezeroed";
-    /// The frame has specks or little light: its markers were found by a second look, and the
+    /// The frame has specks or little light. Its markers were found by a second look, and the
     /// standard uncertainties are larger.
     FRAME_DISTURBED = 22, "frame_disturbed";
-    /// The untouched film was seen last beside its rest position; standard uncertainties include
+    /// The untouched film was last seen away from its rest position; standard uncertainties include
     /// that.
     REST_MOVED = 23, "rest_moved";
-    /// The film may hang otherwise than when its rest position was taken, and nobody said how, or
-    /// the model does not know what that does; where it knows, standard uncertainties include it.
+    /// The film may hang differently than when its rest position was taken, and the direction of
+    /// gravity or its effect is unknown. If the model knows the effect, standard uncertainties
+    /// include it.
     WEIGHT_UNKNOWN = 24, "weight_unknown";
 }
 
@@ -82,7 +83,7 @@ impl Status {
     /// No bit set.
     pub const OK: Status = Status(0);
 
-    /// The bits that say "no force": a sample has a force exactly when it has none of them.
+    /// The bits that mean "no force": a sample has a force exactly if it has none of them.
     pub const NO_FORCE: Status = Status(
         Status::MARKERS_MISSING.0
             | Status::MARKERS_AMBIGUOUS.0

@@ -1,5 +1,5 @@
-//! What is made of one force after another: contact, slip, a filter, re-zeroing, and what the film
-//! remembers. Their limits are settings that a device keeps.
+//! Defines how forces are processed from frame to frame: contact, slip, filter, re-zeroing, and the
+//! film's memory. Their limits are settings that a device keeps.
 
 use crate::units::{
     Micrometres, MilliPx, Milliseconds, Permille, SmallPermille, UnsignedMicroNewtons,
@@ -13,19 +13,19 @@ use core::fmt;
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct TemporalSettings {
-    /// When something touches the film.
+    /// Limits of a contact.
     pub contact: ContactLimits,
-    /// When what touches it slips.
+    /// Limits of a slip.
     pub slip: SlipLimits,
-    /// What is sent in place of each frame's own force.
+    /// The filter of the force that is sent.
     pub filter: Filter,
-    /// Whether the rest position follows what drifts; `None` for never.
+    /// How the rest position follows drift; `None` if it does not.
     pub rezero: Option<Rezero>,
-    /// What the film remembers of its loads.
+    /// The film's memory of its loads.
     pub creep: Creep,
 }
 
-/// When something touches the film: from `begins` on, until |F| is below `ends`.
+/// The film is touched from |F| ≥ `begins` on, until |F| < `ends`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -38,66 +38,66 @@ pub struct ContactLimits {
     pub ends: UnsignedMicroNewtons,
 }
 
-/// When a contact slips: its place moves by `distance` within a time `within`, while the
-/// tangential force is at least `ratio` of the normal one.
+/// A contact slips if its place moves by `distance` within the time `within`, while the tangential
+/// force is at least `ratio` of the normal one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct SlipLimits {
-    /// How far the place moves, 1 µm to 5 mm.
+    /// Distance that the place moves, 1 µm to 5 mm.
     pub distance: Micrometres,
-    /// In what time at most, 10 to 100 ms.
+    /// Longest time for that, 10 to 100 ms.
     pub within: Milliseconds,
-    /// Least tangential over normal force, 0 to 2.
+    /// Smallest ratio of tangential to normal force, 0 to 2.
     pub ratio: Permille,
 }
 
-/// What is sent in place of each frame's own force.
+/// The filter of the force that is sent.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub enum Filter {
-    /// Nothing: each frame's own force.
+    /// No filter: each frame's own force.
     #[default]
     None,
     /// A first-order low-pass of each component.
     LowPass {
-        /// Its time constant, 1 to 10,000 ms, and by as much a steady change comes later.
+        /// Its time constant, 1 to 10,000 ms, by which a steady change lags.
         time_constant: Milliseconds,
     },
-    /// The median of each component in three frames: a steady change comes one frame later.
+    /// The median of each component in three frames; a steady change lags by one frame.
     MedianOfThree,
 }
 
-/// How the rest position follows what drifts while nothing touches the film.
+/// How the rest position follows drift while the film is untouched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct Rezero {
-    /// How long nothing touched the film before it begins, 1 to 3600 s.
+    /// Time without a touch before it begins, 1 to 3600 s.
     pub after: Milliseconds,
-    /// Farthest that a coordinate of a marker's rest position moves in a second, 1 to 100.
+    /// Largest change of a coordinate of a marker's rest position in a second, 1 to 100.
     pub rate: MilliPx,
-    /// Farthest that it moves in all from where it was tared, 1 to 250.
+    /// Largest total change from where it was tared, 1 to 250.
     pub total: MilliPx,
 }
 
-/// What the film remembers of its loads: a held load is seen as if it grew by two parts of itself,
-/// within half a second and within 20 s, and what is taken off is left behind likewise. Forces are
-/// right a second after a load was put on.
+/// The film's memory of its loads. A held load seems to grow by two parts of itself, within half a
+/// second and within 20 s. When it is removed, the same parts remain and decay. Forces are right a
+/// second after a load was applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct Creep {
-    /// The parts, 0 to 150 each: taken off. Both 0: nobody measured them.
+    /// The parts, 0 to 150 each, which are subtracted. Both are 0 if they were not measured.
     pub parts: [SmallPermille; 2],
 }
 
@@ -142,7 +142,7 @@ impl Default for SlipLimits {
 }
 
 impl Rezero {
-    /// After 10 s, by 5 thousandths of a pixel a second, 200 in all.
+    /// After 10 s, by 5 thousandths of a pixel a second, 200 thousandths in all.
     pub const USUAL: Rezero = Rezero {
         after: Milliseconds(10_000),
         rate: MilliPx(5),
@@ -158,20 +158,21 @@ impl Default for Rezero {
 }
 
 impl Creep {
-    /// Of a film whose creep nobody measured.
+    /// A film whose creep was not measured.
     pub const USUAL: Creep = Creep {
         parts: [SmallPermille(0); 2],
     };
-    /// The times. A series of others is nearly one of these with other parts.
+    /// The time constants. A series with other time constants is nearly one with these and other
+    /// parts.
     pub const TIMES: [Milliseconds; 2] = [Milliseconds(500), Milliseconds(20_000)];
 
-    /// Standard uncertainty of each part: 5 in a thousand where they were measured, otherwise as
-    /// silicones differ, of which a held load grows by 2 to 15 % in all.
+    /// Standard uncertainty of each part: 5 in a thousand if they were measured. Otherwise it
+    /// covers the range of silicones, in which a held load grows by 2 to 15 % in all.
     pub fn uncertain(&self) -> SmallPermille {
         SmallPermille(if self.is_measured() { 5 } else { 50 })
     }
 
-    /// Whether somebody measured the parts.
+    /// Returns whether the parts were measured.
     pub fn is_measured(&self) -> bool {
         self.parts != Creep::USUAL.parts
     }
@@ -184,7 +185,7 @@ impl Default for Creep {
     }
 }
 
-/// A setting that is outside its range.
+/// The setting that is outside its range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TemporalError {
     /// [`ContactLimits::begins`].
@@ -227,10 +228,10 @@ impl fmt::Display for TemporalError {
 }
 
 impl TemporalSettings {
-    /// Whether each is within its range.
+    /// Checks whether each setting is within its range.
     ///
     /// # Errors
-    /// The first that is not.
+    /// The first setting that is not.
     pub fn check(&self) -> Result<(), TemporalError> {
         let TemporalSettings {
             contact: ContactLimits { begins, ends },

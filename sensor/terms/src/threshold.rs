@@ -1,10 +1,10 @@
-//! Thresholds: which pixels a marker may have, for each pixel format. `tables` compiles an HSV box
-//! to a look-up table.
+//! Defines thresholds, which select a marker's pixels, for each pixel format. The `tables` of
+//! `hivtac-sensor` compile an HSV box to a look-up table.
 
 use crate::hsv::Hsv;
 use core::fmt;
 
-/// What a pixel is.
+/// The format of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -16,7 +16,7 @@ pub enum PixelFormat {
     Rgb565,
     /// Pairs of pixels in the byte order Y0 Cb Y1 Cr.
     Yuv422,
-    /// A byte a pixel: its luma.
+    /// One byte for each pixel: its luma.
     Mono,
 }
 
@@ -33,7 +33,7 @@ impl PixelFormat {
         }
     }
 
-    /// `u16`s of a row of `width` pixels.
+    /// Number of `u16`s of a row of `width` pixels.
     pub const fn row_length(self, width: u16) -> usize {
         match self {
             PixelFormat::Rgb565 | PixelFormat::Yuv422 => width as usize,
@@ -42,7 +42,7 @@ impl PixelFormat {
     }
 }
 
-/// Which pixels a marker may have, and with that what a pixel is.
+/// The colours of a marker's pixels, and with them the pixel format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -51,7 +51,7 @@ impl PixelFormat {
 pub enum Threshold {
     /// A box of colours.
     Rgb565(HsvBox),
-    /// A least Cr.
+    /// A lowest Cr.
     Yuv422(Yuv422),
     /// Limits of the luma.
     Mono(Mono),
@@ -67,7 +67,7 @@ impl Threshold {
         }
     }
 
-    /// What a pixel is.
+    /// The pixel format.
     pub const fn format(&self) -> PixelFormat {
         match self {
             Threshold::Rgb565(_) => PixelFormat::Rgb565,
@@ -76,12 +76,11 @@ impl Threshold {
         }
     }
 
-    /// Of its six numbers, as files have them: those of [`HsvBox::limits`]; a least Cr and zeros;
-    /// or lowest and highest luma and zeros.
+    /// From its six numbers in a file: those of [`HsvBox::limits`]; a lowest Cr and zeros; or
+    /// lowest and highest luma and zeros.
     ///
     /// # Errors
-    /// Those of [`check`](Self::check), or a number that is not zero though the format has none
-    /// there.
+    /// Those of [`check`](Self::check), or a number that must be zero in this format is not.
     pub const fn of_limits(
         format: PixelFormat,
         limits: [u8; 6],
@@ -98,7 +97,7 @@ impl Threshold {
         }
     }
 
-    /// Its six numbers, as [`of_limits`](Self::of_limits) takes them.
+    /// Its six numbers, the arguments of [`of_limits`](Self::of_limits).
     pub const fn limits(&self) -> [u8; 6] {
         match *self {
             Threshold::Rgb565(hsv_box) => hsv_box.limits(),
@@ -107,7 +106,7 @@ impl Threshold {
         }
     }
 
-    /// Says whether it means something.
+    /// Checks whether the threshold is valid.
     ///
     /// # Errors
     /// Those of [`HsvBox::check`], or a lowest luma above the highest.
@@ -163,7 +162,7 @@ impl HsvBox {
     /// Largest hue.
     pub const MAX_HUE: u8 = 179;
 
-    /// Of its six limits, in the order of the fields, unchecked: as files and commands have them.
+    /// From its six limits, in the order of the fields, unchecked: as in files and commands.
     pub const fn of_limits(limits: [u8; 6]) -> HsvBox {
         let [
             hue_low,
@@ -195,7 +194,7 @@ impl HsvBox {
         ]
     }
 
-    /// Says whether the box means something.
+    /// Checks whether the box is valid.
     ///
     /// # Errors
     /// A hue above 179, or a lowest saturation or value above the highest.
@@ -221,7 +220,7 @@ impl HsvBox {
         Ok(())
     }
 
-    /// Whether a colour lies in the box, borders included.
+    /// Returns whether a colour is in the box, borders included.
     pub const fn contains(&self, color: Hsv) -> bool {
         let from_low = self.hue_low <= color.hue;
         let to_high = color.hue <= self.hue_high;
@@ -237,9 +236,9 @@ impl HsvBox {
     }
 }
 
-/// YUV422 in the order Y0 Cb Y1 Cr: a `u16` a pixel, luma below. A pair of pixels belongs to a
-/// marker when their Cr is at least the threshold. A pixel's weight grows by two for each level of
-/// Cr, from 64 at the threshold.
+/// YUV422 in the order Y0 Cb Y1 Cr: one `u16` for each pixel, luma in its low byte. A pair of
+/// pixels belongs to a marker if its Cr is at least the threshold. A pixel's weight is 64 at the
+/// threshold, and grows by two for each level of Cr.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -250,9 +249,9 @@ pub struct Yuv422 {
     pub cr_low: u8,
 }
 
-/// Mono: two pixels a `u16`, the left one below. A pixel belongs to a marker when its luma lies
-/// within the limits, both included. Its weight grows by 5/4 for each level that it lies inside the
-/// nearer limit, from 64 there; a limit of 0 or 255 is none.
+/// Mono: two pixels in a `u16`, the left one in its low byte. A pixel belongs to a marker if its
+/// luma is within the limits, both included. Its weight is 64 at the nearer limit, and grows by 5/4
+/// for each level inside it. A limit of 0 or 255 does not count as a limit here.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -271,13 +270,13 @@ impl Yuv422 {
 }
 
 impl Mono {
-    /// Half way between markers and film where markers are dark: red ones have a luma of 36 in
-    /// green light or behind a green filter, and the film 141. (In white light they are hardly
-    /// darker than the film.)
+    /// Half way between dark markers and film. Red markers have a luma of 36 in green light or
+    /// behind a green filter, and the film 141. (In white light they are hardly darker than the
+    /// film.)
     pub const DARK: Mono = Mono { low: 0, high: 88 };
 }
 
-/// Why numbers cannot be a threshold.
+/// Why numbers are not a valid threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ThresholdError {
     /// This hue is above 179: OpenCV's 8-bit hue counts steps of two degrees.
@@ -303,7 +302,7 @@ pub enum ThresholdError {
         /// Highest luma.
         high: u8,
     },
-    /// Of the six numbers of a file, those that this format does not use must be zero.
+    /// A number that this format does not use is not zero.
     NotZero(PixelFormat),
 }
 
@@ -337,18 +336,17 @@ impl fmt::Display for ThresholdError {
 
 impl core::error::Error for ThresholdError {}
 
-/// How the two bytes of an RGB565 pixel lie in the `u16` that a row is made of.
+/// Order of the two bytes of an RGB565 pixel in the `u16`s of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum ByteOrder {
     /// The `u16` is the pixel: red in bits 15–11.
     Native,
-    /// The bytes are swapped: what DCMI leaves in memory from a camera that sends the high byte
-    /// first.
+    /// The bytes are swapped, as DCMI stores them from a camera that sends the high byte first.
     Swapped,
 }
 
 impl ByteOrder {
-    /// The pixel (red in bits 15–11) that lies in memory as `raw`.
+    /// Returns the pixel (red in bits 15–11) whose value in memory is `raw`.
     pub const fn pixel(self, raw: u16) -> u16 {
         match self {
             ByteOrder::Native => raw,

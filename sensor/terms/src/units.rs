@@ -1,4 +1,4 @@
-//! The units that cross module borders. Each is a transparent newtype: no bare integer does.
+//! Defines the units that cross module borders, as transparent newtypes instead of bare integers.
 
 use crate::fixed::Q;
 use core::fmt;
@@ -24,17 +24,18 @@ impl Px {
         Px(pixels << Self::FRACTION_BITS)
     }
 
-    /// Of a length in pixels; one beyond ± 32,768 px is as long.
+    /// From a length in pixels; saturates at ± 32,768 px.
     pub fn saturated(length: Q<16, i64>) -> Px {
         Px(length.bits().clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }
 
-    /// Of a value in pixels, to the step below; at the limits of 32 bits beyond them.
+    /// From a value in pixels, truncated towards zero to a step; saturates at the limits of 32
+    /// bits.
     pub const fn of_f32(px: f32) -> Px {
         Px((px * 65_536.0) as i32)
     }
 
-    /// The value in pixels, to 2⁻²⁴ of it.
+    /// The value in pixels, exact to 2⁻²⁴ relative.
     pub fn to_f32(self) -> f32 {
         self.0 as f32 / 65_536.0
     }
@@ -129,7 +130,7 @@ pub struct Milliseconds(pub u32);
 )]
 pub struct Permille(pub u16);
 
-/// Thousandths, to 255 of them.
+/// A ratio in thousandths, up to 255 of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(
     feature = "wire",
@@ -137,7 +138,7 @@ pub struct Permille(pub u16);
 )]
 pub struct SmallPermille(pub u8);
 
-/// A distance in a picture, in thousandths of a pixel: of settings, which people write.
+/// A distance in a picture, in thousandths of a pixel: for settings, which people write.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(
     feature = "wire",
