@@ -1,5 +1,5 @@
-//! Links anew when the memory map changes, which cargo does not look at by itself, and names the
-//! model file to embed, with its answer to the known question.
+//! Relinks the firmware when the memory map changes, which cargo does not detect, and passes on the
+//! model file to embed with its known answer.
 
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;
@@ -29,8 +29,8 @@ fn main() {
     write_answer(&file);
 }
 
-/// What this computer has for the model's answer; none of a file that is no model, which the
-/// firmware says itself.
+/// Writes this computer's answer of the model; `None` if the file is not a model, which the
+/// firmware reports itself.
 fn write_answer(file: &Path) {
     let bytes = std::fs::read(file).expect("it was found");
     let model = Model::parse(&bytes).ok();

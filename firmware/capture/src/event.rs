@@ -1,9 +1,9 @@
-//! What the tracker tells the follower.
+//! Defines the events that the tracker sends to the follower.
 
-/// One VSYNC edge: the one that begins a frame.
+/// The VSYNC edge that begins a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Edge {
-    /// 1 for the first edge that counts, and so on modulo 2³²; 0 when there was none yet.
+    /// 1 for the first edge that counts, and so on modulo 2³²; 0 before the first edge.
     pub number: u32,
     /// Device time, µs since boot.
     pub time_us: u64,
@@ -12,10 +12,10 @@ pub struct Edge {
 /// A finished band.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Band {
-    /// Bands finished before it since boot, modulo 2³². Names its slot
+    /// Number of bands finished before it since boot, modulo 2³². It determines the slot
     /// ([`Shape::slot`](crate::Shape::slot)).
     pub sequence: u32,
-    /// Bands of the same frame above it.
+    /// Number of bands of the same frame above it.
     pub index: u16,
     /// The edge that began its frame.
     pub edge: Edge,
@@ -32,30 +32,30 @@ pub enum Ending {
     Long,
     /// The DMA was too slow for the camera interface.
     Overrun,
-    /// An interrupt came too late: which rows belong to the frame is not known.
+    /// An interrupt came too late: it is unknown which rows belong to the frame.
     Late,
 }
 
-/// Something the follower has to know. Events come in the order in which things happened.
+/// An event for the follower. Events come in the order in which they happened.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Event {
-    /// A band lies in its slot.
+    /// A band is in its slot.
     Band(Band),
-    /// A frame has ended. For one that is not whole, no band comes after this.
+    /// A frame has ended. If it is not whole, no band of it follows.
     Ended {
         /// The edge that began it.
         edge: Edge,
         /// How.
         how: Ending,
     },
-    /// The camera was set up, wholly or otherwise than before. Its frames after number `from` up to
-    /// `to` are accounted for elsewhere.
+    /// The camera was set up, completely or with other settings. Its frames after number `from`, up
+    /// to `to`, are counted elsewhere.
     Passed {
-        /// The newest frame before; 0 when there was none.
+        /// The newest frame before the set-up; 0 if there was none.
         from: u32,
-        /// The newest frame of that time.
+        /// The newest frame during the set-up.
         to: u32,
-        /// It was started again, as it had been silent or did not answer.
+        /// True if the camera was restarted because it was silent or did not answer.
         restart: bool,
     },
 }

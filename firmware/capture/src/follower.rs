@@ -1,17 +1,17 @@
-//! The processing side: which bands to scan, which frames are good, and what became of every other.
+//! Decides on the processing side which bands to scan and which frames are good, and counts all
+//! frames.
 
 use crate::event::{Band, Edge, Ending, Event};
 use crate::shape::Shape;
 
-/// What is to be done next.
+/// What the caller has to do next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Nothing.
+    /// No action.
     None,
-    /// Scan this band, as the first of a frame when its index is 0; then call
-    /// [`Follower::scanned`].
+    /// Scan this band, as the first of a frame if its index is 0; then call [`Follower::scanned`].
     Scan(Band),
-    /// Every band of a frame was scanned: finish it.
+    /// Every band of a frame was scanned: finish the frame.
     Deliver(Delivery),
 }
 
@@ -20,22 +20,22 @@ pub enum Action {
 pub struct Delivery {
     /// The edge that began it.
     pub edge: Edge,
-    /// A frame before it, and after the delivery before, was not delivered, or the frame delivered
-    /// before turned out to be too long.
+    /// True if a frame since the previous delivery was not delivered, or the previous delivery
+    /// turned out to be too long.
     pub after_loss: bool,
-    /// One of these was lost to an overrun.
+    /// True if one of these was lost to an overrun.
     pub after_overrun: bool,
-    /// The camera was started again since the delivery before.
+    /// True if the camera was restarted since the previous delivery.
     pub after_restart: bool,
 }
 
-/// What became of frames. Each is counted once; the sum is the newest frame's number, without those
-/// accounted for elsewhere ([`Event::Passed`]), once its end is known.
+/// The results of frames. Each frame is counted once. The sum is the newest frame's number minus
+/// the frames that are counted elsewhere ([`Event::Passed`]), once that frame's end is known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Delivered, and not too long.
     pub processed: u32,
-    /// Not captured, or overwritten before they were read, or an interrupt came too late.
+    /// Not captured, or overwritten before they were read, or their interrupt came too late.
     pub busy: u32,
     /// Lost to an overrun.
     pub overrun: u32,
@@ -45,10 +45,10 @@ pub struct Tally {
     pub passed: u32,
 }
 
-/// Where the frame under way stands.
+/// The progress of the current frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Under {
-    /// None is, or it is lost already.
+    /// There is no current frame, or it is already lost.
     Nothing,
     /// The bands before `next` were scanned.
     Scanning { edge: Edge, next: u16 },
@@ -61,7 +61,7 @@ enum Under {
 pub struct Follower {
     shape: Shape,
     under: Under,
-    /// The newest frame accounted for.
+    /// The newest frame that was counted.
     accounted: u32,
     tally: Tally,
     after_loss: bool,
@@ -89,18 +89,19 @@ impl Follower {
         }
     }
 
-    /// What became of frames since this was asked last.
+    /// Returns the results of frames since the previous call.
     pub fn take_tally(&mut self) -> Tally {
         core::mem::take(&mut self.tally)
     }
 
-    /// Whether a frame is being scanned.
+    /// Returns whether a frame is being scanned.
     pub fn is_scanning(&self) -> bool {
         matches!(self.under, Under::Scanning { .. })
     }
 
-    /// Whether every band of a frame was scanned and its end is not yet known. When no event waits
-    /// and nothing more has come since its last band, it may be [delivered](Self::deliver) already.
+    /// Returns whether every band of a frame was scanned while its end is not yet known. If no
+    /// event waits and no data has come since its last band, it may already be
+    /// [delivered](Self::deliver).
     pub fn is_complete(&self) -> bool {
         matches!(self.under, Under::Scanning { next, .. } if next == self.shape.bands())
     }
@@ -117,8 +118,8 @@ impl Follower {
         }
     }
 
-    /// The band of [`Action::Scan`] was scanned; `intact` says whether it was whole all the while
-    /// ([`Shape::intact`]). Otherwise its frame is lost.
+    /// Call after the band of [`Action::Scan`] was scanned. If `intact` is false, the band was
+    /// overwritten meanwhile ([`Shape::intact`]), and its frame is lost.
     pub fn scanned(&mut self, intact: bool) {
         if let Under::Scanning { edge, next, .. } = &mut self.under {
             *next += 1;
@@ -129,8 +130,8 @@ impl Follower {
         }
     }
 
-    /// Delivers a [complete](Self::is_complete) frame before its end is known. Should it turn out
-    /// to be too long, it counts as such, and the next delivery says so.
+    /// Delivers a [complete](Self::is_complete) frame before its end is known. If it turns out to
+    /// be too long, it is counted as such, and the next delivery reports it.
     pub fn deliver(&mut self) -> Action {
         match self.under {
             Under::Scanning { edge, next } if next == self.shape.bands() => {
@@ -147,8 +148,7 @@ impl Follower {
         }
     }
 
-    /// Goes on after frame `newest`: whatever has come of frames up to it was not, and will not be,
-    /// looked at.
+    /// Continues after frame `newest`: no data of frames up to it was, or will be, processed.
     pub fn pass_over(&mut self, newest: u32) {
         self.close();
         let passed = self.newer_by(newest);
@@ -171,7 +171,7 @@ impl Follower {
             Under::Scanning { edge, next, .. } if edge == band.edge && next == band.index => {
                 Action::Scan(band)
             }
-            // An event was lost, and with it the frame.
+            // An event was lost, and the frame with it.
             Under::Scanning { .. } => {
                 self.close();
                 Action::None
@@ -219,7 +219,7 @@ impl Follower {
         }
     }
 
-    /// Accounts for the frame under way, of which nothing more will come.
+    /// Counts the current frame, of which no further data will come.
     fn close(&mut self) {
         match self.under {
             Under::Nothing => {}
@@ -232,7 +232,7 @@ impl Follower {
         }
     }
 
-    /// Accounts for a frame that is not good, unless that was done already.
+    /// Counts a bad frame, unless it was already counted.
     fn lost(&mut self, number: u32, reason: impl FnOnce(&mut Tally) -> &mut u32) {
         self.under = Under::Nothing;
         if self.newer_by(number) > 0 {
@@ -243,7 +243,7 @@ impl Follower {
         }
     }
 
-    /// Frames between the newest one accounted for and this one were not captured.
+    /// Frames between the newest counted one and this one were not captured.
     fn gap_before(&mut self, number: u32) {
         let gap = self.newer_by(number).saturating_sub(1);
         if gap > 0 {
@@ -253,9 +253,9 @@ impl Follower {
         }
     }
 
-    /// How many frames there are after the newest one accounted for, up to this number; 0 for one
-    /// that is not newer. Numbers wrap, after most of a year at the usual rate; no two that are
-    /// compared are 2³¹ apart.
+    /// Returns the number of frames after the newest counted one, up to this number; 0 if it is not
+    /// newer. Numbers wrap after most of a year at the usual rate; numbers that are compared are
+    /// never 2³¹ apart.
     fn newer_by(&self, number: u32) -> u32 {
         let further = number.wrapping_sub(self.accounted);
         if further < 1 << 31 { further } else { 0 }

@@ -1,14 +1,14 @@
-//! Which rows belong to which frame, when a camera is captured without a pause: the logic alone,
-//! without a register.
+//! Decides which rows belong to which frame while a camera is captured without a pause: the logic
+//! alone, without registers.
 //!
-//! A frame is written by DMA as *bands* of some rows into a ring of *slots*, one band after the
-//! other, frame after frame. The [`Tracker`] runs in the interrupts: it steers the DMA from slot to
-//! slot, sees where frames begin and end, and brings everything back in step when a frame is
-//! broken. The [`Follower`] runs where frames are processed: it takes the tracker's [`Event`]s in
-//! order, says which bands to scan, and accounts for every frame exactly once.
+//! A frame is written by DMA as *bands* of several rows into a ring of *slots*, one band after the
+//! other, frame after frame. The [`Tracker`] runs in the interrupts. It directs the DMA from slot
+//! to slot, detects where frames begin and end, and resynchronizes after a broken frame. The
+//! [`Follower`] runs where frames are processed. It takes the tracker's [`Event`]s in order,
+//! selects the bands to scan, and counts every frame exactly once.
 //!
-//! The two share no state but the events and one number, [`Tracker::finished`]. The camera never
-//! waits: a band that is not read in time is overwritten, which [`Shape::intact`] tells.
+//! They share only the events and one number, [`Tracker::finished`]. The camera never waits: a band
+//! that is not read in time is overwritten, which [`Shape::intact`] detects.
 //!
 //! ```text
 //! DMA: band finished ─┐             events            ┌→ scan this band

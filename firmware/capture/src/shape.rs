@@ -1,6 +1,6 @@
-//! How frames, bands and slots relate.
+//! Defines how frames, bands and slots relate.
 
-/// The number of bands of a frame, and of slots.
+/// The number of bands of a frame, and of slots of the ring.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Shape {
     bands: u16,
@@ -11,30 +11,31 @@ impl Shape {
     /// Frames of `bands` bands, in a ring of `slots` slots.
     ///
     /// # Panics
-    /// Without a band, or when `slots` is no power of two of at least 4. Meant for constants, where
+    /// If `bands` is 0, or `slots` is not a power of two of at least 4. Meant for constants, where
     /// a panic is a build error.
     pub const fn new(bands: u16, slots: u16) -> Self {
         assert!(bands > 0, "a frame has at least one band");
-        // Sequence numbers wrap at 2³², so that the ring must divide it. The DMA holds two slots.
+        // Sequence numbers wrap at 2³², so the number of slots must divide it. The DMA holds two
+        // slots.
         assert!(slots >= 4 && slots.is_power_of_two());
         Shape { bands, slots }
     }
 
-    /// Bands of a frame.
+    /// Number of bands of a frame.
     pub const fn bands(&self) -> u16 {
         self.bands
     }
 
-    /// Where a band lies.
+    /// The slot of a band.
     pub const fn slot(&self, sequence: u32) -> u16 {
-        // A power of two: the remainder is its lower bits.
+        // With a power of two the remainder is the lower bits.
         sequence as u16 & (self.slots - 1)
     }
 
-    /// Whether the band `sequence` was still whole at a moment *after which* [`Tracker::finished`]
-    /// was read as `finished`.
+    /// Returns whether the band `sequence` was still whole at a moment *after which*
+    /// [`Tracker::finished`] was read as `finished`.
     ///
-    /// The DMA writes band `finished`, or already the next one when its interrupt has not been
+    /// The DMA writes band `finished`, or already the next one if its interrupt has not been
     /// handled yet. So the last `slots − 2` finished bands are safe.
     ///
     /// [`Tracker::finished`]: crate::Tracker::finished
@@ -53,7 +54,7 @@ mod tests {
         let shape = Shape::new(3, 8);
         assert!(!shape.intact(5, 5), "not finished");
         assert!(shape.intact(5, 6) && shape.intact(5, 11));
-        // Slot 5 is band 13's, which the DMA may write from the end of band 12 on, seen or not.
+        // Slot 5 is band 13's, which the DMA may write once band 12 ends, handled or not.
         assert!(!shape.intact(5, 12));
         assert!(shape.intact(u32::MAX, 0) && !shape.intact(u32::MAX - 7, 0));
     }

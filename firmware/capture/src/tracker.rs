@@ -1,31 +1,31 @@
-//! The interrupts' side: steers the DMA, and finds out where frames begin and end.
+//! Directs the DMA in the interrupts, and detects where frames begin and end.
 
 use crate::event::{Band, Edge, Ending, Event};
 use crate::shape::Shape;
 
-/// The camera interface and its double-buffered DMA, as the tracker needs them.
+/// The camera interface and its double-buffered DMA, as the tracker uses them.
 pub trait Interface {
-    /// Stops everything, throws away what is under way, and begins again: the next frame that
-    /// begins goes to slot `first`, then to slot `second`.
+    /// Stops everything, discards incomplete data, and begins again: the next frame that begins
+    /// goes to slot `first`, then to slot `second`.
     fn restart(&mut self, first: u16, second: u16);
 
     /// Stops everything.
     fn stop(&mut self);
 
-    /// Whether the DMA has finished a band since this was asked last.
+    /// Returns whether the DMA has finished a band since the previous call.
     fn take_finished(&mut self) -> bool;
 
-    /// Whether the DMA writes to the second of its two targets now; the first after a restart, then
-    /// in turns.
+    /// Returns whether the DMA now writes to the second of its two targets. It begins with the
+    /// first after a restart, and then alternates.
     fn writes_second(&self) -> bool;
 
-    /// Makes `slot` the target that the DMA does not write to now: the next one.
+    /// Makes `slot` the next target of the DMA, in place of the one that it does not write to now.
     fn aim(&mut self, slot: u16);
 
-    /// Whether anything has come since the newest band was finished.
+    /// Returns whether data has come since the newest band was finished.
     fn has_begun_a_band(&self) -> bool;
 
-    /// The newest VSYNC edge that began a frame.
+    /// Returns the newest VSYNC edge that began a frame.
     fn newest_edge(&self) -> Edge;
 }
 
@@ -36,16 +36,16 @@ pub struct Tracker {
     shape: Shape,
     running: bool,
     finished: u32,
-    /// The DMA's target as far as it is known.
+    /// True if the DMA's last known target is the second one.
     second: bool,
-    /// Band of the frame that comes next.
+    /// Index, in its frame, of the next band.
     index: u16,
-    /// The frame that `index` belongs to, or the newest one when `index` is 0.
+    /// The frame that `index` belongs to, or the newest one if `index` is 0.
     frame: Edge,
 }
 
 impl Tracker {
-    /// A tracker at rest.
+    /// A tracker that does not run.
     pub const fn new(shape: Shape) -> Self {
         Tracker {
             shape,
@@ -60,32 +60,32 @@ impl Tracker {
         }
     }
 
-    /// Bands finished since boot, modulo 2³².
+    /// Number of bands finished since boot, modulo 2³².
     pub fn finished(&self) -> u32 {
         self.finished
     }
 
-    /// Begins with the next frame.
+    /// Starts with the next frame.
     pub fn start(&mut self, interface: &mut impl Interface) {
         self.running = true;
         self.frame = interface.newest_edge();
         self.restart(interface);
     }
 
-    /// Stops. What becomes of a frame under way is told by [`Event::Passed`], once it goes on.
+    /// Stops. When capture continues, [`Event::Passed`] accounts for a frame that was incomplete.
     pub fn stop(&mut self, interface: &mut impl Interface) {
         self.running = false;
         interface.stop();
     }
 
-    /// The DMA has finished a band.
+    /// Call when the DMA has finished a band.
     pub fn band_finished(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
         if !interface.take_finished() || !self.running {
             return;
         }
         self.second = !self.second;
         if interface.writes_second() != self.second {
-            // Another band was finished meanwhile, and the DMA is where it was before.
+            // A second band was finished meanwhile, so the DMA is back at its previous target.
             return self.broken(Ending::Late, interface, tell);
         }
         let edge = interface.newest_edge();
@@ -108,7 +108,7 @@ impl Tracker {
         interface.aim(self.shape.slot(self.finished.wrapping_add(1)));
     }
 
-    /// The camera interface says that a frame has ended.
+    /// Call when the camera interface reports the end of a frame.
     pub fn frame_ended(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
         self.band_finished(interface, tell);
         if !self.running {
@@ -126,14 +126,14 @@ impl Tracker {
         }
     }
 
-    /// The camera interface, or the DMA, has lost data.
+    /// Call when the camera interface or the DMA has lost data.
     pub fn overrun(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
         if self.running {
             self.broken(Ending::Overrun, interface, tell);
         }
     }
 
-    /// Nothing has happened for too long.
+    /// Call when no data has come for too long.
     pub fn silence(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
         if self.running {
             self.give_up_begun(interface, tell);
@@ -141,7 +141,7 @@ impl Tracker {
         }
     }
 
-    /// Tells a frame that has begun and not ended as short.
+    /// Reports a frame that has begun and not ended as short.
     fn give_up_begun(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
         let edge = interface.newest_edge();
         if self.running && (self.index > 0 || edge != self.frame) {
@@ -153,7 +153,7 @@ impl Tracker {
         }
     }
 
-    /// Gives the frame up, and begins again with the next.
+    /// Gives the frame up and restarts with the next one.
     fn broken(
         &mut self,
         how: Ending,

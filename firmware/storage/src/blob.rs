@@ -1,5 +1,5 @@
-//! Many bytes in a sector of their own. Nothing in it says whether they are whole: what names a
-//! blob has its length and checksum.
+//! Stores many bytes in a sector of their own. A blob has no checksum inside: the record that names
+//! it has its length and checksum.
 
 use crate::flash::{self, Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
 
@@ -25,7 +25,7 @@ pub(crate) async fn write<F: Flash>(
 /// Reads a sector's first bytes, as many as `bytes` has.
 ///
 /// # Errors
-/// [`Unreadable`]: a word of them is, or there are not so many.
+/// [`Unreadable`]: one of the words is unreadable, or the sector is shorter.
 pub fn read<F: Flash>(flash: &mut F, sector: u32, bytes: &mut [u8]) -> Result<(), Unreadable> {
     if bytes.len() > F::SECTOR_WORDS as usize * WORD_BYTES {
         return Err(Unreadable);

@@ -1,27 +1,27 @@
-//! The flash that bytes are kept in, one word at a time.
+//! Defines the flash in which bytes are kept, one word at a time.
 
 use core::future::Future;
 
-/// Bytes of a word, which is programmed at once.
+/// Bytes of a word, the unit of programming.
 pub const WORD_BYTES: usize = 32;
 
 /// A word.
 pub type Word = [u8; WORD_BYTES];
 
-/// A word that was erased and not programmed.
+/// An erased word.
 pub const BLANK: Word = [0xFF; WORD_BYTES];
 
-/// Where a word lies.
+/// The place of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The sector.
     pub sector: u32,
-    /// The word in it.
+    /// The word's number in it.
     pub word: u32,
 }
 
 impl Place {
-    /// So many words further on.
+    /// The place `words` words further on.
     pub(crate) fn behind(self, words: u32) -> Self {
         Self {
             word: self.word + words,
@@ -30,11 +30,11 @@ impl Place {
     }
 }
 
-/// The word's error correction found more wrong bits than it corrects.
+/// The word's error correction found more wrong bits than it can correct.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unreadable;
 
-/// The flash did not do what it was told to.
+/// The flash operation failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Failed;
 
@@ -43,7 +43,7 @@ pub trait Flash {
     /// Words of a sector.
     const SECTOR_WORDS: u32;
 
-    /// What a word reads as.
+    /// Reads a word.
     ///
     /// # Errors
     /// [`Unreadable`]: its programming was cut off, or it is worn.
@@ -52,20 +52,20 @@ pub trait Flash {
     /// Programs a blank word.
     ///
     /// # Errors
-    /// [`Failed`]: it may read as anything now.
+    /// [`Failed`]: its content is now undefined.
     fn program(&mut self, place: Place, word: &Word) -> impl Future<Output = Result<(), Failed>>;
 
     /// Makes every word of a sector blank.
     ///
     /// # Errors
-    /// [`Failed`]: it may read as anything now.
+    /// [`Failed`]: its content is now undefined.
     fn erase(&mut self, sector: u32) -> impl Future<Output = Result<(), Failed>>;
 }
 
 /// Programs a word and reads it back.
 ///
 /// # Errors
-/// [`Failed`]: it does not read as it should.
+/// [`Failed`]: it does not read back as programmed.
 pub(crate) async fn program<F: Flash>(
     flash: &mut F,
     place: Place,

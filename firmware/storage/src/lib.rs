@@ -1,14 +1,14 @@
-//! What a device keeps in its flash, through power cuts at any time: the logic alone, without a
-//! register.
+//! Keeps data in the flash of a device, through power cuts at any time: the logic alone, without
+//! registers.
 //!
-//! Two ways to keep bytes, in sectors of their own. A [`Log`] has one small record, which is
-//! written anew as a whole each time: after a cut at any operation it reads as it was before or as
-//! it was to be. A [`blob`] has a sector and is large; what tells whether it is whole is a record
-//! of the log that names it, written once the blob was read back.
+//! There are two ways to keep bytes, in separate sectors. A [`Log`] has one small record, which is
+//! rewritten as a whole each time: after a power cut at any operation it reads as the old or as the
+//! new record. A [`blob`] has a sector and is large. A record of the log names it, written after
+//! the blob was read back; this record proves that the blob is whole.
 //!
-//! The flash is one whose words have an error correcting code of their own, as those of 256 bits of
-//! an STM32H7: a word is programmed once between two erases, and one whose programming was cut off
-//! may read as an error, or once so and once otherwise.
+//! The words of the flash have an error correcting code of their own, as the 256-bit words of an
+//! STM32H7. A word is programmed once between two erases. If its programming was cut off, it may
+//! read as an error, or differently each time.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,19 +1,20 @@
-//! One record, kept through power cuts: a log of what it was, in two sectors.
+//! Keeps one record through power cuts, as a log in two sectors.
 //!
 //! # Design
-//! Saving appends the record as a whole, and the last one that reads right is what is kept. Nothing
-//! is ever changed in place. When a sector is full the other one is erased, which has older records
-//! only, and the log goes on there with a higher *generation*, which each record carries: the
-//! sector with the newest record is never erased.
+//! Saving appends the whole record; the last record that reads correctly is the one that is kept. A
+//! record is never changed in place. When a sector is full, the other one, which has only older
+//! records, is erased. The log continues there with a higher *generation*, which each record
+//! carries. The sector with the newest record is never erased.
 //!
-//! A word whose programming was cut off may read right now and not tomorrow, or the other way
-//! round. So a record is followed by a *seal*, programmed once the record was: where anything but a
-//! blank word follows a record, all words of the record were programmed to their end. When the last
-//! record has no seal, or something follows that is no record, what was read is not *settled*: who
-//! opened the log saves it again, behind all that, and nothing older or unfinished counts any more.
+//! A word whose programming was cut off may read correctly now and not tomorrow, or the other way
+//! round. So each record is followed by a *seal*, programmed after the record. A non-blank word
+//! after a record proves that all words of the record were programmed completely. If the last
+//! record has no seal, or is followed by words that are not a record, the log is not *settled*.
+//! Whoever opened it must then save the record again, behind all of that; older or unfinished
+//! records no longer count.
 //!
-//! A word that does not read back as it was programmed is left behind, and the record is written
-//! anew behind it.
+//! A word that does not read back as programmed is skipped, and the record is written anew behind
+//! it.
 
 use crate::blob;
 use crate::flash::{self, BLANK, Failed, Flash, Place};
@@ -21,17 +22,17 @@ use crate::record::{self, Header};
 
 pub use crate::record::PAYLOAD_LIMIT;
 
-/// Sectors of a log: the first two of its flash.
+/// Number of sectors of a log: the first two of its flash.
 const SECTORS: u32 = 2;
-/// Attempts to write a record before it is given up.
+/// Number of attempts to write a record.
 const ATTEMPTS: u32 = 8;
 
-/// Why a record was not saved. What was kept before still is.
+/// Why a record was not saved. The previous record is still kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SaveError {
     /// It is longer than [`PAYLOAD_LIMIT`].
     TooLong,
-    /// The flash is worn: nowhere did it read back.
+    /// The flash is worn: the record read back in no place.
     Worn,
 }
 
@@ -40,9 +41,9 @@ pub enum SaveError {
 pub struct Log<F> {
     flash: F,
     newest: Option<Newest>,
-    /// Of the sector that is written.
+    /// Generation of the sector that is being written.
     generation: u32,
-    /// The next word to program; nothing when the next record begins another sector.
+    /// The next word to program; `None` if the next record begins a new sector.
     end: Option<Place>,
     settled: bool,
     failures: u32,
@@ -55,8 +56,8 @@ struct Newest {
 }
 
 impl<F: Flash> Log<F> {
-    /// Reads what is kept into the front of `payload`; how long that is, or nothing when nothing
-    /// is.
+    /// Opens the log and reads the newest payload into the front of `payload`. Returns its length;
+    /// `None` if the log is empty.
     pub fn open(flash: F, payload: &mut [u8; PAYLOAD_LIMIT]) -> (Self, Option<usize>) {
         let mut log = Self {
             flash,
@@ -76,22 +77,22 @@ impl<F: Flash> Log<F> {
         (log, length)
     }
 
-    /// False when what was read may not read so the next time: save it again.
+    /// Returns false if the record may read differently the next time: save it again.
     pub fn is_settled(&self) -> bool {
         self.settled
     }
 
-    /// Attempts to write a record or a blob that failed since the log was opened.
+    /// Number of failed attempts to write a record or a blob since the log was opened.
     pub fn failures(&self) -> u32 {
         self.failures
     }
 
-    /// Sectors erased so far in the life of this log.
+    /// Number of sectors erased in the life of this log.
     pub fn erases(&self) -> u32 {
         self.generation
     }
 
-    /// Erases a sector that is none of the log's, writes a [`blob`] into it, and reads it back.
+    /// Erases a sector that is not the log's, writes a [`blob`] into it, and reads it back.
     ///
     /// # Errors
     /// [`Failed`]: the bytes do not fit the sector, or do not read back.
@@ -103,7 +104,7 @@ impl<F: Flash> Log<F> {
         written
     }
 
-    /// The flash, for its other sectors.
+    /// Returns the flash, for access to its other sectors.
     pub fn flash(&mut self) -> &mut F {
         &mut self.flash
     }
@@ -111,7 +112,7 @@ impl<F: Flash> Log<F> {
     /// Keeps `payload` from now on.
     ///
     /// # Errors
-    /// When it cannot be; what was kept before still is.
+    /// [`SaveError`]; the previous record is still kept.
     pub async fn save(&mut self, payload: &[u8]) -> Result<(), SaveError> {
         let length = u8::try_from(payload.len()).map_err(|_| SaveError::TooLong)?;
         for _ in 0..ATTEMPTS {
@@ -131,28 +132,28 @@ impl<F: Flash> Log<F> {
         self.failures = self.failures.saturating_add(1);
     }
 
-    /// Writes a record and its seal behind what was written before; tells in which sector.
+    /// Writes a record and its seal behind the previous one; returns the number of the sector.
     async fn append(&mut self, payload: &[u8]) -> Result<u32, Failed> {
         let words = record::words(payload.len());
         let first = self.room_for(words).await?;
         let header = Header::new(self.generation, payload).ok_or(Failed)?;
         for nth in 0..words {
             let place = first.behind(nth);
-            // Whatever becomes of it, this word is not programmed again, and the next one is left
-            // for a seal, should the record read right one day.
+            // Whatever happens, this word is not programmed again, and the next one is reserved for
+            // a seal, in case the record later reads correctly.
             self.end = Some(place.behind(2));
             let word = record::word(&header, payload, nth);
             flash::program(&mut self.flash, place, &word).await?;
         }
         let seal = first.behind(words);
         self.end = Some(seal.behind(1));
-        // A seal that does not read back is one all the same: it is not blank.
+        // A seal that does not read back still counts, because it is not blank.
         let _ = self.flash.program(seal, &record::seal()).await;
         Ok(first.sector)
     }
 
-    /// Where a record of so many words and its seal fit: behind the last one, or in the other
-    /// sector, which is erased.
+    /// Returns a place for a record of `words` words and its seal: behind the last one, or in the
+    /// other sector, which is erased.
     async fn room_for(&mut self, words: u32) -> Result<Place, Failed> {
         let fits = |end: &Place| end.word + words < F::SECTOR_WORDS;
         if let Some(end) = self.end.filter(fits) {
@@ -171,8 +172,8 @@ impl<F: Flash> Log<F> {
         Ok(start)
     }
 
-    /// Looks for the last record of a sector, which is taken when its generation is the highest so
-    /// far. Blank words do not end it: each word that could not be programmed may be one.
+    /// Finds the last record of a sector, and takes it if its generation is the highest so far.
+    /// Blank words do not end the search: a word that could not be programmed may be blank.
     fn scan(&mut self, sector: u32, payload: &mut [u8; PAYLOAD_LIMIT]) {
         let mut place = Place { sector, word: 0 };
         while place.word < F::SECTOR_WORDS {
@@ -180,7 +181,7 @@ impl<F: Flash> Log<F> {
             let header = read.ok().as_ref().and_then(Header::of);
             let record = header.filter(|header| self.take(place, header, payload));
             if read != Ok(BLANK) && self.is_newest_in(sector) {
-                // Of what does not read right, this word may be the last; then that of a seal.
+                // In unreadable data, this word may be the last one, followed by a seal.
                 self.end = Some(place.behind(record.map_or(2, |header| header.words() + 1)));
                 self.settled &= record.is_some();
             }
@@ -192,8 +193,8 @@ impl<F: Flash> Log<F> {
         self.newest.is_some_and(|newest| newest.sector == sector)
     }
 
-    /// A sector without the newest record begins with an older one, or with a blank word. Anything
-    /// else is a record that was not finished: that sector is written next.
+    /// A sector without the newest record begins with an older record or a blank word. Otherwise it
+    /// begins with an unfinished record, and is written next.
     fn look_at_the_start(&mut self, sector: u32) {
         if self.is_newest_in(sector) {
             return;
@@ -209,8 +210,8 @@ impl<F: Flash> Log<F> {
         }
     }
 
-    /// Takes the record that begins in a place, unless it is older; false when it does not read
-    /// right.
+    /// Takes the record that begins at a place, unless it is older. Returns false if it does not
+    /// read correctly.
     fn take(&mut self, at: Place, header: &Header, payload: &mut [u8; PAYLOAD_LIMIT]) -> bool {
         let mut read = [0; PAYLOAD_LIMIT];
         let Some(read) = read.get_mut(..usize::from(header.length)) else {
@@ -235,7 +236,7 @@ impl<F: Flash> Log<F> {
     }
 
     fn read_record(&mut self, at: Place, header: &Header, payload: &mut [u8]) -> bool {
-        // With its seal it fits the sector.
+        // The record and its seal must fit the sector.
         let mut whole = at.word + header.words() < F::SECTOR_WORDS;
         for nth in 0..header.words() {
             whole = whole

@@ -1,16 +1,16 @@
-//! A record in words: one that begins it, with its sector's generation, its length and its
-//! checksum, and those that go on with its bytes. The first byte of each says which it is, so that
-//! none of them is ever blank, and none that goes on is taken for one that begins.
+//! Encodes a record in words. The first word holds the sector's generation, the length and the
+//! checksum; the others continue the payload. The first byte of each word states its kind, so no
+//! word is ever blank, and a continuing word is never taken for a first one.
 
 use crate::flash::{WORD_BYTES, Word};
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// The one of Ethernet and zip.
+/// The CRC-32 of Ethernet and zip.
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// First byte of a word that begins a record. Another layout of records has another one.
+/// First byte of a record's first word. A different layout of records uses a different byte.
 const BEGIN: u8 = 0x48;
-/// First byte of a word that says that the record before it is whole.
+/// First byte of a seal, which states that the record before it is whole.
 const SEAL: u8 = 0x5A;
 /// Bytes of a record's first word before the payload: [`BEGIN`], length, generation, checksum.
 const HEADER_BYTES: usize = 10;
@@ -21,10 +21,10 @@ const FIRST_BYTES: usize = WORD_BYTES - HEADER_BYTES;
 /// Longest payload: its length is one byte.
 pub const PAYLOAD_LIMIT: usize = 255;
 
-/// What a record's first word says.
+/// The content of a record's first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
-    /// Higher than that of every record in the other sector that is older.
+    /// Higher than the generation of all older records in the other sector.
     pub generation: u32,
     /// Bytes of the payload.
     pub length: u8,
@@ -32,7 +32,7 @@ pub struct Header {
 }
 
 impl Header {
-    /// That of a record with this payload; `None` when it is longer than [`PAYLOAD_LIMIT`].
+    /// Returns the header for this payload; `None` if it is longer than [`PAYLOAD_LIMIT`].
     pub fn new(generation: u32, payload: &[u8]) -> Option<Self> {
         let length = u8::try_from(payload.len()).ok()?;
         let checksum = checksum(generation, payload);
@@ -43,7 +43,7 @@ impl Header {
         })
     }
 
-    /// What a word says that begins a record; `None` for every other one.
+    /// Returns the header in a record's first word; `None` for any other word.
     pub fn of(word: &Word) -> Option<Self> {
         let [BEGIN, length, n0, n1, n2, n3, c0, c1, c2, c3, ..] = *word else {
             return None;
@@ -55,19 +55,19 @@ impl Header {
         })
     }
 
-    /// Words of the record, without its seal.
+    /// Number of words of the record, without its seal.
     pub fn words(&self) -> u32 {
         words(usize::from(self.length))
     }
 
-    /// Whether this is the payload that it was written for.
+    /// Returns whether this is the payload that belongs to the header.
     pub fn fits(&self, payload: &[u8]) -> bool {
         payload.len() == usize::from(self.length)
             && checksum(self.generation, payload) == self.checksum
     }
 }
 
-/// Words of a record with a payload of so many bytes, without its seal.
+/// Number of words of a record with a payload of `bytes` bytes, without its seal.
 pub const fn words(bytes: usize) -> u32 {
     1 + bytes.saturating_sub(FIRST_BYTES).div_ceil(CONTINUED_BYTES) as u32
 }
@@ -79,8 +79,8 @@ fn checksum(generation: u32, payload: &[u8]) -> u32 {
     digest.finalize()
 }
 
-/// Where the payload's bytes of a record's word lie: from which byte of the word on, and from which
-/// byte of the payload on.
+/// Where the payload lies in a record's `nth` word: the first byte in the word, and the first byte
+/// in the payload.
 fn share(nth: u32) -> (usize, usize) {
     match nth {
         0 => (HEADER_BYTES, 0),
@@ -88,7 +88,7 @@ fn share(nth: u32) -> (usize, usize) {
     }
 }
 
-/// A record's word: the `nth` of [`Header::words`].
+/// Returns the `nth` word of a record, of [`Header::words`].
 pub fn word(header: &Header, payload: &[u8], nth: u32) -> Word {
     let mut word = [0; WORD_BYTES];
     let (at, from) = share(nth);
@@ -116,7 +116,8 @@ fn first_word(header: &Header) -> Word {
     word
 }
 
-/// Takes the payload's bytes out of a record's word. False when it is not the `nth` of one.
+/// Copies the payload's bytes out of a record's word. Returns false if it is not the `nth` word of
+/// a record.
 pub fn take(word: &Word, nth: u32, payload: &mut [u8]) -> bool {
     let (at, from) = share(nth);
     let rest = payload.get_mut(from..).unwrap_or(&mut []);
@@ -126,7 +127,7 @@ pub fn take(word: &Word, nth: u32, payload: &mut [u8]) -> bool {
     nth == 0 || word.first() == Some(&(nth as u8))
 }
 
-/// The word behind a record that is whole.
+/// Returns the word that follows a whole record.
 pub fn seal() -> Word {
     [SEAL; WORD_BYTES]
 }

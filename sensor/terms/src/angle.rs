@@ -1,6 +1,6 @@
 //! Computes the angle of a vector in integers, with a table and a division.
 //!
-//! Over every input, the error of [`atan2`] is at most 0.51 m°, of which 0.5 is the rounding to
+//! Over every input, the error of [`atan2`] is at most 0.51 m°, including 0.5 for the rounding to
 //! whole m°; the tests assert it.
 //!
 //! With a ≥ b ≥ 0 and k the integer nearest to 64·b/a, atan(b/a) = atan(k/64) + atan z with z =

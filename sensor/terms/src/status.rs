@@ -29,7 +29,8 @@ bits! {
     BLOB_OVERFLOW = 2, "blob_overflow";
     /// Areas or shapes of the four markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
-    /// |F| is outside the range that the model was calibrated for, or the markers moved farther than the model's inputs can represent.
+    /// |F| is outside the range that the model was calibrated for, or the markers moved farther
+    /// than the inputs of the model can represent.
     MAGNITUDE_OUT_OF_RANGE = 4, "magnitude_out_of_range";
     /// The force is too small for a reliable direction; its size is still good.
     DIRECTION_UNRELIABLE = 5, "direction_unreliable";

@@ -1,5 +1,5 @@
-//! Tracker and follower in a simulated world: whatever happens, what is delivered is right and
-//! everything is counted.
+//! Tests tracker and follower in a simulated world: every delivered frame is right and every frame
+//! is counted.
 
 mod world;
 
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use std::vec::Vec;
 use world::{BAND, Chip, FRAME, GOOD, Pace, SHAPE, Sent, World, value};
 
-/// Sends frames to prompt handlers, then a good one. Gives the world afterwards.
+/// Sends frames to prompt handlers, then a good one. Returns the world afterwards.
 fn promptly(frames: &[Sent]) -> World {
     let mut world = World::new(Pace::prompt());
     for frame in frames {
@@ -49,7 +49,8 @@ fn a_long_frame_counts_as_such_and_the_next_is_delivered() {
             processed, size, ..
         } = world.tally;
         assert_eq!((processed, size), (3, 1), "{surplus} more");
-        // Whether it was delivered before it turned out to be too long or not: the next one tells.
+        // Whether or not it was delivered before it turned out too long, the next delivery reports
+        // it.
         assert!(world.after[numbers.len() - 2].0, "{surplus} more");
     }
 }
@@ -198,7 +199,7 @@ fn a_frame_under_way_at_a_stop_is_not_captured_and_the_next_one_says_so() {
     assert_eq!(world.after, [(false, false), (false, false), (true, false)]);
 }
 
-/// While the pipeline is set anew it looks at nothing, and no frame is of the time before and
+/// While the pipeline is reconfigured it processes no data, and no frame mixes data from before and
 /// after.
 #[test]
 fn frames_that_are_passed_over_are_counted_and_never_mixed() {
@@ -239,7 +240,7 @@ fn the_reason_of_a_late_interrupt_is_told() {
     let mut tracker = Tracker::new(SHAPE);
     tracker.start(&mut chip);
     chip.edge.number = 1;
-    // Two bands were finished, and one interrupt came.
+    // Two bands were finished, but only one interrupt came.
     (chip.band_flag, chip.second) = (true, false);
     let mut told = Vec::new();
     tracker.band_finished(&mut chip, &mut |event| told.push(event));
@@ -277,9 +278,9 @@ fn check_everything(frames: &[Sent], pace: Pace) -> Result<(), TestCaseError> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(2048))]
 
-    /// Whatever the camera sends, and however slow the follower is: what is delivered is right, and
-    /// every frame is counted once. Interrupts may come up to two bands late, so that one is
-    /// missed.
+    /// For any frames of the camera, and however slow the follower is: every delivered frame is
+    /// right, and every frame is counted once. Interrupts may come up to two bands late, so that
+    /// one is missed.
     #[test]
     fn nothing_is_lost_or_duplicated_silently(
         frames in prop::collection::vec(sent(), 1..40),
@@ -289,8 +290,7 @@ proptest! {
         check_everything(&frames, Pace { interrupts, follower })?;
     }
 
-    /// The same with interrupts that come later than that, as long as no frame is too long by just
-    /// what was missed.
+    /// The same with later interrupts, unless a frame is too long by exactly the missed part.
     #[test]
     fn late_interrupts_are_noticed(
         frames in prop::collection::vec(sent(), 1..40),
@@ -303,7 +303,7 @@ proptest! {
     }
 
     /// With prompt handlers, exactly the good frames are delivered and counted as processed: a
-    /// broken one costs no other.
+    /// broken frame costs no other frame.
     #[test]
     fn a_broken_frame_costs_no_other(frames in prop::collection::vec(sent(), 1..40)) {
         let world = promptly(&frames);

@@ -1,5 +1,5 @@
-//! The world that a tracker and a follower live in: camera, DMA, memory and processor, in steps of
-//! one word.
+//! Simulates the world of tracker and follower: camera, DMA, memory and processor, in steps of one
+//! word.
 
 use crate::{Action, Edge, Event, Follower, Interface, Shape, Tally, Tracker};
 use std::collections::VecDeque;
@@ -9,13 +9,13 @@ pub const BAND: usize = 4;
 const BANDS: u16 = 3;
 const SLOTS: usize = 8;
 pub const FRAME: usize = BAND * BANDS as usize;
-/// Words of time from the last word to the VSYNC pulse, and that it lasts.
+/// Words of time from the last word to the VSYNC pulse, and the pulse's length.
 const FRONT: usize = 4;
 const PULSE: usize = 6;
 /// Words of time from the end of the VSYNC pulse to the first word.
 const BACK: usize = 3;
 pub const SHAPE: Shape = Shape::new(BANDS, SLOTS as u16);
-/// More frames are never under way.
+/// Most events that can wait.
 const EVENTS: usize = SLOTS + 4;
 
 /// One frame of the camera.
@@ -119,7 +119,7 @@ impl Interface for Chip {
     }
 }
 
-/// How prompt everybody is.
+/// How fast handlers and follower react.
 #[derive(Clone, Debug)]
 pub struct Pace {
     /// Words of time until interrupts are served, in turns.
@@ -147,7 +147,7 @@ pub struct World {
     now: usize,
     interrupts_at: usize,
     follower_at: usize,
-    /// When the follower passes over all that came.
+    /// When the follower passes over everything that came.
     pass_over_at: usize,
     turns: usize,
     scanned: Vec<u32>,
@@ -202,7 +202,7 @@ impl World {
         self.pass(PULSE);
     }
 
-    /// Years pass in which nothing is looked at: until the newest frame is that number.
+    /// Simulates years without processing, until the newest frame has this number.
     pub fn grow_old(&mut self, newest: u32) {
         for quarter in [1 << 30, 2 << 30, 3 << 30, newest] {
             self.follower.pass_over(quarter);
@@ -212,14 +212,13 @@ impl World {
         self.tracker.start(&mut self.chip);
     }
 
-    /// For the next `words` of time the follower does something else, and then passes over what
-    /// came.
+    /// For the next `words` of time the follower is busy; then it passes over what came.
     pub fn busy_for(&mut self, words: usize) {
         self.follower_at = usize::MAX;
         self.pass_over_at = self.now + words;
     }
 
-    /// Time passes.
+    /// Lets time pass.
     pub fn pass(&mut self, words: usize) {
         for _ in 0..words {
             self.now += 1;
@@ -241,7 +240,7 @@ impl World {
         }
     }
 
-    /// Handles what stands; answers whether anything did.
+    /// Handles pending interrupts; returns whether there were any.
     fn serve(&mut self) -> bool {
         let Chip {
             band_flag,
@@ -266,7 +265,7 @@ impl World {
         band_flag | frame_flag | overrun_flag
     }
 
-    /// The processor's step: one event, or an early delivery.
+    /// One step of the processor: one event, or an early delivery.
     fn follow(&mut self) {
         let early =
             self.events.is_empty() && self.follower.is_complete() && !self.chip.has_begun_a_band();
@@ -311,7 +310,8 @@ impl World {
         self.delivered.iter().map(|(number, ..)| *number).collect()
     }
 
-    /// Every delivered frame is the camera's, word by word, and none comes twice or late.
+    /// Checks that every delivered frame equals the camera's, word by word, and none comes twice or
+    /// late.
     pub fn check_contents(&self) {
         for (number, words) in &self.delivered {
             let sent: Vec<u32> = (0..FRAME).map(|word| value(*number, word)).collect();
@@ -324,7 +324,8 @@ impl World {
         );
     }
 
-    /// A good frame after everything else, with time for all, so that every frame's end is known.
+    /// Sends a good frame at the end, with time for all handlers, so that every frame's end is
+    /// known.
     pub fn settle(&mut self) {
         self.pace = Pace::prompt();
         (self.interrupts_at, self.follower_at) = (0, 0);

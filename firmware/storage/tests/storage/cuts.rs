@@ -1,10 +1,10 @@
-//! The power is cut at every operation of every action in turn, in every way, and after each cut
-//! again at every operation of the next start.
+//! Cuts the power at every operation of every action, in every way, and after each cut again at
+//! every operation of the next start.
 
 use crate::device::{Action, Device, Kept};
 use crate::mock::{Cells, Cut, EVERY_WAY, Leaves};
 
-/// A device with a history: settings saved so many times, and two models.
+/// A device with a history: settings saved `saves` times, and two models.
 fn used(saves: u8) -> (Cells, Kept) {
     let mut cells = Cells::blank(u64::from(saves));
     let mut device = Device::start(&mut cells, None).unwrap();
@@ -21,14 +21,14 @@ fn used(saves: u8) -> (Cells, Kept) {
     (cells, kept)
 }
 
-/// Does an action with the power cut at an operation; tells whether it came so far.
+/// Performs an action with the power cut at an operation; returns whether the cut happened.
 fn cut_at(cells: &mut Cells, action: &Action, operation: u64, leaves: Leaves) -> bool {
     let cut = Cut { operation, leaves };
     Device::start(cells, Some(cut)).is_none_or(|mut device| device.act(action).is_none())
 }
 
-/// What a device has after it was started again, with the power cut once more at every operation
-/// of that, and then a few times in peace: always the same.
+/// Returns the device's data after a restart. The power is cut once more at every operation of that
+/// restart, and then the device is restarted without cuts: the data is always the same.
 fn started_again(cells: &Cells, leaves: Leaves) -> Kept {
     let mut peaceful = cells.clone();
     let kept = Device::start(&mut peaceful, None).unwrap().kept();
@@ -52,7 +52,7 @@ fn started_again(cells: &Cells, leaves: Leaves) -> Kept {
 
 fn every_cut_keeps_the_old_or_the_new(action: &Action) -> u64 {
     let mut cuts = 0;
-    // The log's sector is full at one of these.
+    // For one of these numbers the log's sector is full.
     for saves in 0..12 {
         let (before, old) = used(saves);
         let new = old.after(action);
@@ -69,7 +69,7 @@ fn every_cut_keeps_the_old_or_the_new(action: &Action) -> u64 {
                     kept == old || kept == new,
                     "{action:?} after {saves} saves, cut at {operation} ({leaves:?}): {kept:?}"
                 );
-                // And it goes on.
+                // The device still works.
                 let next = Action::Set(b"next".to_vec());
                 let mut device = Device::start(&mut cells, None).unwrap();
                 let kept = device.kept();

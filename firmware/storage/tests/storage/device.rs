@@ -1,5 +1,5 @@
-//! A device as the firmware is one: a record with its settings and with the blob in use, and two
-//! sectors for blobs.
+//! Simulates a device like the firmware: a record with its settings and with the blob in use, and
+//! two sectors for blobs.
 
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError, blob};
 
@@ -8,14 +8,14 @@ use crate::mock::{Cells, Cut, Mock, powered};
 /// The sectors of blobs.
 const SLOTS: [u32; 2] = [2, 3];
 
-/// What a device has.
+/// The data of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Kept {
     pub settings: Vec<u8>,
     pub model: Option<Vec<u8>>,
 }
 
-/// What its user does.
+/// An action of the user.
 #[derive(Clone, Debug)]
 pub enum Action {
     Set(Vec<u8>),
@@ -76,7 +76,7 @@ pub struct Device<'c> {
 }
 
 impl<'c> Device<'c> {
-    /// Starts it; nothing when the power fails meanwhile.
+    /// Starts the device; returns `None` if the power fails meanwhile.
     pub fn start(cells: &'c mut Cells, cut: Option<Cut>) -> Option<Self> {
         let mut payload = [0; PAYLOAD_LIMIT];
         let (log, length) = Log::open(Mock::new(cells, cut), &mut payload);
@@ -84,13 +84,13 @@ impl<'c> Device<'c> {
         let mut device = Self { log, record };
         if !device.log.is_settled() {
             let record = device.record.clone();
-            // Worn flash keeps what it has.
+            // Worn flash keeps its data.
             let _ = powered(device.save(record))?;
         }
         Some(device)
     }
 
-    /// What it has; reads the blob.
+    /// Returns its data, including the blob.
     pub fn kept(&mut self) -> Kept {
         let model = self.record.blob.map(|(slot, length, expected)| {
             let mut bytes = vec![0; usize::from(length)];
@@ -105,7 +105,7 @@ impl<'c> Device<'c> {
         }
     }
 
-    /// Does what its user does; nothing when the power fails meanwhile.
+    /// Performs an action; returns `None` if the power fails meanwhile.
     pub fn act(&mut self, action: &Action) -> Option<Result<(), SaveError>> {
         powered(async {
             let mut record = self.record.clone();

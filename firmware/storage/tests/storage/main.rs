@@ -1,4 +1,4 @@
-//! What is kept, on a flash whose power is cut at any operation.
+//! Tests the stored data on a flash whose power is cut at any operation.
 
 mod cuts;
 mod device;

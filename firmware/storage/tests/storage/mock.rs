@@ -1,5 +1,5 @@
-//! A flash in memory, of words with an error correcting code, whose power is cut on request, and
-//! whose words wear out.
+//! Simulates a flash whose words have an error correcting code and wear out, and whose power can be
+//! cut.
 
 use std::cell::Cell;
 use std::future::{Future, pending};
@@ -14,29 +14,29 @@ pub const SECTOR_WORDS: u32 = 24;
 /// Two of the log, two for blobs.
 pub const SECTORS: u32 = 4;
 
-/// What a word is like.
+/// The state of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// It reads so.
+    /// It reads as this.
     Whole(Word),
     /// It does not read.
     Torn,
-    /// It reads so at one time, and not at another.
+    /// It reads as this at one time, and as an error at another.
     Flaky(Word),
 }
 
-/// What an operation leaves that was cut off, of each word that it was to change.
+/// The state of each affected word after an operation was cut off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Leaves {
-    /// As it was.
+    /// As before the operation.
     Before,
     /// Unreadable.
     Torn,
-    /// As it was to be, or unreadable, from one reading to the next.
+    /// As after the operation or unreadable, differently at each read.
     Flaky,
-    /// As it was to be.
+    /// As after the operation.
     After,
-    /// Of an erased sector every third word one of the first three.
+    /// In an erased sector, every third word in one of the first three states.
     Mixed,
 }
 
@@ -58,7 +58,7 @@ pub struct Cells {
     pub operations: u64,
     /// Words that cannot be programmed.
     pub worn: Vec<u32>,
-    /// Words that stay as they are when they are programmed.
+    /// Words that stay unchanged when they are programmed.
     pub deaf: Vec<u32>,
     chance: u64,
 }
@@ -100,7 +100,7 @@ impl Cells {
 /// A cut of the power at an operation.
 #[derive(Clone, Copy, Debug)]
 pub struct Cut {
-    /// Which one, counted from the start of the device.
+    /// Number of the operation, counted from the start of the device.
     pub operation: u64,
     pub leaves: Leaves,
 }
@@ -124,7 +124,8 @@ impl<'c> Mock<'c> {
         }
     }
 
-    /// Counts an operation; what it leaves when the power fails in it.
+    /// Counts an operation. Returns the state that it leaves if the power fails in it, otherwise
+    /// `None`.
     fn begin(&mut self) -> Option<Leaves> {
         assert!(!self.is_cut.get(), "nothing runs without power");
         let nth = self.begun;
@@ -157,7 +158,7 @@ impl Flash for Mock<'_> {
     async fn program(&mut self, place: Place, word: &Word) -> Result<(), Failed> {
         let at = index(place);
         let before = self.cells.words[at];
-        // One that was cut off before anything was programmed is as blank as any.
+        // A word whose programming was cut off before it began is still blank.
         assert_eq!(before, State::Whole(BLANK), "{place:?} programmed twice");
         if let Some(leaves) = self.begin() {
             self.cells.words[at] = Cells::left(leaves, at, before, *word);
@@ -192,7 +193,7 @@ impl Flash for Mock<'_> {
     }
 }
 
-/// Runs what waits for nothing but the flash; `None` when the power was cut in it.
+/// Runs a future that waits only for the flash; `None` if the power was cut in it.
 pub fn powered<T>(work: impl Future<Output = T>) -> Option<T> {
     let mut context = Context::from_waker(Waker::noop());
     match pin!(work).poll(&mut context) {

@@ -1,4 +1,4 @@
-//! Any actions with the power cut at any operation, over and over on the same flash.
+//! Performs random actions with the power cut at any operation, repeatedly on the same flash.
 
 use proptest::prelude::*;
 

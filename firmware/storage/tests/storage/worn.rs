@@ -1,4 +1,4 @@
-//! Words that cannot be programmed any more, and how even the wear is.
+//! Tests words that can no longer be programmed, and how evenly the flash wears.
 
 use crate::device::{Action, Device, Kept};
 use crate::mock::{Cells, SECTOR_WORDS};
