@@ -1,11 +1,12 @@
-//! MDMA channel 0: bands from AXI SRAM into DTCM, where the core reads them without waiting.
+//! Copies bands by MDMA channel 0 from AXI SRAM into DTCM, where the core reads them without
+//! waiting.
 //!
 //! # Design
-//! Three buffers: while the core scans one band, the next one is copied when it is there already,
-//! and the one before stays, as its last rows may have to be weighed yet. The core asks for a band
-//! when it knows that it is finished, so it waits for a copy only when it had nothing to do: one
-//! band of 320 × 8 pixels moves in about 6 µs (640 reads of 8 bytes and 1280 writes of 4 at the
-//! 240 MHz of the bus; an estimate, not measured).
+//! There are three buffers. While the core scans one band, the next one is copied if it has already
+//! arrived; the previous one stays, because its last rows may still have to be weighed. The core
+//! asks for a band once the band is finished, so it waits for a copy only if it was idle. One band
+//! of 320 × 8 pixels takes about 6 µs (640 reads of 8 bytes and 1280 writes of 4 at the 240 MHz of
+//! the bus; an estimate, not measured).
 
 use crate::bands::{self, BAND_LENGTH, SHAPE};
 use crate::block_move::{BlockMove, End};
@@ -19,7 +20,7 @@ const CHANNEL: usize = 0;
 #[repr(C, align(128))]
 struct Rows([u16; BAND_LENGTH]);
 
-/// The one being scanned, the one before it, and the next.
+/// The current band, the previous one, and the next.
 const COUNT: usize = 3;
 
 static BUFFERS: ConstStaticCell<[Rows; COUNT]> =
@@ -30,11 +31,11 @@ pub struct BandCopy {
     _channel: Peri<'static, peripherals::MDMA_CH0>,
     mover: BlockMove<CHANNEL>,
     buffers: &'static mut [Rows; COUNT],
-    /// The buffer of the copy under way, or the next one.
+    /// Index of the buffer of the active copy, or of the next one.
     next: usize,
-    /// The band that is being copied, or was copied ahead.
+    /// The band that is being copied, or was copied, ahead.
     ahead: Option<u32>,
-    /// The band that was fetched last, when it was intact.
+    /// The last band that was fetched, if it was intact.
     before: Option<u32>,
 }
 
@@ -42,7 +43,7 @@ pub struct BandCopy {
 pub struct Fetched<'b> {
     /// Its pixels.
     pub rows: &'b [u16],
-    /// Those of the band before it; none when that is not there.
+    /// The pixels of the band before it; empty if that is no longer in memory.
     pub above: &'b [u16],
 }
 
@@ -59,9 +60,9 @@ impl BandCopy {
         }
     }
 
-    /// A finished band. `finished` tells how many bands are finished by now; when there is one more
-    /// already, its copy begins. `None` when the band was overwritten meanwhile, or could not be
-    /// copied.
+    /// Returns a finished band. `finished` returns how many bands are finished by now; if the next
+    /// band is among them, its copy begins. Returns `None` if the band was overwritten meanwhile,
+    /// or could not be copied.
     pub fn fetch(&mut self, band: &Band, finished: impl Fn() -> u32) -> Option<Fetched<'_>> {
         if self.ahead.take() != Some(band.sequence) {
             self.start(band.sequence);
@@ -89,13 +90,13 @@ impl BandCopy {
         })
     }
 
-    /// Bands are fetched anew that were fetched before: none was copied ahead, and none lies above
+    /// Call before bands are fetched a second time: none counts as copied ahead, and none as above
     /// the next.
     pub fn rewind(&mut self) {
         (self.ahead, self.before) = (None, None);
     }
 
-    /// Begins to copy a band into the next buffer. What was under way is given up.
+    /// Begins to copy a band into the next buffer. An active copy is aborted.
     fn start(&mut self, sequence: u32) {
         let Some(buffer) = self.buffers.get_mut(self.next) else {
             return;

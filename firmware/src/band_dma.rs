@@ -1,12 +1,12 @@
-//! DMA1 stream 0: DCMI's data register into the ring of bands, without end.
+//! Writes DCMI's data register into the ring of bands, endlessly, by DMA1 stream 0.
 //!
 //! # Design
-//! Double-buffer mode: while the stream fills one target, the handler of its interrupt sets the
-//! other one to the slot after. Direct mode (no DMA FIFO), so that the count of missing words is
-//! exact at any moment and nothing has to be flushed. One interrupt a band.
+//! In double-buffer mode, while the stream fills one target, the handler of its interrupt sets the
+//! other target to the slot after. Direct mode (no DMA FIFO) keeps the count of missing words exact
+//! at any moment, and needs no flush. There is one interrupt for each band.
 //!
 //! # Note
-//! The ring lies in AXI SRAM: this DMA reaches neither DTCM nor ITCM.
+//! The ring is in AXI SRAM, because this DMA reaches neither DTCM nor ITCM.
 
 use crate::bands::{self, BAND_LENGTH};
 use crate::seeded_bugs;
@@ -20,7 +20,7 @@ const WORDS: u16 = (BAND_LENGTH / 2) as u16 / seeded_bugs::BAND_DIVISOR;
 
 /// The stream.
 pub struct BandDma {
-    /// Holding it says that nobody else uses the stream.
+    /// Ownership proves that no other code uses the stream.
     _stream: Peri<'static, peripherals::DMA1_CH0>,
 }
 
@@ -30,8 +30,8 @@ impl BandDma {
         Self { _stream: stream }
     }
 
-    /// Starts anew: bands from the data register at `source` into slots `first`, `second`, and then
-    /// where [`aim`](Self::aim) says.
+    /// Starts anew: bands from the data register at `source` go into slots `first` and `second`,
+    /// and then into those of [`aim`](Self::aim).
     pub fn start(&mut self, source: *mut u32, first: u16, second: u16) {
         self.halt();
         DMAMUX1
@@ -43,7 +43,7 @@ impl BandDma {
         stream.m1ar().write_value(bands::address(second));
         stream.ndtr().write(|w| w.set_ndt(WORDS));
         stream.fcr().write_value(regs::Fcr(0));
-        // What the core wrote to the ring at boot must not arrive after the DMA's words.
+        // The core's writes to the ring at boot must not arrive after the DMA's words.
         cortex_m::asm::dmb();
         stream.cr().write(|w| {
             w.set_dir(vals::Dir::PERIPHERAL_TO_MEMORY);
@@ -58,8 +58,8 @@ impl BandDma {
         });
     }
 
-    /// Stops the stream and forgets its events; returns when its last write is done. That takes
-    /// some bus cycles; if it should ever take longer, the watchdog ends it.
+    /// Stops the stream and discards its events. Returns when its last write is done, after some
+    /// bus cycles; if that ever takes longer, the watchdog resets the program.
     pub fn halt(&mut self) {
         let control = registers().cr();
         control.modify(|w| w.set_en(false));
@@ -83,12 +83,12 @@ impl BandDma {
         }
     }
 
-    /// Whether the second target is being filled.
+    /// Returns whether the second target is being filled.
     pub fn fills_second(&self) -> bool {
         registers().cr().read().ct() == vals::Ct::MEMORY1
     }
 
-    /// Whether a band was finished since this was asked last.
+    /// Returns whether a band was finished since the previous call.
     pub fn take_finished(&mut self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
         if finished {
@@ -98,18 +98,18 @@ impl BandDma {
         finished
     }
 
-    /// Whether the bus refused an access, which stopped the stream.
+    /// Returns whether the bus refused an access, which stops the stream.
     pub fn failed(&self) -> bool {
         DMA1.isr(STREAM / 4).read().teif(STREAM % 4)
     }
 
-    /// Whether a band was just finished, or none has begun.
+    /// Returns whether a band was just finished, or none has begun.
     pub fn is_between_bands(&self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
         finished || registers().ndtr().read().ndt() == WORDS
     }
 
-    /// Whether words have come since the newest band that was [taken](Self::take_finished).
+    /// Returns whether words have come since the last band that was [taken](Self::take_finished).
     pub fn has_begun_a_band(&self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
         finished || registers().ndtr().read().ndt() != WORDS

@@ -1,4 +1,4 @@
-//! The ring of bands in AXI SRAM that the camera's DMA fills, and its numbers.
+//! Defines the ring of bands in AXI SRAM that the camera's DMA fills.
 //!
 //! The DMA writes it and the MDMA reads it; the core touches it once, at boot.
 
@@ -7,15 +7,15 @@ use crate::camera::{HEIGHT, USUAL_FORMAT, WIDTH};
 use core::mem::MaybeUninit;
 use hivtac_capture::Shape;
 
-/// Rows of a band: as many as the sensing takes at a time, for each time costs it some hundred
+/// Rows of a band: as many as the sensing takes at a time, because each call costs some hundred
 /// cycles.
 pub const ROWS: u16 = 8;
-/// Bands in the ring: at 320 × 240 a little more than a frame.
+/// Number of bands in the ring: at 320 × 240 slightly more than a frame.
 pub const SLOTS: u16 = 32;
 /// How frames, bands and slots relate.
 pub const SHAPE: Shape = Shape::new(HEIGHT / ROWS, SLOTS);
-/// `u16`s of a band, whatever pixels they hold: the size of a slot. All of a camera's formats have
-/// rows of the same length.
+/// `u16`s of a band, in any pixel format: the size of a slot. All formats of a camera have rows of
+/// the same length.
 pub const BAND_LENGTH: usize = USUAL_FORMAT.pixels().row_length(WIDTH) * ROWS as usize;
 /// Bytes of a band.
 pub const BAND_BYTES: usize = BAND_LENGTH * size_of::<u16>();
@@ -23,11 +23,11 @@ pub const BAND_BYTES: usize = BAND_LENGTH * size_of::<u16>();
 const _: () = {
     assert!(HEIGHT.is_multiple_of(ROWS));
     assert!(BAND_BYTES.is_multiple_of(BUFFER_BYTES as usize));
-    // The widest rows that the pipeline takes fit, too.
+    // The widest rows of the pipeline fit, too.
     assert!(ring_bytes(800) <= 512 * 1024);
 };
 
-/// Size of the ring for rows of so many pixels, bytes.
+/// Size of the ring for rows of `width` pixels, bytes.
 const fn ring_bytes(width: usize) -> usize {
     SLOTS as usize * ROWS as usize * width * size_of::<u16>()
 }
@@ -44,8 +44,8 @@ pub fn address(slot: u16) -> u32 {
     base + u32::from(slot % SLOTS) * BAND_BYTES as u32
 }
 
-/// Writes every word once, which gives the memory's error correction codes a defined start. Call
-/// before the DMA runs.
+/// Writes every word once, so that the memory's error correction codes are defined. Call before the
+/// DMA runs.
 pub fn clear() {
     // SAFETY: no reference to the ring is ever made, and nothing else writes to it yet.
     unsafe { (&raw mut RING).write_bytes(0, 1) };

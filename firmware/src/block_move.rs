@@ -1,44 +1,45 @@
-//! The MDMA: one block of memory to another place, on software request. It alone reaches DTCM.
+//! Moves one block of memory to another place by MDMA, on software request. Only the MDMA reaches
+//! DTCM.
 //!
 //! # Note
-//! Coherence: AXI SRAM and the flash's second bank are not cached (`caches`), nor is DTCM ever. A
-//! barrier on each side keeps the core's accesses to the blocks from moving past the start and the
-//! end.
+//! Coherence: AXI SRAM and the flash's second bank are not cached (`caches`), and DTCM never is. A
+//! barrier on each side keeps the core's accesses to the blocks between the end of one move and the
+//! start of the next.
 
 use embassy_stm32::pac::mdma::{Ch, regs, vals};
 use embassy_stm32::pac::{MDMA, RCC};
 
-/// Most bytes that the MDMA reads and then writes at once: its whole buffer. Every block is a
-/// multiple of it in size and place, or half or a quarter of it.
+/// Most bytes that the MDMA reads and then writes at once: its whole buffer. The size and address
+/// of every block are multiples of it, or of half or a quarter of it.
 pub const BUFFER_BYTES: u32 = 128;
-/// Core cycles between two looks at a move under way: a band takes twenty times as long, and looks
+/// Core cycles between two checks of an active move. A band takes twenty times as long, and checks
 /// without a pause would only keep the bus busy.
 const PAUSE_CYCLES: u32 = 128;
-/// Looks at a move under way before it counts as failed: a few milliseconds.
+/// Number of checks before a move counts as failed: a few milliseconds.
 const PATIENCE: u32 = 10_000;
-/// TEIF to TCIF of IFCR.
+/// The flags TEIF to TCIF of IFCR.
 const ALL_FLAGS: u32 = 0x1F;
 
 /// One end of a move: the address of its first byte.
 #[derive(Clone, Copy)]
 pub enum End {
-    /// On the AXI bus, as AXI SRAM and flash: words of 8 bytes.
+    /// On the AXI bus, like AXI SRAM and flash: words of 8 bytes.
     Axi(u32),
-    /// In DTCM: words of 4 bytes, as more is not allowed there (RM0433, MDMA_CxTCR).
+    /// In DTCM: words of 4 bytes, because larger ones are not allowed there (RM0433, MDMA_CxTCR).
     Tcm(u32),
 }
 
-/// One channel of the controller; of two that want to move, the lower number goes first.
+/// One channel of the controller; among active channels, the lower number has priority.
 pub struct BlockMove<const CHANNEL: usize>;
 
 impl<const CHANNEL: usize> BlockMove<CHANNEL> {
-    /// For who holds this channel's peripheral.
+    /// For the owner of this channel's peripheral.
     pub fn new() -> Self {
         RCC.ahb3enr().modify(|w| w.set_mdmaen(true));
         Self
     }
 
-    /// Begins to move `bytes` bytes, at most 65,536. What was under way is given up.
+    /// Begins to move `bytes` bytes, at most 65,536. An active move is aborted.
     pub fn start(&mut self, source: End, destination: End, bytes: usize) {
         let channel = self.registers();
         channel.cr().write_value(regs::Cr(0));
@@ -56,7 +57,7 @@ impl<const CHANNEL: usize> BlockMove<CHANNEL> {
             w.set_dbus(destination.bus());
         });
         channel.mar().write_value(regs::Mar(0));
-        // The core's last reads of the destination come before the MDMA's writes.
+        // The core's last reads of the destination must come before the MDMA's writes.
         cortex_m::asm::dmb();
         channel.cr().write(|w| w.set_en(true));
         channel.cr().write(|w| {
@@ -65,7 +66,7 @@ impl<const CHANNEL: usize> BlockMove<CHANNEL> {
         });
     }
 
-    /// Waits for the end of the move; says whether it went well.
+    /// Waits for the end of the move; returns whether it succeeded.
     pub fn wait(&self) -> bool {
         for _ in 0..PATIENCE {
             let state = self.registers().isr().read();
@@ -115,7 +116,7 @@ impl End {
     }
 }
 
-/// So many words at once: a buffer is filled or emptied by one burst or by whole ones.
+/// `words` words at once: one burst or several whole bursts fill or empty the buffer.
 fn burst(words: u32) -> vals::Burst {
     match words {
         16.. => vals::Burst::INCR16,
@@ -125,7 +126,7 @@ fn burst(words: u32) -> vals::Burst {
     }
 }
 
-/// One software request moves one block, so many bytes at once.
+/// One software request moves one block, `at_once` bytes at a time.
 fn set_up(w: &mut regs::Tcr, source: End, destination: End, at_once: u32) {
     w.set_sinc(vals::Incmode::INCREMENT);
     w.set_ssize(source.word());

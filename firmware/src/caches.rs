@@ -1,21 +1,20 @@
-//! Caches and the memory protection unit.
+//! Sets up the caches and the memory protection unit (MPU).
 //!
-//! Both caches are on: code and model lie in flash, which is slow without them. What the DMA writes
-//! and the core reads lies in AXI SRAM, which one MPU region makes normal, non-cacheable memory. So
-//! no cache line can ever hold a stale pixel and no code has to remember to invalidate one. DTCM is
-//! never cached.
+//! Both caches are on, because code and model are in flash, which is slow without them. Memory that
+//! the DMA writes and the core reads is in AXI SRAM, which one MPU region makes normal,
+//! non-cacheable memory. So no cache line can hold a stale pixel, and no code has to invalidate
+//! one. DTCM is never cached.
 
 use crate::flash;
 use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 
-/// `MPU_RASR` of a region: attributes in the bits that the architecture gives them (ARMv7-M,
-/// B3.5.9).
+/// `MPU_RASR` of a region, with the attributes in the architecture's bits (ARMv7-M, B3.5.9).
 struct Region {
     base: u32,
     /// log2 of the size in bytes.
     size_log2: u32,
-    /// Eighths of the region that do not belong to it.
+    /// Number of the region's eighths that are disabled.
     disabled_eighths: u32,
     access: u32,
     /// TEX, S, C, B.
@@ -37,8 +36,8 @@ const WRITE_THROUGH: u32 = 1 << 17;
 const WRITE_BACK: u32 = 1 << 19 | 1 << 17 | 1 << 16;
 const NEVER_EXECUTE: u32 = 1 << 28;
 
-/// External memory (0x6000_0000 to 0xDFFF_FFFF) is not fitted, but the core may read there
-/// speculatively and then waits for ever (ST AN4838, section 4): no access at all.
+/// External memory (0x6000_0000 to 0xDFFF_FFFF) is not fitted. The core may read there
+/// speculatively and then wait for ever (ST AN4838, section 4): no access at all.
 const EXTERNAL_MEMORY: Region = Region {
     base: 0,
     size_log2: 32,
@@ -48,7 +47,7 @@ const EXTERNAL_MEMORY: Region = Region {
     execute: false,
 };
 
-/// All SRAM and DTCM, as in the default map, but never run.
+/// All SRAM and DTCM, as in the default map, but never executed.
 const DATA: Region = Region {
     base: 0x2000_0000,
     size_log2: 29,
@@ -68,7 +67,7 @@ const DMA_BUFFERS: Region = Region {
     execute: false,
 };
 
-/// ITCM, once its code is loaded: a stray write, as through a null pointer, faults instead of
+/// ITCM, after its code is loaded. A stray write, such as through a null pointer, faults instead of
 /// changing the program.
 const NEAR_CODE: Region = Region {
     base: 0,
@@ -79,7 +78,7 @@ const NEAR_CODE: Region = Region {
     execute: true,
 };
 
-/// The program and its constants, as in the default map, but never written.
+/// The program and its constants, as in the default map, but read-only.
 const PROGRAM: Region = Region {
     base: 0x0800_0000,
     size_log2: 20,
@@ -89,8 +88,8 @@ const PROGRAM: Region = Region {
     execute: true,
 };
 
-/// The flash's second bank: nothing is read ahead while it is programmed or erased, and what is
-/// stored arrives at once and in order.
+/// The flash's second bank as device memory: no speculative reads while it is programmed or erased,
+/// and writes arrive at once and in order.
 const KEPT: Region = Region {
     base: flash::BASE,
     size_log2: flash::SIZE_LOG2,
@@ -100,12 +99,11 @@ const KEPT: Region = Region {
     execute: false,
 };
 
-/// Where regions overlap, the later one counts. What is run is never written, and what is written
-/// is never run.
+/// If regions overlap, the later one counts. Code is never writable, and writable memory is never
+/// executed.
 const REGIONS: [Region; 6] = [EXTERNAL_MEMORY, DATA, DMA_BUFFERS, NEAR_CODE, PROGRAM, KEPT];
 
-/// Sets the MPU regions and switches both caches on. Call first, before anything touches a DMA
-/// buffer.
+/// Sets the MPU regions and enables both caches. Call first, before any access to a DMA buffer.
 pub fn enable(core: &mut Peripherals) {
     set_regions(&mut core.MPU);
     core.SCB.enable_icache();
@@ -114,7 +112,7 @@ pub fn enable(core: &mut Peripherals) {
 
 fn set_regions(mpu: &mut MPU) {
     const ENABLE: u32 = 1;
-    /// Everywhere else the architecture's default memory map holds.
+    /// All other addresses use the architecture's default memory map.
     const PRIVILEGED_DEFAULT: u32 = 1 << 2;
     cortex_m::asm::dmb();
     // SAFETY: the caches are still off, and memory in use keeps the type of the default map or, as

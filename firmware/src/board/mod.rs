@@ -1,5 +1,5 @@
-//! The board in use: all of its pins and clocks. A cargo feature says which; each is one file with
-//! the same names.
+//! Selects the board in use, with all of its pins and clocks. A cargo feature selects it; each
+//! board is one file with the same names.
 
 mod parts;
 mod silicon;

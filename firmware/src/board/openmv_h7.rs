@@ -1,4 +1,4 @@
-//! OpenMV Cam H7 with its global shutter module.
+//! Sets up the OpenMV Cam H7 with its global shutter module.
 //!
 //! | what | pins |
 //! |---|---|
@@ -34,15 +34,14 @@ use embassy_stm32::{Peri, pac, peripherals};
 /// Name in the device's hello.
 pub const NAME: &str = "openmv-h7";
 const CRYSTAL_HZ: u32 = 12_000_000;
-/// What TIM1 counts: twice the peripherals' clock.
+/// Frequency of TIM1's counter: twice the peripherals' clock.
 const TIMER_HZ: u32 = 240_000_000;
-/// The camera's clock is high for four ninths of its period: OpenMV's firmware gives the module the
-/// same.
+/// The camera's clock is high for four ninths of its period, as OpenMV's firmware sets it for this
+/// module.
 const XCLK_DIVIDER: u32 = 9;
 const _: () = assert!(XCLK_HZ == TIMER_HZ / XCLK_DIVIDER);
 
-/// Starts the clocks and sets up every pin. Call once. On silicon that is too old it does not
-/// return.
+/// Starts the clocks and sets up every pin. Call once. Does not return on silicon that is too old.
 pub fn start() -> Board {
     silicon::refuse_old(&Led {
         port: pac::GPIOC,

@@ -1,5 +1,5 @@
-//! What boards have in common: an STM32H743 with a camera on DCMI and I²C1, a crystal, USB and an
-//! LED.
+//! Defines the parts that all boards have: an STM32H743 with a camera on DCMI and I²C1, a crystal,
+//! USB and an LED.
 
 use crate::band_copy::BandCopy;
 use crate::camera::{BUS_CLOCK, Camera};
@@ -16,7 +16,7 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::Duration;
 
-/// The watchdog resets a program whose thread mode stood still for so long.
+/// The watchdog resets the program if its thread mode is blocked for this time.
 pub const WATCHDOG: Duration = Duration::from_secs(2);
 
 /// DCMI's alternate function on each of its pins.
@@ -27,19 +27,19 @@ pub struct Board {
     pub camera: Camera,
     /// The camera's data side.
     pub capture: Capture,
-    /// Where the pipeline gets its rows from.
+    /// The source of the pipeline's rows.
     pub bands: BandCopy,
-    /// Where settings are kept.
+    /// The flash that keeps the settings.
     pub flash: SecondBank,
-    /// What keeps a frame for the host.
+    /// The copier that keeps a frame for the host.
     pub snapshots: SnapshotCopy,
     /// The microcontroller's temperature.
     pub thermometer: Thermometer,
-    /// What the USB task needs to make its driver.
+    /// The parts that the USB task needs for its driver.
     pub usb: UsbPort,
     /// The status LED, off.
     pub led: StatusLed,
-    /// Not yet started.
+    /// Not started yet.
     pub watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
 }
 
@@ -69,8 +69,8 @@ impl StatusLed {
     }
 }
 
-/// A crystal of so many Hz, divided to what PLL1 multiplies by `mul`: 960 MHz, of which half is for
-/// the core, 240 MHz for the buses, 120 MHz for the peripherals.
+/// The clocks from a crystal of `crystal_hz`, divided such that PLL1 reaches 960 MHz with `mul`.
+/// Half of that is for the core, 240 MHz for the buses, 120 MHz for the peripherals.
 pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hse = Some(Hse {
@@ -100,9 +100,9 @@ pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32:
 }
 
 /// USB runs from the crystal, too: 960 MHz / 20 = 48 MHz. The internal 48 MHz oscillator is off by
-/// more than the 0.25 % that full speed allows until it is trimmed to the host's packets, and the
-/// HAL has it trimmed to those of the other USB core, OTG_HS: its source is write-protected from
-/// then on (RM0433, CRS_CFGR).
+/// more than the 0.25 % that full speed allows until it is trimmed to the host's packets. The HAL
+/// trims it to those of the other USB core, OTG_HS, and its source is write-protected from then on
+/// (RM0433, CRS_CFGR).
 fn clock_usb(rcc: &mut Config) {
     rcc.mux.usbsel = mux::Usbsel::PLL1_Q;
     if seeded_bugs::USB_FROM_HSI48 {
@@ -113,24 +113,24 @@ fn clock_usb(rcc: &mut Config) {
     }
 }
 
-/// Gives the pins to DCMI for good.
+/// Connects the pins to DCMI permanently.
 pub fn connect_camera(pins: [Peri<'static, AnyPin>; 11]) {
     for pin in pins {
         let mut pin = Flex::new(pin);
-        // Pulled down: with no camera fitted, an open VSYNC pin must not make interrupts.
+        // Pulled down: without a camera, an open VSYNC pin must not cause interrupts.
         pin.set_as_af_unchecked(DCMI_FUNCTION, AfType::input(Pull::Down));
         // Dropping it would disconnect the pin.
         core::mem::forget(pin);
     }
 }
 
-/// Of the camera's control bus.
+/// The configuration of the camera's control bus.
 pub fn bus_config() -> i2c::Config {
     let mut config = i2c::Config::default();
     config.frequency = BUS_CLOCK;
     config.sda_pullup = true;
     config.scl_pullup = true;
-    // A byte takes 90 µs. A bus that hangs must not hold up the tasks below for long.
+    // A byte takes 90 µs. A hanging bus must not delay tasks of lower priority for long.
     config.timeout = Duration::from_millis(5);
     config
 }

@@ -1,4 +1,4 @@
-//! Which revision of the silicon this is, and the end of the program on one that is too old.
+//! Checks the revision of the silicon, and ends the program on one that is too old.
 
 use embassy_stm32::gpio::Level;
 use embassy_stm32::pac::gpio::{Gpio, vals::Moder};
@@ -7,7 +7,7 @@ use embassy_stm32::pac::{DBGMCU, RCC};
 /// REV_ID of the first revision with 480 MHz, X. V, the usual one, is 0x2003; Z and Y are 0x1001
 /// and 0x1003.
 const FIRST_REVISION: u16 = 0x2001;
-/// Tenth of a second, core cycles at the 64 MHz after a reset.
+/// A tenth of a second, in core cycles at the 64 MHz after a reset.
 const TENTH: u32 = 6_400_000;
 
 /// The LED's pin.
@@ -30,14 +30,15 @@ impl Led {
     }
 }
 
-/// REV_ID of this one.
+/// Returns the REV_ID of this microcontroller.
 pub fn revision() -> u16 {
     DBGMCU.idc().read().rev_id()
 }
 
-/// Returns on silicon that runs this program. Before it the core has no more than 400 MHz, setting
-/// up 480 MHz would wait for ever for a voltage that is not there, and the DMA's memory is read
-/// wrongly (errata ES0396, "Reading from AXI SRAM may lead to data read corruption").
+/// Returns only on silicon that can run this program. Earlier silicon has at most 400 MHz, and
+/// setting up 480 MHz would wait for ever for a core voltage that it does not have. It also
+/// corrupts reads of the DMA's memory (errata ES0396, "Reading from AXI SRAM may lead to data read
+/// corruption").
 pub fn refuse_old(led: &Led) {
     let revision = revision();
     if revision >= FIRST_REVISION {
@@ -51,13 +52,13 @@ pub fn refuse_old(led: &Led) {
     flash_for_ever(led);
 }
 
-/// Two flashes a second.
+/// Flashes the LED twice a second, for ever.
 fn flash_for_ever(led: &Led) -> ! {
     RCC.ahb4enr().modify(|w| {
         w.set_gpiocen(true);
         w.set_gpioeen(true);
     });
-    // The clock runs after this.
+    // The read returns once the clock runs.
     let _ = RCC.ahb4enr().read();
     led.set(false);
     led.port

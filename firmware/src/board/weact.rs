@@ -1,4 +1,4 @@
-//! WeAct MiniSTM32H743VIT6 with its camera connector.
+//! Sets up the WeAct MiniSTM32H743VIT6 with its camera connector.
 //!
 //! | what | pins |
 //! |---|---|
@@ -30,11 +30,10 @@ use embassy_stm32::{Peri, pac, peripherals};
 /// Name in the device's hello.
 pub const NAME: &str = "weact-h743";
 const CRYSTAL_HZ: u32 = 25_000_000;
-// The camera's clock is the crystal's, halved.
+// The camera's clock is half of the crystal's.
 const _: () = assert!(camera::XCLK_HZ == CRYSTAL_HZ / 2);
 
-/// Starts the clocks and sets up every pin. Call once. On silicon that is too old it does not
-/// return.
+/// Starts the clocks and sets up every pin. Call once. Does not return on silicon that is too old.
 pub fn start() -> Board {
     silicon::refuse_old(&Led {
         port: pac::GPIOE,
@@ -81,8 +80,8 @@ pub fn start() -> Board {
     }
 }
 
-/// The camera's clock comes from the crystal: its frame rate is exact, and needs no other
-/// oscillator.
+/// The camera's clock comes from the crystal: its frame rate is exact, and no other oscillator is
+/// needed.
 fn start_camera_clock(mco: Peri<'static, peripherals::MCO1>, pin: Peri<'static, peripherals::PA8>) {
     let mut config = McoConfig::default();
     config.prescaler = McoPrescaler::DIV2;

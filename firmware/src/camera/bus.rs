@@ -1,11 +1,11 @@
-//! The camera's control bus, I²C1.
+//! Drives the camera's control bus, I²C1.
 //!
 //! # Design
-//! A transfer that fails is tried again on a freed bus. Two things are known to go wrong. A
-//! microcontroller that was reset amid a byte leaves the camera waiting for the rest of it, holding
-//! SDA low; its reset, where it has one, comes later. And I²C1 may report a bus error where there
-//! was none (errata ES0396, "spurious bus error detection in master mode"), upon which the HAL
-//! gives the transfer up in its middle.
+//! A failed transfer is repeated on a freed bus. Two causes are known. A microcontroller reset in
+//! the middle of a byte leaves the camera waiting for the rest of it, holding SDA low; the camera's
+//! own reset, if it has one, comes later. And I²C1 may report a bus error that did not happen
+//! (errata ES0396, "spurious bus error detection in master mode"), upon which the HAL aborts the
+//! transfer.
 
 use super::free_bus::{self, Lines};
 use embassy_embedded_hal::SetConfig;
@@ -14,17 +14,17 @@ use embassy_stm32::mode::Blocking;
 use embassy_stm32::pac;
 use embassy_stm32::time::Hertz;
 
-/// Of the camera's control bus. The pins' own pull-ups help those on the board.
+/// Clock of the camera's control bus. The pins' own pull-ups support those on the board.
 pub const BUS_CLOCK: Hertz = Hertz::khz(100);
-/// Times that a transfer is tried.
+/// Number of attempts for a transfer.
 const ATTEMPTS: u32 = 3;
 
-/// The bus. Every transfer fails when the device does not answer, or the bus does not work, at
-/// every attempt.
+/// The bus. A transfer fails if the device does not answer, or the bus does not work, at every
+/// attempt.
 pub struct Bus(I2c<'static, Blocking, Master>);
 
 impl Bus {
-    /// At [`BUS_CLOCK`].
+    /// The bus, whose clock must be [`BUS_CLOCK`].
     pub fn new(bus: I2c<'static, Blocking, Master>) -> Self {
         Self(bus)
     }
@@ -40,7 +40,7 @@ impl Bus {
         self.persist(|bus| bus.blocking_write(device, &[register, high, low]))
     }
 
-    /// Reads a register of one byte as SCCB has it: with a stop between address and value.
+    /// Reads a register of one byte by SCCB: with a stop between address and value.
     pub fn read_byte(&mut self, device: u8, register: u8) -> Result<u8, i2c::Error> {
         self.persist(|bus| {
             let mut value = [0];
@@ -70,7 +70,7 @@ impl Bus {
                 Err(error) => error,
             };
             free();
-            // Never fails: the clock is the one it was made with.
+            // Never fails: the bus was created with the same clock.
             let _ = self.0.set_config(&BUS_CLOCK);
             if attempt == ATTEMPTS {
                 return Err(error);
@@ -80,8 +80,7 @@ impl Bus {
     }
 }
 
-/// Has a camera that holds the control bus let go of it, and brings I²C1 to its state after a
-/// reset.
+/// Makes a camera that holds the control bus release it, and resets I²C1.
 fn free() {
     let lines = Lines {
         port: pac::GPIOB,

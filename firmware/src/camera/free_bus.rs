@@ -1,24 +1,25 @@
-//! Frees an I²C bus that a device holds, by nine clocks and a stop (UM10204, section 3.1.16).
+//! Frees an I²C bus that a device holds, with nine clocks and a stop (UM10204, section 3.1.16).
 
 use embassy_stm32::pac::RCC;
 use embassy_stm32::pac::gpio::{Gpio, vals::Moder};
 
-/// Half a clock, core cycles: 5 µs at 480 MHz.
+/// Half a clock period, in core cycles: 5 µs at 480 MHz.
 const HALF: u32 = 2_400;
 
-/// The two lines of a bus on one port, open-drain outputs with or without their alternate function.
+/// The two lines of a bus on one port: open-drain outputs, with or without their alternate
+/// function.
 pub struct Lines {
     /// Their port.
     pub port: Gpio,
-    /// Clock's pin.
+    /// Pin of the clock line.
     pub clock: usize,
-    /// Data's pin.
+    /// Pin of the data line.
     pub data: usize,
 }
 
 impl Lines {
-    /// Clocks until the device lets go of the data line, nine times at most, then stops. Takes 0.2
-    /// ms at most.
+    /// Clocks until the device releases the data line, at most nine times, then sends a stop. Takes
+    /// at most 0.2 ms.
     pub fn free(&self) {
         self.set(self.clock, true);
         self.set(self.data, true);
@@ -59,7 +60,7 @@ impl Lines {
     }
 }
 
-/// Brings I²C1 to its state after a reset. Its clock and filters must be set anew.
+/// Resets I²C1. Its clock and filters must then be set again.
 pub fn reset_i2c1() {
     critical_section::with(|_| {
         RCC.apb1lrstr().modify(|w| w.set_i2c1rst(true));

@@ -1,30 +1,30 @@
-//! Which camera answers: the one that this firmware is for, or another one, which is named.
+//! Identifies the camera: the one that this firmware supports, or a different one, which is named.
 
 use super::{Bus, IDENTITY};
 use core::fmt;
 use embassy_stm32::i2c;
 
-/// How a camera tells what it is.
+/// How to identify a camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Its name.
     pub name: &'static str,
-    /// On the bus, 7 bits.
+    /// Its address on the bus, 7 bits.
     pub address: u8,
-    /// What it says.
+    /// Its identification number.
     pub number: u16,
-    /// Where it says so.
+    /// The registers of that number.
     pub told: Told,
-    /// The cargo feature of the firmware that is for it.
+    /// The cargo feature of the firmware that supports it.
     pub feature: &'static str,
 }
 
-/// Where a camera's number is.
+/// The registers of a camera's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
-    /// In two registers of a byte, the high one first.
+    /// Two registers of a byte, the high one first.
     InBytes([u8; 2]),
-    /// In a register of two bytes.
+    /// One register of two bytes.
     InWord(u8),
 }
 
@@ -47,7 +47,7 @@ pub const MT9V034: Identity = Identity {
     feature: "board-openmv-h7",
 };
 
-/// Every camera that some firmware is for.
+/// Every camera that a firmware supports.
 const KNOWN: [Identity; 2] = [OV7725, MT9V034];
 
 /// Why a camera cannot be used.
@@ -55,18 +55,18 @@ const KNOWN: [Identity; 2] = [OV7725, MT9V034];
 pub enum Error {
     /// It does not acknowledge, or the bus does not work.
     Bus(i2c::Error),
-    /// A camera answers that other firmware is for.
+    /// The camera is supported by a different firmware.
     Other(Identity),
-    /// A part answers that no firmware is for.
+    /// The part is not supported by any firmware.
     WrongId {
         /// Its number.
         found: u16,
     },
-    /// A register does not hold what was written.
+    /// A register does not hold the written value.
     Register {
         /// Its address.
         address: u8,
-        /// What it holds.
+        /// Its value.
         found: u16,
     },
 }
@@ -101,17 +101,17 @@ impl fmt::Display for Error {
     }
 }
 
-/// Checks that the camera is the one that this firmware is for.
+/// Checks whether the camera is the one that this firmware supports.
 ///
 /// # Errors
-/// What is there instead, as far as it can be told.
+/// The camera or the fault that was found instead.
 pub fn check(bus: &mut Bus) -> Result<(), Error> {
     let found = id(bus);
     if found == Ok(IDENTITY.number) {
         return Ok(());
     }
     let mut others = KNOWN.into_iter().filter(|other| *other != IDENTITY);
-    // A bus that does not work at all is not asked for everyone.
+    // If the bus does not work at all, other cameras are not tried.
     let works = !matches!(found, Err(error) if error != i2c::Error::Nack);
     if works && let Some(other) = others.find(|other| other.ask(bus) == Ok(other.number)) {
         return Err(Error::Other(other));
@@ -122,13 +122,13 @@ pub fn check(bus: &mut Bus) -> Result<(), Error> {
     })
 }
 
-/// The number by which the camera in use says what it is.
+/// Reads the identification number of the camera in use.
 pub fn id(bus: &mut Bus) -> Result<u16, i2c::Error> {
     IDENTITY.ask(bus)
 }
 
 impl Identity {
-    /// What answers at its address.
+    /// Reads the number at this camera's address.
     fn ask(&self, bus: &mut Bus) -> Result<u16, i2c::Error> {
         match self.told {
             Told::InBytes([high, low]) => Ok(u16::from_be_bytes([

@@ -1,21 +1,21 @@
-//! The camera's lines besides its buses.
+//! Drives the camera's lines that are not part of a bus.
 
 use embassy_stm32::gpio::Output;
 use embassy_time::{Duration, Timer};
 
-/// How long the camera's reset line is held: thousands of its clocks.
+/// Length of the camera's reset pulse: thousands of its clocks.
 const RESET_PULSE: Duration = Duration::from_millis(1);
 
-/// The camera's lines besides its buses.
+/// The camera's lines that are not part of a bus.
 pub struct CameraLines {
-    /// High = standby: the registers keep their values.
+    /// High means standby: the registers keep their values.
     pub standby: Output<'static>,
-    /// Low = reset, where the microcontroller has that line.
+    /// Low means reset; `None` if the board does not have this line.
     pub reset: Option<Output<'static>>,
 }
 
 impl CameraLines {
-    /// Has the camera run, out of a reset where there is the line for one.
+    /// Ends standby, and resets the camera if there is a line for it.
     pub async fn wake(&mut self) {
         self.standby.set_low();
         if let Some(reset) = &mut self.reset {

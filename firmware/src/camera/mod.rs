@@ -1,5 +1,5 @@
-//! The camera in use: that of the board. Each is one file, and one with its registers, with the
-//! same names.
+//! Selects the camera in use: that of the board. Each camera is one file, and one with its
+//! registers, with the same names.
 
 mod bus;
 mod free_bus;
@@ -39,7 +39,7 @@ use hivtac_wire::settings::CameraReport;
 /// From VSYNC to the middle of the exposure, µs. Written by the capture task; read by the pipeline.
 static EXPOSURE_MIDDLE_US: AtomicI32 = AtomicI32::new(0);
 
-/// How the camera is set. Written at boot and by the capture task; read by the USB tasks, the
+/// The camera's settings. Written at boot and by the capture task; read by the USB tasks, the
 /// memory task and the pipeline.
 static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
     CriticalSectionMutex::new(Cell::new(CameraReport {
@@ -56,7 +56,7 @@ static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
 
-/// What it can be set to.
+/// The limits of its settings.
 pub const LIMITS: CameraLimits = CameraLimits([
     limits(Rate::Full),
     limits(Rate::Half),
@@ -67,7 +67,7 @@ const fn limits(rate: Rate) -> RateLimits {
     RateLimits::new((1_000_000 / frame_us(rate)) as u16, exposures(rate))
 }
 
-/// Exposure and gain are taken as they are after this time: ten frames at a slow rate.
+/// Exposure and gain are accepted as they are after this time: ten frames at a slow rate.
 const PATIENCE: Duration = Duration::from_millis(300);
 
 /// Time from frame to frame.
@@ -75,7 +75,7 @@ pub fn frame_time(rate: Rate) -> Duration {
     Duration::from_micros(frame_us(rate).into())
 }
 
-/// How long frames take by the device's own clock, by the newest two that were looked at.
+/// The frame time by the device's own clock, from the last two frames that were looked at.
 #[derive(Default)]
 pub struct Pace {
     before: Edge,
@@ -97,25 +97,25 @@ impl Pace {
         }
     }
 
-    /// How long the newest ones took, µs; nothing before there were two.
+    /// The frame time, µs; `None` before two frames were looked at.
     pub fn frame_us(&self) -> Option<u32> {
         self.frame_us
     }
 }
 
-/// A search for exposure and gain: over once they are the same for so many frames, or after
+/// A search for exposure and gain. It ends once they are unchanged for `frames` frames, or after
 /// [`PATIENCE`].
 struct Search<F> {
     frames: u32,
     begun: Instant,
-    /// What they are.
+    /// Their newest values.
     found: F,
-    /// Frames in a row for which they are that.
+    /// Number of successive frames with these values.
     steady: u32,
 }
 
 impl<F: PartialEq> Search<F> {
-    /// Begins with what they are.
+    /// Begins with the current values.
     fn new(frames: u32, found: F) -> Self {
         Self {
             frames,
@@ -129,7 +129,7 @@ impl<F: PartialEq> Search<F> {
         self.steady >= self.frames || stats::since(self.begun) >= PATIENCE
     }
 
-    /// What they are a frame later.
+    /// Takes their values a frame later.
     fn look(&mut self, now: F) {
         self.steady = if now == self.found {
             self.steady + 1
@@ -140,38 +140,38 @@ impl<F: PartialEq> Search<F> {
     }
 }
 
-/// What a camera is set to.
+/// The state of a camera, as read back.
 pub struct Setting {
-    /// The number by which it says what it is.
+    /// Its identification number.
     pub id: u16,
-    /// Its registers beside what was written.
+    /// Its registers compared with the written values.
     pub comparison: Comparison,
-    /// How long a row is exposed.
+    /// Exposure of a row.
     pub exposure: Microseconds,
-    /// The longest that it can be.
+    /// The longest possible exposure.
     pub longest_exposure: Microseconds,
     /// Its gain.
     pub gain: Sixteenths,
 }
 
-/// From the VSYNC edge that begins a frame to the middle of its middle row's exposure, µs. Negative
-/// where that was before.
+/// Time from the VSYNC edge that begins a frame to the middle of its middle row's exposure, µs.
+/// Negative if the exposure's middle comes first.
 pub fn exposure_middle_us() -> i32 {
     EXPOSURE_MIDDLE_US.load(Ordering::Relaxed)
 }
 
-/// How it is set, and what it can be set to.
+/// Returns the camera's settings, and their limits.
 pub fn report() -> CameraReport {
     CAMERA.lock(|cell| cell.get())
 }
 
-/// Tells how it is going to be set, before it is.
+/// Reports the settings that the camera is about to get.
 pub fn tell(settings: CameraSettings) {
     let before = report();
     CAMERA.lock(|cell| cell.set(CameraReport { settings, ..before }));
 }
 
-/// Tells how it is set, and where in a frame that has the middle of the exposure.
+/// Reports the camera's settings, and the time of the exposure's middle in a frame with them.
 fn store(middle_us: i32, settings: CameraSettings, exposure: Microseconds, gain: Sixteenths) {
     EXPOSURE_MIDDLE_US.store(middle_us, Ordering::Relaxed);
     let limits = LIMITS;

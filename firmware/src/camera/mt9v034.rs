@@ -1,5 +1,5 @@
-//! onsemi (Aptina) MT9V034, mono, with a global shutter: 160 × 152 pixels of 2 × 2 binned ones,
-//! over I²C with registers of 16 bits.
+//! Controls the onsemi (Aptina) MT9V034, mono, with a global shutter: 160 × 152 pixels, each 2 × 2
+//! binned, over I²C with registers of 16 bits.
 
 use super::identity::{self, Identity};
 use super::mt9v034_registers::{
@@ -14,23 +14,23 @@ use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, Rate};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 
-/// What it says it is.
+/// Its identification.
 pub const IDENTITY: Identity = identity::MT9V034;
 /// Name in the device's hello.
 pub const NAME: &str = "mt9v034";
 /// Its lens and pixels.
 pub const PRESET: Preset = Preset::Mt9v034;
-/// What it sends.
+/// Its pixel format.
 pub const USUAL_FORMAT: Format = Format::Mono;
-/// Columns of a frame, px. Wider than the markers need: rows take the same time down to 80.
+/// Columns of a frame, px. More than the markers need: rows take the same time down to 80.
 pub const WIDTH: u16 = 160;
-/// Rows of a frame, px: what the markers reach in the calibrated range.
+/// Rows of a frame, px: the markers' reach in the calibrated range.
 pub const HEIGHT: u16 = 152;
 
-/// Clock that the board gives it, Hz: it takes 27 MHz at most.
+/// Clock that the board supplies, Hz; at most 27 MHz.
 pub const XCLK_HZ: u32 = 240_000_000 / 9;
 
-/// When its rows are exposed: all at once.
+/// Exposure of its rows: all at once.
 pub const MOTION: Motion = Motion::GLOBAL;
 
 /// Time from frame to frame, µs: rows with data and blank ones.
@@ -38,7 +38,7 @@ pub const fn frame_us(rate: Rate) -> u32 {
     rows_us(HEIGHT + blank_rows(rate))
 }
 
-/// Shortest and longest exposure: a row to the longest.
+/// Shortest and longest exposure: from one row to the longest.
 pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
     [
         Microseconds(rows_us(1) + 1),
@@ -48,29 +48,29 @@ pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
 
 /// PIXCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
-/// Level of VSYNC (FRAME_VALID) while it says "no data": it is high with the rows.
+/// Level of VSYNC (FRAME_VALID) that means "no data": it is high with the rows.
 pub const VSYNC_BLANKING_IS_HIGH: bool = false;
-/// Level of HSYNC (LINE_VALID) while it says "no data": it is high with the data.
+/// Level of HSYNC (LINE_VALID) that means "no data": it is high with the data.
 pub const HREF_BLANKING_IS_HIGH: bool = false;
 
-/// After a reset, until registers are written.
+/// Time after a reset until registers may be written.
 const SETTLE: Duration = Duration::from_millis(20);
-/// Frames in a row with the same exposure and gain are steady. The control looks at every third
-/// frame.
+/// Number of successive frames with equal exposure and gain that count as steady. The camera's
+/// control updates at every third frame.
 const STEADY_FRAMES: u32 = 9;
 /// The camera's control side.
 pub struct Camera {
     registers: Registers,
     lines: CameraLines,
     settings: CameraSettings,
-    /// Of the frames at the newest search for exposure and gain.
+    /// The frame time during the newest search for exposure and gain.
     pub pace: Pace,
-    /// What gain and exposure are kept at.
+    /// The registers that keep gain and exposure.
     locked: [(u8, u16); 3],
 }
 
 impl Camera {
-    /// The bus at 100 kHz or up to 400 kHz. XCLK must already run.
+    /// The bus must run at 100 kHz to 400 kHz, and XCLK must already run.
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
         Self {
             registers: Registers(bus),
@@ -85,7 +85,7 @@ impl Camera {
         }
     }
 
-    /// Has the camera run, checks that it is the right one, and resets its registers.
+    /// Wakes the camera, checks that it is the right one, and resets its registers.
     pub async fn reset(&mut self) -> Result<(), Error> {
         self.lines.wake().await;
         Timer::after(SETTLE).await;
@@ -93,8 +93,8 @@ impl Camera {
         self.registers.write(RESET, 1_u16)
     }
 
-    /// Writes the register table after a reset, and sets it so, within [`LIMITS`](super::LIMITS);
-    /// returns when the camera sends well exposed frames so.
+    /// Writes the register table after a reset, and applies `settings`, which must be within
+    /// [`LIMITS`](super::LIMITS). Returns when the camera sends well exposed frames.
     pub async fn configure(
         &mut self,
         _format: Format,
@@ -105,8 +105,8 @@ impl Camera {
         self.set(settings).await
     }
 
-    /// Sets it so, within [`LIMITS`](super::LIMITS); returns when it sends well exposed
-    /// frames so.
+    /// Applies `settings`, which must be within [`LIMITS`](super::LIMITS). Returns when the camera
+    /// sends well exposed frames.
     pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
         self.settings = settings;
         self.registers.set(rows_for(settings.rate)).await?;
@@ -118,19 +118,19 @@ impl Camera {
         frame_time(self.settings.rate)
     }
 
-    /// There is but one format.
+    /// Does nothing, because there is only one format.
     pub async fn set_format(&mut self, _format: Format) -> Result<(), Error> {
         Ok(())
     }
 
-    /// Lets what is automatic of exposure and gain find what the light needs, and keeps that:
-    /// markers do not change their brightness with what presses the film.
+    /// Lets automatic exposure and gain adapt to the light, and then keeps their values: markers
+    /// must not change their brightness with the load on the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
         let CameraSettings { exposure, gain, .. } = self.settings;
         if exposure.is_some() || gain.is_some() {
             let before = self.exposure()?;
             self.take(before);
-            // What is not automatic is in force while the rest is sought.
+            // Fixed values must be in force while the others are sought.
             self.registers.set(&self.locked).await?;
         }
         self.registers
@@ -144,7 +144,7 @@ impl Camera {
         }
         self.take(search.found);
         self.registers.set(&self.locked).await?;
-        // What was set is in force from the next frame on.
+        // Settings are in force from the next frame on.
         Timer::after(2 * self.frame_time()).await;
         let exposed = self.exposed();
         // All rows' exposure ends before the first one is read.
@@ -152,14 +152,14 @@ impl Camera {
         Ok(())
     }
 
-    /// The bits of [`AEC_AGC_ENABLE`] for what is automatic.
+    /// The bits of [`AEC_AGC_ENABLE`] for the automatic values.
     fn automatic(&self) -> u16 {
         let CameraSettings { exposure, gain, .. } = self.settings;
         let bits = |is_automatic, bits| if is_automatic { bits } else { 0 };
         bits(exposure.is_none(), AUTOMATIC_EXPOSURE) | bits(gain.is_none(), AUTOMATIC_GAIN)
     }
 
-    /// What exposure and gain are to be kept at: as they were found, unless they are set.
+    /// Stores the values to keep: those of the settings, otherwise those found.
     fn take(&mut self, [found_gain, found_rows]: [u16; 2]) {
         let CameraSettings {
             exposure,
@@ -172,7 +172,7 @@ impl Camera {
         *kept_rows = rows.clamp(1, longest_exposure(rate));
     }
 
-    /// What it is set to, while frames are captured.
+    /// Reads the camera's state, while frames are captured.
     pub async fn setting(&mut self, _format: Format) -> Result<Setting, Error> {
         let tables = [TABLE, rows_for(self.settings.rate), &self.locked];
         let longest = longest_exposure(self.settings.rate);
@@ -185,31 +185,31 @@ impl Camera {
         })
     }
 
-    /// How long all rows are exposed, as it was kept.
+    /// The exposure of all rows, as kept.
     fn exposed(&self) -> Microseconds {
         let [_, (_, rows), _] = self.locked;
         Microseconds(rows_us(rows))
     }
 
-    /// The gain, as it was kept.
+    /// The gain, as kept.
     fn gain(&self) -> Sixteenths {
         let [(_, gain), ..] = self.locked;
         Sixteenths(gain)
     }
 
-    /// What [`FOUND`]'s registers hold.
+    /// Reads the registers of [`FOUND`].
     fn exposure(&mut self) -> Result<[u16; 2], Error> {
         let [gain, rows] = FOUND;
         Ok([self.registers.read(gain)?, self.registers.read(rows)?])
     }
 }
 
-/// So many rows' time, µs.
+/// The time of `rows` rows, µs.
 const fn rows_us(rows: u16) -> u32 {
     (rows as u64 * ROW_CLOCKS as u64 * 1_000_000 / XCLK_HZ as u64) as u32
 }
 
-/// Whole rows that are nearest to a time.
+/// The number of rows nearest to a time.
 fn rows_in(exposure: Microseconds) -> u16 {
     let clocks = u64::from(exposure.0) * u64::from(XCLK_HZ) / 1_000_000;
     let row_clocks = u64::from(ROW_CLOCKS);

@@ -1,5 +1,5 @@
-//! OmniVision OV7725: 320 × 240, RGB565 or YUV422, over SCCB (I²C with a stop between address and
-//! read).
+//! Controls the OmniVision OV7725: 320 × 240, RGB565 or YUV422, over SCCB (I²C with a stop between
+//! address and read).
 
 use super::identity::{self, Identity};
 use super::ov7725_registers::{
@@ -14,32 +14,32 @@ use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 
-/// What it says it is.
+/// Its identification.
 pub const IDENTITY: Identity = identity::OV7725;
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";
 /// Its lens and pixels.
 pub const PRESET: Preset = Preset::Ov7725;
-/// What it sends unless it is told otherwise.
+/// Its pixel format if no other one is requested.
 pub const USUAL_FORMAT: Format = Format::Rgb565;
 /// Columns of a frame, px.
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
 
-/// Clock that the board gives it, Hz.
+/// Clock that the board supplies, Hz.
 pub const XCLK_HZ: u32 = 12_500_000;
 
 /// Lines from frame to frame, blank ones included.
 const LINES: u16 = 278;
-/// When its rows are exposed: one after the other.
+/// Exposure of its rows: one after the other.
 pub const MOTION: Motion = Motion::rolling(LINES);
 /// Clocks from frame to frame: lines of 576 pixels of two bytes, one byte per PCLK.
 const FRAME_CLOCKS: u64 = LINES as u64 * 576 * 2;
-/// From the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the rows.
-/// A row's exposure ends when it is read, which is when it is sent.
+/// Lines from the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the
+/// rows. A row's exposure ends when it is read, which is when it is sent.
 const LINES_TO_MIDDLE_ROW: u32 = 22 + HEIGHT as u32 / 2;
-/// PCLK at the full rate: XCLK times the sensor's loop. Lower rates divide it.
+/// PCLK at the full rate: XCLK times the sensor's PLL factor. Lower rates divide it.
 const FULL_PCLK_HZ: u64 = 4 * XCLK_HZ as u64;
 
 /// Time from frame to frame, µs.
@@ -47,7 +47,7 @@ pub const fn frame_us(rate: Rate) -> u32 {
     (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
 }
 
-/// Shortest and longest exposure: a line to a frame.
+/// Shortest and longest exposure: from one line to one frame.
 pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
     [
         Microseconds(frame_us(rate).div_ceil(LINES as u32)),
@@ -57,30 +57,30 @@ pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
 
 /// PCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
-/// Level of VSYNC while it says "no data": its pulse is high.
+/// Level of VSYNC that means "no data": its pulse is high.
 pub const VSYNC_BLANKING_IS_HIGH: bool = true;
-/// Level of HREF while it says "no data": it is high with the data.
+/// Level of HREF that means "no data": it is high with the data.
 pub const HREF_BLANKING_IS_HIGH: bool = false;
 
-/// The register file is busy for 1 ms after a reset and 10 ms after power-down; doubled.
+/// The registers are busy for 1 ms after a reset and 10 ms after power-down; doubled here.
 const SETTLE: Duration = Duration::from_millis(20);
-/// Frames after a change of registers that the data sheet asks not to use.
+/// Number of frames after a change of registers that must not be used, by the data sheet.
 const FRAMES_TO_SETTLE: u32 = 10;
-/// Frames in a row with the same exposure and gain are steady.
+/// Number of successive frames with equal exposure and gain that count as steady.
 const STEADY_FRAMES: u32 = 3;
 /// The camera's control side.
 pub struct Camera {
     registers: Registers,
     lines: CameraLines,
     settings: CameraSettings,
-    /// Of the frames at the newest search for exposure and gain.
+    /// The frame time during the newest search for exposure and gain.
     pub pace: Pace,
-    /// What exposure and gain are kept at.
+    /// The registers that keep exposure and gain.
     locked: [(u8, u8); 4],
 }
 
 impl Camera {
-    /// The bus at 100 kHz or up to 400 kHz. XCLK must already run.
+    /// The bus must run at 100 kHz to 400 kHz, and XCLK must already run.
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
         let [gain, low, high] = EXPOSURE;
         Self {
@@ -92,7 +92,7 @@ impl Camera {
         }
     }
 
-    /// Has the camera run, checks that it is the right one, and resets its registers: nothing else
+    /// Wakes the camera, checks that it is the right one, and resets its registers, which only this
     /// does.
     pub async fn reset(&mut self) -> Result<(), Error> {
         self.lines.wake().await;
@@ -101,8 +101,8 @@ impl Camera {
         self.registers.write(COM7, COM7_RESET)
     }
 
-    /// Writes the register table after a reset, and sets it so, within [`LIMITS`](super::LIMITS);
-    /// returns when the camera sends well exposed frames so.
+    /// Writes the register table after a reset, and applies `settings`, which must be within
+    /// [`LIMITS`](super::LIMITS). Returns when the camera sends well exposed frames.
     pub async fn configure(
         &mut self,
         format: Format,
@@ -110,15 +110,15 @@ impl Camera {
     ) -> Result<(), Error> {
         Timer::after(SETTLE).await;
         self.settings = settings;
-        // The clock first: frames are of the new rate when exposure is sought.
+        // The clock comes first, so that exposure is sought with frames of the new rate.
         for table in [clock(settings.rate), format.registers(), TABLE] {
             self.registers.set(table).await?;
         }
         self.lock_exposure().await
     }
 
-    /// Sets it so, within [`LIMITS`](super::LIMITS); returns when it sends well exposed
-    /// frames so.
+    /// Applies `settings`, which must be within [`LIMITS`](super::LIMITS). Returns when the camera
+    /// sends well exposed frames.
     pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
         let before = core::mem::replace(&mut self.settings, settings);
         if settings.rate != before.rate {
@@ -137,7 +137,7 @@ impl Camera {
         frame_us(self.settings.rate)
     }
 
-    /// Changes the pixel format of a configured camera; returns when it sends frames so. Exposure
+    /// Changes the pixel format of a configured camera. Returns when it sends such frames. Exposure
     /// and gain stay.
     pub async fn set_format(&mut self, format: Format) -> Result<(), Error> {
         self.registers.set(format.registers()).await?;
@@ -145,14 +145,14 @@ impl Camera {
         Ok(())
     }
 
-    /// Lets what is automatic of exposure and gain find what the light needs, and keeps that:
-    /// markers do not change their brightness with what presses the film.
+    /// Lets automatic exposure and gain adapt to the light, and then keeps their values: markers
+    /// must not change their brightness with the load on the film.
     pub async fn lock_exposure(&mut self) -> Result<(), Error> {
         let CameraSettings { exposure, gain, .. } = self.settings;
         if exposure.is_some() || gain.is_some() {
             let before = self.exposure()?;
             self.take(before);
-            // What is not automatic is in force while the rest is sought.
+            // Fixed values must be in force while the others are sought.
             self.registers.set(&self.locked).await?;
         }
         self.registers.write(COM8, LOCKED | self.automatic())?;
@@ -171,14 +171,14 @@ impl Camera {
         Ok(())
     }
 
-    /// The bits of [`COM8`] for what is automatic.
+    /// The bits of [`COM8`] for the automatic values.
     fn automatic(&self) -> u8 {
         let CameraSettings { exposure, gain, .. } = self.settings;
         let bit = |is_automatic, bit| if is_automatic { bit } else { 0 };
         bit(exposure.is_none(), AUTOMATIC_EXPOSURE) | bit(gain.is_none(), AUTOMATIC_GAIN)
     }
 
-    /// What exposure and gain are to be kept at: as they were found, unless they are set.
+    /// Stores the values to keep: those of the settings, otherwise those found.
     fn take(&mut self, [found_gain, found_low, found_high]: [u8; 3]) {
         let CameraSettings { exposure, gain, .. } = self.settings;
         let lines = exposure.map(|time| lines(time, self.frame_us()).to_le_bytes());
@@ -188,7 +188,7 @@ impl Camera {
         (*low, *high) = (set_low, set_high);
     }
 
-    /// What it is set to, while frames of `format` are captured.
+    /// Reads the camera's state, while frames of `format` are captured.
     pub async fn setting(&mut self, format: Format) -> Result<Setting, Error> {
         let clock = clock(self.settings.rate);
         let tables = [format.registers(), TABLE, clock, &self.locked];
@@ -201,24 +201,24 @@ impl Camera {
         })
     }
 
-    /// How long a row is exposed, as it was kept.
+    /// The exposure of a row, as kept.
     fn exposed(&self) -> Microseconds {
         Microseconds(self.lines() * self.frame_us() / u32::from(LINES))
     }
 
-    /// The gain, as it was kept.
+    /// The gain, as kept.
     fn gain(&self) -> Sixteenths {
         let [_, (_, register), ..] = self.locked;
         gain_of(register)
     }
 
-    /// Lines that a row is exposed, as it was kept.
+    /// The exposure of a row in lines, as kept.
     fn lines(&self) -> u32 {
         let [_, _, (_, low), (_, high)] = self.locked;
         u32::from(u16::from_le_bytes([low, high])).min(u32::from(LINES))
     }
 
-    /// What [`EXPOSURE`]'s registers hold.
+    /// Reads the registers of [`EXPOSURE`].
     fn exposure(&mut self) -> Result<[u8; 3], Error> {
         let [gain, low, high] = EXPOSURE;
         let registers = &mut self.registers;
@@ -230,18 +230,19 @@ impl Camera {
     }
 }
 
-/// Whole lines, at least one and at most a frame, that are nearest to a time.
+/// The number of lines nearest to a time, at least 1 and at most a frame's.
 fn lines(exposure: Microseconds, frame_us: u32) -> u16 {
     let lines = (exposure.0.min(frame_us) * u32::from(LINES) + frame_us / 2) / frame_us.max(1);
     (lines as u16).clamp(1, LINES)
 }
 
-/// The gain register's: each of the upper four bits doubles, the lower ones are sixteenths more.
+/// The gain of a register value: each of the upper four bits doubles it, the lower four add
+/// sixteenths.
 fn gain_of(register: u8) -> Sixteenths {
     Sixteenths((16 + u16::from(register & 0x0F)) << (register >> 4).count_ones())
 }
 
-/// The gain register for the gain that is next below, of at most four.
+/// The register value of the next lower gain, at most four.
 fn register_of(Sixteenths(gain): Sixteenths) -> u8 {
     match gain {
         ..32 => gain.saturating_sub(16) as u8,

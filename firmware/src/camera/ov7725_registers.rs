@@ -1,5 +1,5 @@
-//! The OV7725's registers that the firmware writes, and why. Everything else keeps its value after
-//! reset.
+//! Lists the OV7725's registers that the firmware writes, and why. All other registers keep their
+//! value after reset.
 //!
 //! Numbers and names: OV7725 data sheet 1.31, table 17. Application note: OV7725 1.04.
 
@@ -9,21 +9,21 @@ use hivtac_terms::threshold::PixelFormat;
 
 /// Output format, size and register reset.
 pub const COM7: u8 = 0x12;
-/// [`COM7`]: every register back to its power-up value.
+/// [`COM7`]: resets every register to its power-up value.
 pub const COM7_RESET: u8 = 0x80;
 
 /// [`COM7`]: QVGA (bit 6), RGB565 (bits 3:2 = 01) out of the RGB path (bits 1:0 = 10).
 const COM7_QVGA_RGB565: u8 = 0x46;
 /// [`COM7`]: QVGA, YUV.
 const COM7_QVGA_YUV: u8 = 0x40;
-/// Order of bytes; mirror, flip and colour bars, which stay off.
+/// Byte order; mirror, flip and colour bars, which stay off.
 const COM3: u8 = 0x0C;
-/// [`COM3`]: luma before chroma in YUV, as after a reset. Without it chroma comes first.
+/// [`COM3`]: luma before chroma in YUV, as after a reset. Without this bit chroma comes first.
 const COM3_LUMA_FIRST: u8 = 0x10;
 
-/// The pixel formats that the sensing knows and this camera sends. Mono is not among them: its luma
-/// alone would have to be picked out of YUV422, and red markers are hardly darker than the film in
-/// white light.
+/// The pixel formats that the sensing supports and this camera sends. Mono is not among them: its
+/// luma would have to be extracted from YUV422, and in white light red markers are hardly darker
+/// than the film.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// RGB565.
@@ -33,7 +33,7 @@ pub enum Format {
 }
 
 impl Format {
-    /// The one of such pixels, if the camera sends it.
+    /// Returns the format with these pixels; `None` if the camera does not send them.
     pub const fn of(pixels: PixelFormat) -> Option<Format> {
         match pixels {
             PixelFormat::Rgb565 => Some(Format::Rgb565),
@@ -42,7 +42,7 @@ impl Format {
         }
     }
 
-    /// Its pixels.
+    /// The format's pixels.
     pub const fn pixels(self) -> PixelFormat {
         match self {
             Format::Rgb565 => PixelFormat::Rgb565,
@@ -50,11 +50,13 @@ impl Format {
         }
     }
 
-    /// Register, value: what makes the camera send it. Everything else is the same for all formats.
+    /// Registers and values that select this format. All other registers are the same for all
+    /// formats.
     pub const fn registers(self) -> &'static [(u8, u8)] {
         match self {
             _ if seeded_bugs::CAMERA_REGISTER => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
-            // High byte of each pixel first. The pipeline unswaps the bytes in its threshold table.
+            // The high byte of each pixel comes first. The pipeline's threshold table swaps the
+            // bytes back.
             Format::Rgb565 => &[(COM7, COM7_QVGA_RGB565), (COM3, 0)],
             // Cb before Cr, as DSP_CTRL3 (0x66) is set.
             Format::Yuv422 => &[(COM7, COM7_QVGA_YUV), (COM3, COM3_LUMA_FIRST)],
@@ -62,20 +64,20 @@ impl Format {
     }
 }
 
-/// What is automatic: [`LOCKED`] and the bits of what is.
+/// Automatic control: [`LOCKED`] plus the bits of the automatic values.
 pub const COM8: u8 = 0x13;
-/// [`COM8`]: nothing; what is, fast and to a part of a line. What exposure and gain were they stay.
-/// White balance off: it would turn the hue that the threshold asks for with whatever is in view.
-/// Banding filter off: the light is DC.
+/// [`COM8`]: no automatic control, so exposure and gain stay. With automatic bits added, it is fast
+/// and resolves parts of a line. White balance is off: it would shift the threshold's hue with the
+/// scene. The banding filter is off: the light is DC.
 pub const LOCKED: u8 = 0x88;
 /// [`COM8`]: exposure.
 pub const AUTOMATIC_EXPOSURE: u8 = 0x01;
 /// [`COM8`]: gain.
 pub const AUTOMATIC_GAIN: u8 = 0x04;
-/// Gain, and exposure in lines, low and high byte: what the automatic control has found.
+/// Gain, and exposure in lines, low and high byte: the values of the automatic control.
 pub const EXPOSURE: [u8; 3] = [0x00, 0x10, 0x08];
 
-/// [`TABLE`]'s companion: how often the camera sends a frame.
+/// Registers for the frame rate, in addition to [`TABLE`].
 pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
     match rate {
         // No prescaler: PCLK = XCLK · 4 = 50 MHz.
@@ -88,18 +90,18 @@ pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
 }
 const CLKRC: u8 = 0x11;
 
-/// Register, value: written in this order after a reset and a [`Format`]'s, and read back. It has
-/// every register that the picture depends on and whose value after a reset is not the same in all
-/// of OmniVision's data sheets and the drivers of Linux and OpenMV.
+/// Registers and values, written in this order after a reset and a [`Format`]'s registers, and read
+/// back. It has every register that affects the picture and whose value after a reset differs
+/// between OmniVision's data sheets and the drivers of Linux and OpenMV.
 pub const TABLE: &[(u8, u8)] = &[
     // COM4: PLL × 4; exposure is judged on the whole frame.
     (0x0D, 0x41),
-    // COM5: no automatic frame rate. Dim light must not change the time between frames.
+    // COM5: no automatic frame rate, because dim light must not change the time between frames.
     (0x0E, 0x01),
     // COM6: as in OpenMV's table; its meaning is not public.
     (0x0F, 0xC5),
     // COM10: HREF high while data is valid, PCLK runs freely and data changes on its falling edge,
-    // VSYNC high during its pulse. `ov7725.rs` tells DCMI the same.
+    // VSYNC high during its pulse. `ov7725.rs` sets DCMI to match.
     (0x15, 0x00),
     // HSTART, HSIZE, VSTRT, VSIZE, HREF, EXHCH: the sensor's window for QVGA, whole array (320 ×
     // 240 of binned pixels; sizes in units of 4 columns and 2 rows, low bits zero).
@@ -112,13 +114,14 @@ pub const TABLE: &[(u8, u8)] = &[
     // HOUTSIZE, VOUTSIZE: 320 × 240 out, no scaling.
     (0x29, 0x50),
     (0x2C, 0x78),
-    // COM8, COM9: automatic exposure and gain until the film is well exposed. Gain at most 4×:
-    // beyond it noise costs more than light gains. COM9's bits 2 and 1 clear: never drop the VSYNC
-    // or HREF of a frame during an exposure change, so that every VSYNC edge has a whole frame.
+    // COM8, COM9: automatic exposure and gain until the film is well exposed. Gain is at most 4×,
+    // beyond which noise costs more than light gains. COM9's bits 2 and 1 are clear: the VSYNC or
+    // HREF of a frame is never dropped during an exposure change, so every VSYNC edge has a whole
+    // frame.
     (COM8, LOCKED | AUTOMATIC_EXPOSURE | AUTOMATIC_GAIN),
     (0x14, 0x18),
     // AEW, AEB, VPT: mean luma between 0x64 and 0x96, as in OpenMV's table: a white film is bright
-    // and not saturated.
+    // but not saturated.
     (0x24, 0x96),
     (0x25, 0x64),
     (0x26, 0xA1),
@@ -130,9 +133,9 @@ pub const TABLE: &[(u8, u8)] = &[
     (0x43, 0x80),
     (0x44, 0x80),
     (0x45, 0x80),
-    // LC_CTR: no lens correction. It is made for another lens.
+    // LC_CTR: no lens correction, because it is made for a different lens.
     (0x46, 0x00),
-    // AWB_CTRL0, AWB_CTRL1: gains are applied and not calculated; 0x40 is a gain of one.
+    // AWB_CTRL0, AWB_CTRL1: fixed gains are applied, none are calculated; 0x40 is a gain of one.
     (0x63, 0xA0),
     (0x69, 0x5E),
     // BLUE, RED, GREEN: gains of one. A white measured on a real unit would go here.
@@ -149,13 +152,13 @@ pub const TABLE: &[(u8, u8)] = &[
     (0x66, 0x00),
     // DSP_CTRL4: YUV or RGB, no raw data.
     (0x67, 0x00),
-    // DNSTH, EDGE0: no smoothing and no sharpening, which would move rims; DSPAUTO: neither by
-    // itself, only scaling.
+    // DNSTH, EDGE0: no smoothing and no sharpening, which would move rims. DSPAUTO: no automatic
+    // smoothing or sharpening, only scaling.
     (0x8E, 0x00),
     (0x8F, 0x00),
     (0xAC, 0x0F),
     // MTX1 to MTX6, MTX_CTRL: the application note's colour matrix. Half of it, the value after a
-    // reset in some sheets, makes red dots half as red.
+    // reset in some data sheets, makes red dots half as red.
     (0x94, 0xB0),
     (0x95, 0x9D),
     (0x96, 0x13),

@@ -1,4 +1,4 @@
-//! A camera's registers: tables of them written, read back and compared.
+//! Writes, reads back and compares tables of a camera's registers.
 
 use super::{Bus, Error, IDENTITY};
 use embassy_stm32::i2c;
@@ -6,13 +6,13 @@ use embassy_time::{Duration, Timer};
 use heapless::Vec;
 use hivtac_wire::message::{DIFFERENT_REGISTERS, DifferentRegister};
 
-/// Between two register transfers while nothing is captured: lets tasks of lower priority run.
+/// Pause between two register transfers while capture is stopped: lets tasks of lower priority run.
 const PAUSE: Duration = Duration::from_micros(100);
-/// The same while frames are captured: a transfer holds the pipeline up for a third of a
-/// millisecond, and it must not fall behind.
+/// The same while frames are captured. A transfer blocks the pipeline for a third of a millisecond,
+/// and it must not fall behind.
 const PAUSE_WHILE_CAPTURING: Duration = Duration::from_millis(5);
 
-/// What a register holds, and how that travels.
+/// A register's value, and how it is transferred.
 pub trait Value: Copy + PartialEq + Into<u16> {
     /// Writes it to a device's register.
     fn write(self, bus: &mut Bus, device: u8, register: u8) -> Result<(), i2c::Error>;
@@ -40,19 +40,19 @@ impl Value for u16 {
     }
 }
 
-/// Register, value: what is written, in this order.
+/// Registers and the values that are written to them, in this order.
 pub type Table<V> = [(u8, V)];
 
-/// The registers of the camera in use. All of it fails when the camera does not answer.
+/// The registers of the camera in use. All functions return an error if the camera does not answer.
 pub struct Registers(pub Bus);
 
 impl Registers {
-    /// Writes one.
+    /// Writes one register.
     pub fn write(&mut self, register: u8, value: impl Value) -> Result<(), Error> {
         Ok(value.write(&mut self.0, IDENTITY.address, register)?)
     }
 
-    /// Reads one.
+    /// Reads one register.
     pub fn read<V: Value>(&mut self, register: u8) -> Result<V, Error> {
         Ok(V::read(&mut self.0, IDENTITY.address, register)?)
     }
@@ -80,8 +80,7 @@ impl Registers {
         Ok(())
     }
 
-    /// Reads back what tables wrote that were written one after the other, while frames are
-    /// captured.
+    /// Reads back registers that `tables` wrote one after the other, while frames are captured.
     pub async fn compare<V: Value>(&mut self, tables: &[&Table<V>]) -> Result<Comparison, Error> {
         let mut comparison = Comparison::default();
         for (written_so_far, table) in (1..).zip(tables) {
@@ -103,12 +102,12 @@ fn has<V>(table: &Table<V>, address: u8) -> bool {
     table.iter().any(|(register, _)| *register == address)
 }
 
-/// What registers hold beside what was written.
+/// Registers compared with the written values.
 #[derive(Default)]
 pub struct Comparison {
-    /// How many were compared.
+    /// Number of registers that were compared.
     pub registers: u16,
-    /// Those that differ, the first of them.
+    /// The first of those that differ.
     pub different: Vec<DifferentRegister, DIFFERENT_REGISTERS>,
 }
 
@@ -116,7 +115,8 @@ impl Comparison {
     fn count<V: Value>(&mut self, address: u8, written: V, found: V) {
         self.registers = self.registers.saturating_add(1);
         if found != written {
-            // What there is no room for is not told: the camera has lost all of them.
+            // Registers beyond the vector's capacity are not reported: the camera has then lost all
+            // of them.
             let _ = self.different.push(DifferentRegister {
                 address,
                 written: written.into(),
