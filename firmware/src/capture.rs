@@ -1,37 +1,37 @@
-//! The camera interface (DCMI) in continuous mode: every frame, whatever the camera does.
+//! Captures every frame with the camera interface (DCMI) in continuous mode, whatever the camera
+//! does.
 //!
 //! # Design
 //! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots
-//! in AXI SRAM (`bands`), at 320 × 240 a little more than a frame, at 800 × 600 four tenths of one.
-//! Each finished band is one interrupt; so are the end of a frame (the VSYNC pulse) and an overrun.
-//! The handlers do what `hivtac_capture::Tracker` says, and pass its events to the pipeline, which
-//! has finished bands copied to DTCM (`band_copy`) and scans one while the next ones arrive. A
-//! frame is measured as soon as its last band is scanned. When more comes after that, it counts as
-//! too long, and the next sample says that a frame was lost.
+//! in AXI SRAM (`bands`): slightly more than a frame at 320 × 240, four tenths of one at 800 × 600.
+//! Each finished band causes one interrupt, as do the end of a frame (the VSYNC pulse) and an
+//! overrun. The handlers follow `hivtac_capture::Tracker`, and pass its events to the pipeline. The
+//! pipeline has finished bands copied to DTCM (`band_copy`) and scans one while the next ones
+//! arrive. A frame is measured as soon as its last band is scanned. If more data follows, it counts
+//! as too long, and the next sample reports a lost frame.
 //!
-//! After anything unforeseen, DCMI is reset and set up anew, and the DMA begins a new band: the
-//! next frame is captured from its beginning. Between two good frames nothing is touched.
+//! After any unexpected event, DCMI is reset and set up anew, and the DMA begins a new band: the
+//! next frame is captured from its beginning. Between two good frames the hardware is not touched.
 //!
 //! # Note
 //! Coherence: the core never reads the ring (see `band_copy`).
 //!
-//! Deadlines, for 156 frames a second (line 23 µs, band 184 µs, frame 6.4 ms; at 78 and 39 frames a
-//! second all are two and four times longer):
-//! - *The DMA*: DCMI's FIFO holds 4 words, 0.32 µs at 50 MB/s, 76 bus cycles. A word goes in some
-//!   ten of them, and a burst of the MDMA holds AXI SRAM for 16 to 32 (estimates, not measured).
-//!   When missed, DCMI reports an overrun: the frame is dropped and counted.
-//! - *The handler of a band*: until the end of the next band, 184 µs. When missed, the DMA writes
-//!   over a band; the handler sees that it has changed its target twice, or the frame's number of
-//!   bands is wrong: the frame is dropped.
-//! - *The handler of a frame's end*: within the VSYNC pulse, 92 µs. When missed after a good frame,
-//!   the frame counts as dropped; when missed after a bad one, the next frame is not captured
-//!   either.
-//! - *The pipeline*: a band is overwritten 30 bands after it was finished, 5.5 ms. When missed, its
+//! Deadlines at 156 frames a second (line 23 µs, band 184 µs, frame 6.4 ms); at 78 and 39 frames a
+//! second all are two and four times longer:
+//! - *The DMA*: DCMI's FIFO holds 4 words, 0.32 µs at 50 MB/s, 76 bus cycles. A word takes some ten
+//!   of them, and a burst of the MDMA holds AXI SRAM for 16 to 32 (estimates, not measured). If
+//!   missed, DCMI reports an overrun: the frame is dropped and counted.
+//! - *The handler of a band*: until the end of the next band, 184 µs. If missed, the DMA overwrites
+//!   a band. The handler then sees that the DMA changed its target twice, or that the frame's
+//!   number of bands is wrong: the frame is dropped.
+//! - *The handler of a frame's end*: within the VSYNC pulse, 92 µs. If missed after a good frame,
+//!   the frame counts as dropped; if missed after a bad one, the next frame is not captured either.
+//! - *The pipeline*: a band is overwritten 30 bands after it was finished, 5.5 ms. If missed, its
 //!   frame is dropped and counted as `dropped_busy`; the camera never waits.
 //!
 //! # Limitations
-//! A frame in which the camera lost bytes and gained as many is not noticed. Nor is it noticed that
-//! the handler of a band was late by exactly two bands in a frame that was too long by two bands.
+//! A frame in which the camera lost bytes and gained the same number is not detected. Neither is a
+//! handler of a band that was late by exactly two bands in a frame that was too long by two bands.
 
 use crate::band_dma::BandDma;
 use crate::bands::SHAPE;
@@ -48,42 +48,42 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use hivtac_capture::{Edge, Event, Interface, Tracker};
 
-/// The tracker and the hardware that it steers. Used by the capture handlers, the capture task and
+/// The tracker and the hardware that it directs. Used by the capture handlers, the capture task and
 /// the pipeline, one at a time.
 static CAPTURE: CriticalSectionMutex<RefCell<Option<Running>>> =
     CriticalSectionMutex::new(RefCell::new(None));
 
-/// Pixels of the frames that are captured. Written by the capture task while the capture is
-/// stopped; read by the capture handlers and the capture task.
+/// Pixel format of the captured frames. Written by the capture task while the capture is stopped;
+/// read by the capture handlers and the capture task.
 static CAPTURED_FORMAT: CriticalSectionMutex<Cell<Format>> =
     CriticalSectionMutex::new(Cell::new(USUAL_FORMAT));
 
-/// Bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by the
-/// pipeline.
+/// Number of bands finished since boot, modulo 2³². Written by whoever uses [`CAPTURE`]; read by
+/// the pipeline.
 static BANDS_FINISHED: AtomicU32 = AtomicU32::new(0);
 
-/// Capture events so far, lost ones too. Written by the capture handlers and the capture task; read
-/// by the capture task.
+/// Number of capture events so far, including lost ones. Written by the capture handlers and the
+/// capture task; read by the capture task.
 static CAPTURE_ACTIVITY: AtomicU32 = AtomicU32::new(0);
 
-/// Capture events that wait: more than bands that are still whole.
+/// Capacity for waiting capture events: more than the bands that can still be whole.
 const CAPTURE_EVENTS_WAITING: usize = 72;
 
-/// What happens, in order. From the capture handlers and the capture task to the pipeline. When
-/// there is no room a handler's event is lost; the pipeline notices that by the next one.
+/// Capture events in order. From the capture handlers and the capture task to the pipeline. If the
+/// queue is full, a handler's event is lost; the pipeline detects that by the next one.
 pub static CAPTURE_EVENTS: Channel<CriticalSectionRawMutex, CaptureEvent, CAPTURE_EVENTS_WAITING> =
     Channel::new();
 
-/// An event, and what pixels the camera sends since the newest start.
+/// An event, and the camera's pixel format since the last start.
 #[derive(Clone, Copy)]
 pub struct CaptureEvent {
-    /// What happened.
+    /// The event.
     pub event: Event,
-    /// The frames' pixels.
+    /// The frames' pixel format.
     pub format: Format,
 }
 
-/// The tracker, and what it steers.
+/// The tracker, and the hardware that it directs.
 struct Running {
     tracker: Tracker,
     hardware: Hardware,
@@ -99,8 +99,8 @@ struct Hardware {
 pub struct Capture(());
 
 impl Capture {
-    /// Clocks the peripheral and enables its interrupts at `priority`, which the DMA's has, too.
-    /// Call once.
+    /// Clocks the peripheral and enables its interrupts at `priority`, which must be the DMA's,
+    /// too. Call once.
     pub fn new(dcmi: Peri<'static, peripherals::DCMI>, dma: BandDma, priority: Priority) -> Self {
         rcc::enable_and_reset::<peripherals::DCMI>();
         let running = Running {
@@ -117,17 +117,17 @@ impl Capture {
         Self(())
     }
 
-    /// What pixels the camera sends.
+    /// Returns the camera's pixel format.
     pub fn format(&self) -> Format {
         CAPTURED_FORMAT.lock(Cell::get)
     }
 
-    /// The camera sends such pixels from now on. Only while nothing is captured.
+    /// Sets the pixel format that the camera sends from now on. Only while capture is stopped.
     pub fn set_format(&mut self, format: Format) {
         CAPTURED_FORMAT.lock(|cell| cell.set(format));
     }
 
-    /// Captures from the next frame on, after the time that `passed` tells of.
+    /// Captures from the next frame on. The event `passed` accounts for the frames before.
     pub async fn start(&mut self, passed: Event) {
         let format = self.format();
         let event = CaptureEvent {
@@ -138,38 +138,38 @@ impl Capture {
         act(|running, _| running.tracker.start(&mut running.hardware));
     }
 
-    /// Captures no more.
+    /// Stops capturing.
     pub fn stop(&mut self) {
         act(|running, _| running.tracker.stop(&mut running.hardware));
     }
 
-    /// Begins again after a silence.
+    /// Restarts the capture after a silence.
     pub fn start_again(&mut self) {
         act(|running, mut tell| running.tracker.silence(&mut running.hardware, &mut tell));
     }
 
-    /// A number that changes whenever something comes from the camera: at least once a frame.
+    /// Returns a number that changes whenever data comes from the camera: at least once a frame.
     pub fn activity(&self) -> u32 {
         CAPTURE_ACTIVITY.load(Ordering::Relaxed)
     }
 }
 
-/// Bands finished since boot, modulo 2³².
+/// Returns the number of bands finished since boot, modulo 2³².
 pub fn finished() -> u32 {
     BANDS_FINISHED.load(Ordering::Acquire)
 }
 
-/// Whether anything has come since the newest band that an event told of.
+/// Returns whether data has come since the last band that an event reported.
 pub fn has_begun_a_band() -> bool {
     let mut begun = true;
     act(|running, _| begun = running.hardware.has_begun_a_band());
     begun
 }
 
-/// Does something with the tracker, alone.
+/// Calls `what` with exclusive access to the tracker.
 fn act(what: impl FnOnce(&mut Running, fn(Event))) {
     CAPTURE.lock(|capture| {
-        // Nothing in here comes back here, so it is never borrowed already.
+        // `what` never calls this function, so the value is never borrowed already.
         if let Ok(mut capture) = capture.try_borrow_mut()
             && let Some(running) = capture.as_mut()
         {
@@ -182,7 +182,7 @@ fn act(what: impl FnOnce(&mut Running, fn(Event))) {
 fn tell(event: Event) {
     CAPTURE_ACTIVITY.fetch_add(1, Ordering::Relaxed);
     let format = CAPTURED_FORMAT.lock(Cell::get);
-    // Documented at `CAPTURE_EVENTS`.
+    // A full queue is handled as described at `CAPTURE_EVENTS`.
     let _ = CAPTURE_EVENTS.try_send(CaptureEvent { event, format });
 }
 
@@ -226,14 +226,13 @@ impl Interface for Hardware {
     }
 }
 
-/// Brings DCMI to its state after a reset, whatever it was doing.
+/// Resets DCMI in any state.
 fn reset() {
     RCC.ahb2rstr().modify(|w| w.set_dcmirst(true));
     RCC.ahb2rstr().modify(|w| w.set_dcmirst(false));
 }
 
-/// Configures DCMI to what the camera's registers were set to: 8 bits, hardware synchronization,
-/// continuous.
+/// Configures DCMI to match the camera's registers: 8 bits, hardware synchronization, continuous.
 fn configure() {
     DCMI.cr().write(|w| {
         w.set_pckpol(camera::SAMPLE_ON_RISING_EDGE != INVERTED_POLARITIES);
@@ -242,8 +241,8 @@ fn configure() {
     });
 }
 
-/// Waits until the DMA has written a frame's last words, some bus cycles; no longer, as they may
-/// never come.
+/// Waits until the DMA has written a frame's last words, which takes some bus cycles. The wait is
+/// limited, because they may never come.
 fn drain(dma: &BandDma) {
     const PATIENCE: u32 = 64;
     for _ in 0..PATIENCE {

@@ -1,5 +1,5 @@
-//! Keeps the camera going: sets it up, changes its pixel format or has it expose anew, and starts
-//! it again when it falls silent.
+//! Keeps the camera running: sets it up, changes its pixel format or exposure, and restarts it when
+//! it falls silent.
 
 use crate::board;
 use crate::camera::{self, Camera, Format, Setting};
@@ -17,44 +17,44 @@ use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::fixed::Q;
 use hivtac_wire::message::{DeviceMessage, Inspection, LogLevel, Outcome};
 
-/// The newest thing that the capture task is asked for.
+/// The newest request to the capture task.
 type Request<T> = Signal<CriticalSectionRawMutex, T>;
 
-/// What pixels the camera shall send. From the pipeline.
+/// The requested pixel format. From the pipeline.
 static REQUESTED_FORMAT: Request<Format> = Request::new();
-/// What a host asks of the camera. From the USB tasks.
+/// A host's order for the camera. From the USB tasks.
 static CAMERA_ORDER: Request<CameraOrder> = Request::new();
-/// Such an order is under way. Set by the USB tasks, cleared by the capture task.
+/// True while such an order is carried out. Set by the USB tasks, cleared by the capture task.
 static CAMERA_ORDERED: AtomicBool = AtomicBool::new(false);
-/// The camera is to be set as a new device's. From the memory task.
+/// Requests the camera settings of a new device. From the memory task.
 static CAMERA_AFRESH: Request<()> = Request::new();
 
-/// So many frame times without a band or the end of a frame are a silence. Bands come all the
-/// time but for the vertical blanking, a seventh of a frame.
+/// Number of frame times without a band or the end of a frame that count as a silence. Bands come
+/// all the time except during the vertical blanking, a seventh of a frame.
 const SILENCE: u32 = 2;
-/// So many silences in a row, and the camera is set up again.
+/// Number of successive silences after which the camera is set up again.
 const SILENCES: u32 = 3;
-/// Pause before the next attempt when the camera does not answer.
+/// Pause before the next attempt if the camera does not answer.
 const RETRY: Duration = Duration::from_millis(500);
 
-/// What a host asks of the camera, and who.
+/// A host's order for the camera, and who sent it.
 struct CameraOrder {
     action: Action,
     asked: Asked,
 }
 
-/// What the camera is to do for a command.
+/// The action of an order.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Action {
-    /// Find what is automatic of exposure and gain anew.
+    /// Let automatic exposure and gain adapt anew.
     Expose,
-    /// Be set so; unchecked.
+    /// Apply these settings; unchecked.
     Set(CameraSettings),
-    /// Tell what it is set to.
+    /// Report the camera's state.
     Inspect,
 }
 
-/// Has the camera do something for the command `id`; `Busy` while it does.
+/// Passes an action on for the command `id`; returns `Busy` if one is already being carried out.
 pub fn order(action: Action, id: u16) -> Option<Outcome> {
     if CAMERA_ORDERED.swap(true, Ordering::Relaxed) {
         return Some(Outcome::Busy);
@@ -64,17 +64,17 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
     None
 }
 
-/// Has the camera send such pixels.
+/// Requests a pixel format from the camera.
 pub fn request_format(format: Format) {
     REQUESTED_FORMAT.signal(format);
 }
 
-/// Has the camera set as a new device's.
+/// Requests the camera settings of a new device.
 pub fn set_afresh() {
     CAMERA_AFRESH.signal(());
 }
 
-/// The order has been carried out.
+/// Ends an order and replies to it.
 fn end_order(asked: Asked, outcome: Outcome) {
     CAMERA_ORDERED.store(false, Ordering::Relaxed);
     if let Some(id) = asked.id() {
@@ -112,21 +112,21 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
 struct CaptureTask {
     camera: Camera,
     capture: Capture,
-    /// VSYNC edges count since the first register reset.
+    /// True if VSYNC edges have been counted since the first register reset.
     numbering: bool,
-    /// The camera was not set up yet.
+    /// True until the camera was set up for the first time.
     starting: bool,
-    /// [`Capture::activity`] when it was looked at last.
+    /// [`Capture::activity`] at the last check.
     activity: u32,
-    /// Frame times without activity.
+    /// Number of frame times without activity.
     quiet: u32,
-    /// In a row.
+    /// Number of successive silences.
     silences: u32,
 }
 
 impl CaptureTask {
-    /// Looks whether something has come during the last frame time; whether nothing has for too
-    /// long.
+    /// Checks for activity during the last frame time. Returns whether the camera has been inactive
+    /// for too long.
     fn is_silent(&mut self) -> bool {
         let activity = self.capture.activity();
         if activity != self.activity {
@@ -156,12 +156,12 @@ impl CaptureTask {
             stats::CAMERA_RESTARTS.count();
         } else {
             self.capture.start_again();
-            // What that told is no sign of life.
+            // The events of the restart are not a sign of life.
             self.activity = self.capture.activity();
         }
     }
 
-    /// Sets the camera up; tries until it answers.
+    /// Sets the camera up; repeats until it answers.
     async fn start_camera(&mut self) {
         let restart = self.numbering;
         let from = self.stop();
@@ -169,7 +169,7 @@ impl CaptureTask {
         self.go_on(from, restart).await;
     }
 
-    /// Has the camera send other pixels.
+    /// Changes the camera's pixel format.
     async fn change_format(&mut self, format: Format) {
         let from = self.stop();
         self.capture.set_format(format);
@@ -196,7 +196,7 @@ impl CaptureTask {
         }
     }
 
-    /// Sets the camera so.
+    /// Applies settings to the camera.
     async fn set_up(&mut self, settings: CameraSettings) {
         let from = self.stop();
         camera::tell(settings);
@@ -204,7 +204,7 @@ impl CaptureTask {
         self.go_on_when_set_up(from, answered).await;
     }
 
-    /// Has the camera find what is automatic of exposure and gain anew.
+    /// Lets automatic exposure and gain adapt anew.
     async fn expose(&mut self) -> Outcome {
         let from = self.stop();
         let answered = self.camera.lock_exposure().await;
@@ -212,7 +212,7 @@ impl CaptureTask {
         Outcome::Done
     }
 
-    /// Tells what the camera is set to, while it goes on.
+    /// Reports the camera's state while it keeps running.
     async fn inspect(&mut self, asked: Asked) -> Outcome {
         let frame_time = self.camera.frame_time();
         match self.camera.setting(self.capture.format()).await {
@@ -230,7 +230,7 @@ impl CaptureTask {
         }
     }
 
-    /// Captures again; a camera that did not answer is set up anew before.
+    /// Restarts the capture; a camera that did not answer is first set up anew.
     async fn go_on_when_set_up(&mut self, from: u32, answered: Result<(), camera::Error>) {
         if let Err(error) = answered {
             log::say(LogLevel::Error, format_args!("camera: {error}"));
@@ -240,8 +240,8 @@ impl CaptureTask {
         self.go_on(from, answered.is_err()).await;
     }
 
-    /// Captures no more; the newest frame so far. Frames that pass from now on count as dropped at
-    /// once.
+    /// Stops the capture and returns the number of the newest frame. Frames that pass from now on
+    /// count as dropped immediately.
     fn stop(&mut self) -> u32 {
         self.capture.stop();
         let from = match self.numbering {
@@ -252,7 +252,7 @@ impl CaptureTask {
         from
     }
 
-    /// Captures again, after the frames that passed since [`stop`](Self::stop).
+    /// Restarts the capture after the frames that passed since [`stop`](Self::stop).
     async fn go_on(&mut self, from: u32, restart: bool) {
         let to = vsync::newest().number;
         stats::end_passing_over(to);

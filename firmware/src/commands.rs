@@ -1,4 +1,4 @@
-//! What the host asks for, and the answers.
+//! Carries out the host's requests and answers them.
 
 use crate::capture_task::{self, Action};
 use crate::orders::{Order, order};
@@ -41,8 +41,8 @@ async fn obey(Command { id, request }: Command) {
     }
 }
 
-/// The outcome, or `None` when another task replies: the pipeline between two frames, the capture
-/// task when the camera is ready, the memory task when it has written, the sender behind a
+/// Returns the outcome; `None` if another task replies. That is the pipeline between two frames,
+/// the capture task when the camera is ready, the memory task after writing, or the sender after a
 /// snapshot's last part.
 async fn carry_out(id: u16, request: Request) -> Option<Outcome> {
     match request {
@@ -73,7 +73,7 @@ async fn carry_out(id: u16, request: Request) -> Option<Outcome> {
             Some(Outcome::Done)
         }
         Request::SetTemporal(settings) => order(Order::SetTemporal { id, settings }),
-        // The memory task reads what was sent.
+        // The memory task is reading the last upload.
         Request::BeginModel { .. } if memory::is_ordered() => Some(Outcome::Busy),
         Request::BeginModel { bytes } => Some(model_upload::begin(bytes)),
         Request::ModelPart(part) => Some(model_upload::part(&part)),

@@ -1,4 +1,4 @@
-//! How the sensor is doing: from whoever notices to LED and self-test.
+//! Shares the sensor's condition with LED and self-test.
 
 use core::sync::atomic::{AtomicU8, Ordering};
 
@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 /// memory task.
 static CONDITION: AtomicU8 = AtomicU8::new(Condition::NoCamera as u8);
 
-/// How the sensor is doing.
+/// The sensor's condition.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Condition {
@@ -18,12 +18,12 @@ pub enum Condition {
     Good = 2,
 }
 
-/// Tells how the sensor is doing from now on.
+/// Sets the sensor's condition.
 pub fn set(condition: Condition) {
     CONDITION.store(condition as u8, Ordering::Relaxed);
 }
 
-/// How it is doing.
+/// Returns the sensor's condition.
 pub fn get() -> Condition {
     match CONDITION.load(Ordering::Relaxed) {
         condition if condition == Condition::Good as u8 => Condition::Good,

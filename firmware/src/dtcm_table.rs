@@ -1,11 +1,11 @@
-//! The threshold's table of 64 KiB, in DTCM; the rest of the pipeline lies where its owner does.
+//! Places the threshold's table of 64 KiB in DTCM; the rest of the pipeline is where its owner is.
 
 use hivtac_sensor::markers::tables::{ByteTable, Pixels, Run, Table, Weights};
 use hivtac_sensor::pipeline;
 use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 use static_cell::ConstStaticCell;
 
-/// `.bss`, which is in DTCM.
+/// In `.bss`, which is in DTCM.
 static TABLE: ConstStaticCell<ByteTable> = ConstStaticCell::new(ByteTable::CLOSED);
 
 /// The pipeline, its threshold table in DTCM.
@@ -15,7 +15,7 @@ pub type Sensor = pipeline::Sensor<'static, 64, DtcmTable>;
 pub struct DtcmTable(Option<&'static mut ByteTable>);
 
 impl DtcmTable {
-    /// The table, taken when it is needed first: not while pixels are not RGB565.
+    /// Returns the table, which is taken at its first use: only with RGB565 pixels.
     fn table(&mut self) -> Option<&mut ByteTable> {
         if self.0.is_none() {
             self.0 = TABLE.try_take();

@@ -1,4 +1,4 @@
-//! When all else fails: say so if possible, and start again.
+//! Handles faults: reports them if possible, and restarts.
 //!
 //! | what | ends in |
 //! |---|---|
@@ -26,7 +26,8 @@ const FEED_PERIOD: Duration = Duration::from_millis(500);
 /// Logs why the microcontroller was reset, keeps that for the host, and clears the reasons.
 pub fn report_reset() {
     let reasons = RCC.rsr().read();
-    // Each reset pulls the reset line, too, and the supply's comes with the others of it.
+    // Each reset also pulls the reset line, and a power-on also sets the flags of other supply
+    // resets.
     let reason = match () {
         () if reasons.porrstf() => ResetReason::PowerOn,
         () if reasons.borrstf() => ResetReason::BrownOut,
@@ -60,11 +61,11 @@ pub fn reset_reason() -> ResetReason {
     reason.unwrap_or(ResetReason::Other)
 }
 
-/// Starts the watchdog and feeds it from thread mode: it bites when something above never lets
-/// thread mode run.
+/// Starts the watchdog and feeds it from thread mode. It resets the program if tasks of higher
+/// priority never let thread mode run.
 #[embassy_executor::task]
 pub async fn feed_watchdog(mut watchdog: IndependentWatchdog<'static, IWDG1>) {
-    // A debugger may hold the core for as long as it likes.
+    // The watchdog stops while a debugger halts the core.
     DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
     watchdog.unleash();
     loop {
@@ -75,7 +76,7 @@ pub async fn feed_watchdog(mut watchdog: IndependentWatchdog<'static, IWDG1>) {
 
 #[exception(trampoline = false)]
 unsafe fn HardFault() -> ! {
-    // After a stack overflow nothing may be pushed.
+    // After a stack overflow no data may be pushed.
     SCB::sys_reset()
 }
 

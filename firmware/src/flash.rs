@@ -1,15 +1,15 @@
-//! The flash's second bank, in which settings are kept: sectors of 128 KiB, words of 256 bits.
+//! Accesses the flash's second bank, which keeps settings: sectors of 128 KiB, words of 256 bits.
 //!
 //! # Design
-//! The program runs from the first bank and goes on while the second one is programmed (0.1 ms a
-//! word) or erased (1 to 2 s a sector): whoever waits here gives way to everything else. Nothing
-//! reads the bank meanwhile.
+//! The program runs from the first bank and continues while the second one is programmed (0.1 ms a
+//! word) or erased (1 to 2 s a sector). Callers wait without blocking other tasks. The bank is not
+//! read meanwhile.
 //!
 //! # Note
-//! A word whose programming was cut off reads as an error of its correcting code, which is a bus
-//! error. It is the MDMA that reads: an error of its transfer is a flag, one of the core's a fault.
-//! The MPU makes the bank device memory (`caches`), so that the core neither reads ahead in it nor
-//! keeps back what it writes.
+//! A word whose programming was cut off fails its error correcting code, which is a bus error. The
+//! MDMA reads the bank: an error of its transfer sets a flag, whereas one of the core's would be a
+//! fault. The MPU makes the bank device memory (`caches`), so that the core neither reads it
+//! speculatively nor delays writes to it.
 
 use crate::block_move::{BlockMove, End};
 use embassy_stm32::pac::FLASH;
@@ -28,31 +28,31 @@ const BANK: usize = 1;
 const SECTOR_BYTES: u32 = 128 << 10;
 /// Unlock the bank's control register, one after the other (RM0433, FLASH_KEYR).
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
-/// 64 bits at once: the fastest, at the supply of the boards.
+/// 64 bits at once: the fastest setting at the boards' supply voltage.
 const PARALLELISM: u8 = 0b11;
-/// Of programming a word, and how often it is looked for its end.
+/// Time of programming a word, and interval of checks for its end.
 const WORD_TIME: Duration = Duration::from_micros(100);
-/// Of erasing a sector: looked for its end so often.
+/// Interval of checks for the end of erasing a sector.
 const ERASE_STEP: Duration = Duration::from_millis(10);
-/// Looks at an operation before it counts as failed: 10 ms for a word, 4 s for a sector.
+/// Number of checks before an operation counts as failed: 10 ms for a word, 4 s for a sector.
 const WORD_LOOKS: u32 = 100;
 const ERASE_LOOKS: u32 = 400;
 
-/// Words that are read at once: a few of them cost as much as one.
+/// Number of words that are read at once: a few of them take as long as one.
 const BLOCK_WORDS: usize = 32;
 const BLOCK_BYTES: usize = BLOCK_WORDS * WORD_BYTES;
 
-/// What the MDMA read, in DTCM, which is not cached.
+/// The MDMA's target, in DTCM, which is not cached.
 #[repr(C, align(32))]
 struct Buffer([Word; BLOCK_WORDS]);
 
-/// The bank. Holding it says that nobody else uses it.
+/// The bank. Ownership proves that no other code uses it.
 pub struct SecondBank {
     _flash: Peri<'static, peripherals::FLASH>,
     _channel: Peri<'static, peripherals::MDMA_CH2>,
     mover: BlockMove<CHANNEL>,
     buffer: Buffer,
-    /// Where the block in the buffer begins; nothing when one of its words is unreadable.
+    /// Address of the block in the buffer; `None` if one of its words is unreadable.
     block: Option<u32>,
 }
 
@@ -71,7 +71,7 @@ impl SecondBank {
         }
     }
 
-    /// Has the MDMA read into the front of the buffer; whether it could.
+    /// Reads into the front of the buffer by MDMA; returns whether it succeeded.
     fn fetch(&mut self, source: u32, bytes: usize) -> bool {
         let to = End::Tcm(&raw mut self.buffer as u32);
         self.mover.start(End::Axi(source), to, bytes);
@@ -80,7 +80,7 @@ impl SecondBank {
         read
     }
 
-    /// A word of the buffer.
+    /// Returns a word of the buffer.
     fn fetched(&self, nth: usize) -> Word {
         let words = &raw const self.buffer.0;
         // SAFETY: the buffer is ours, and the MDMA has ended; it is volatile as the compiler does
@@ -88,7 +88,7 @@ impl SecondBank {
         unsafe { words.cast::<Word>().add(nth % BLOCK_WORDS).read_volatile() }
     }
 
-    /// Opens the control register for one operation, and closes it behind that.
+    /// Opens the control register for one operation, and closes it afterwards.
     async fn operate(
         &mut self,
         begin: impl FnOnce(Bank),
@@ -166,14 +166,14 @@ fn registers() -> Bank {
     FLASH.bank(BANK)
 }
 
-/// Of a word; `None` when it is not in the bank.
+/// Returns a word's address; `None` if it is not in the bank.
 fn address(place: Place) -> Option<u32> {
     let inside =
         place.word < SecondBank::SECTOR_WORDS && place.sector < (1 << SIZE_LOG2) / SECTOR_BYTES;
     inside.then(|| BASE + place.sector * SECTOR_BYTES + place.word * WORD_BYTES as u32)
 }
 
-/// Waits for the end of an operation; whether it came in time.
+/// Waits for the end of an operation; returns whether it ended in time.
 async fn wait(bank: Bank, step: Duration, looks: u32) -> bool {
     for _ in 0..looks {
         Timer::after(step).await;

@@ -1,4 +1,4 @@
-//! What the device says about itself.
+//! Answers the host's questions about the device.
 
 use crate::settings::{name, of_pipeline};
 use crate::{board, camera};
@@ -37,7 +37,7 @@ pub fn hello() -> DeviceHello {
     }
 }
 
-/// Text that is known to fit; what does not is left out.
+/// Formats text that is known to fit; text beyond the capacity is dropped.
 fn text<const N: usize>(words: core::fmt::Arguments) -> String<N> {
     let mut text = String::new();
     let _ = text.write_fmt(words);

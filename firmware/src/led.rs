@@ -1,4 +1,4 @@
-//! The LED: how the sensor is doing, at a glance.
+//! Shows the sensor's condition on the LED.
 //!
 //! | pattern | meaning |
 //! |---|---|
@@ -37,7 +37,7 @@ pub async fn run(mut led: StatusLed) {
     }
 }
 
-/// How long the LED is on in the dimming period that begins at `now`.
+/// Returns how long the LED is on in the dimming period that begins at `now`.
 fn lit_time(now: Instant) -> Duration {
     match condition::get() {
         Condition::NoCamera => blink(now, FAST_BLINK),
@@ -50,7 +50,7 @@ fn lit_time(now: Instant) -> Duration {
     }
 }
 
-/// Three flashes of a tenth of a period each, a tenth apart, and a pause.
+/// Three flashes of a tenth of a period each, a tenth apart, then a pause.
 fn three_flashes(now: Instant) -> Duration {
     let tenth = (phase(now, FLASHES) * 10.0) as u32;
     if matches!(tenth, 0 | 2 | 4) {
@@ -68,14 +68,15 @@ fn blink(now: Instant, period: Duration) -> Duration {
     }
 }
 
-/// Where `now` lies in its period, 0 to 1.
+/// The phase of `now` in its period, 0 to 1.
 fn phase(now: Instant, period: Duration) -> f32 {
     (now.as_micros() % period.as_micros()) as f32 / period.as_micros() as f32
 }
 
-/// Brightness, 0 to 1, at a phase of the breath: ((1 − cos 2πp) / 2)², squared as the eye is more
-/// sensitive to little light. `micromath`'s cosine is off by at most 0.0011, which makes at most
-/// 0.0007 here (both over 4,001 phases): less than a tenth of the smallest step an eye sees.
+/// Brightness, 0 to 1, at a phase of the breath: ((1 − cos 2πp) / 2)², squared because the eye is
+/// more sensitive to little light. The error of `micromath`'s cosine is at most 0.0011, which is at
+/// most 0.0007 here (both over 4,001 phases): less than a tenth of the smallest step that an eye
+/// sees.
 fn brightness(phase: f32) -> f32 {
     let half = (1.0 - (phase * core::f32::consts::TAU).cos()) / 2.0;
     half * half

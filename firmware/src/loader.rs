@@ -1,24 +1,24 @@
-//! The microcontroller's own loader, which takes new firmware over USB (DFU): started on request.
+//! Starts the microcontroller's own loader on request, which receives new firmware over USB (DFU).
 //!
 //! # Design
-//! The loader expects the part as a reset leaves it. So a word in memory asks for it, and the
-//! program resets the part: `start.s` looks for that word before anything else.
+//! The loader expects the microcontroller in its state after a reset. So the program writes a
+//! request into memory and resets: `start.s` checks for that word before anything else.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use cortex_m::peripheral::SCB;
 use embassy_time::{Duration, Timer};
 
-/// "DFU!" in ASCII; `start.s` has it, too.
+/// "DFU!" in ASCII, as in `start.s`.
 const WANTED: u32 = 0x2155_4644;
-/// Until the reply has left.
+/// Time until the reply has left.
 const REPLY_TIME: Duration = Duration::from_millis(100);
 
-/// Nothing initializes it: it outlives a reset.
+/// It is not initialized, so it survives a reset.
 #[unsafe(no_mangle)]
 #[unsafe(link_section = ".uninit.loader")]
 static LOADER_WANTED: AtomicU32 = AtomicU32::new(0);
 
-/// Starts the loader, once the host has had its reply.
+/// Starts the loader, after the host has received its reply.
 pub async fn start() -> ! {
     Timer::after(REPLY_TIME).await;
     LOADER_WANTED.store(WANTED, Ordering::Relaxed);

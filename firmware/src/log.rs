@@ -1,4 +1,4 @@
-//! Lines for a person: to the debug probe always, and to the host when one listens.
+//! Sends lines for a person: always to the debug probe, and to a host that listens.
 
 use crate::outbox;
 use core::fmt::{self, Write};
@@ -6,11 +6,11 @@ use embassy_time::Instant;
 use heapless::String;
 use hivtac_wire::message::{DeviceMessage, LogLevel, LogLine};
 
-/// Says it. A line that is too long is cut; a line that the host's queue has no room for goes to
-/// the probe only.
+/// Sends a line. A line that is too long is cut; if the host's queue is full, the line goes to the
+/// probe only.
 pub fn say(level: LogLevel, line: fmt::Arguments) {
     let mut text = Cut(String::new());
-    // Never fails: what does not fit is cut.
+    // Never fails: text beyond the capacity is dropped.
     let _ = text.write_fmt(line);
     let Cut(text) = text;
     match level {
@@ -25,7 +25,7 @@ pub fn say(level: LogLevel, line: fmt::Arguments) {
     }));
 }
 
-/// A string that takes what fits and drops the rest.
+/// A string that keeps the text that fits and drops the rest.
 struct Cut(String<96>);
 
 impl Write for Cut {

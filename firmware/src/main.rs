@@ -1,4 +1,4 @@
-//! The HiVTac sensor's program for the STM32H743.
+//! Runs the HiVTac sensor on the STM32H743.
 //!
 //! ```text
 //! vsync ─┐
@@ -8,8 +8,8 @@
 //!                                         └→ memory → flash
 //! ```
 //!
-//! Who interrupts whom: [`priorities`]. What they share: `docs/firmware.md`. What lies where: `memory.x`,
-//! [`caches`]. Nothing is allocated after boot.
+//! Which task may interrupt which: [`priorities`]. Their shared state: `docs/firmware.md`. Memory
+//! layout: `memory.x`, [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
 
@@ -77,8 +77,8 @@ core::arch::global_asm!(include_str!("start.s"));
 static CAPTURE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static USB_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static THREAD_EXECUTOR: StaticCell<Executor> = StaticCell::new();
-/// Too large for DTCM beside the tables; frames use small parts of it at a time, which the data
-/// cache holds.
+/// Too large for DTCM in addition to the tables. Each part of a frame uses small parts of it, which
+/// the data cache holds.
 #[unsafe(link_section = ".sram.sensor")]
 static SENSOR: ConstStaticCell<Sensor> = ConstStaticCell::new(Sensor::new());
 
@@ -98,7 +98,7 @@ fn main() -> ! {
         })
 }
 
-/// What runs in thread mode.
+/// The state of thread mode.
 struct Foreground {
     sensor: &'static mut Sensor,
     model: InUse,
@@ -107,7 +107,7 @@ struct Foreground {
     watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
 }
 
-/// Starts everything else. Not in `main`, which never gives its stack back.
+/// Starts all tasks. Separate from `main`, which never releases its stack.
 #[inline(never)]
 fn start() -> Foreground {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
@@ -145,7 +145,8 @@ fn start() -> Foreground {
     }
 }
 
-/// Sets the pipeline to the camera's frames and to what is kept, and says what pixels it asks for.
+/// Configures the pipeline for the camera's frames and the kept settings; returns the pixel format
+/// that it needs.
 fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
     let Chosen { model, source, .. } = chosen;
     let settings = model::settings(model.as_ref(), kept.threshold);
@@ -168,11 +169,11 @@ fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
         defmt::warn!("the kept limits of contact, slip or filter are out of range");
     }
     settings::follow(sensor, source);
-    // Always one that the camera sends.
+    // Always a format that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }
 
-/// Has the camera begin as it is kept.
+/// Sets the camera's initial settings to the kept ones.
 fn set_camera(kept: CameraSettings) {
     match camera::LIMITS.check(&kept) {
         Ok(()) => camera::tell(kept),
@@ -180,7 +181,8 @@ fn set_camera(kept: CameraSettings) {
     }
 }
 
-/// Each task is started once, at boot; a second start would be a bug of this file.
+/// Returns the token of a task. Each task is started once, at boot; a second start would be a bug
+/// in this file.
 fn token<S, E>(result: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
     match result {
         Ok(token) => token,

@@ -1,11 +1,11 @@
-//! What outlives a restart: read at the start, written when a host asks for it, while everything
-//! else goes on.
+//! Keeps data through restarts: read at the start, written when a host requests it, while all other
+//! tasks go on.
 //!
 //! # Design
 //! The first two sectors of the flash's second bank hold a log of one record ([`Log`]): after a
-//! power cut at any moment the device has what it had kept before, or what it was to keep. A record
-//! of another version is not read, nor written over before something is kept. The next two sectors
-//! hold a model each; the record names the one that is kept, once it was read back.
+//! power cut at any moment the device has the old record or the new one. A record of a different
+//! version is not read, and not overwritten until something is kept. The next two sectors hold one
+//! model each; the record names the kept one, after it was read back.
 
 use crate::flash::SecondBank;
 use crate::model::{self, Chosen};
@@ -28,36 +28,36 @@ use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
 
 const _: () = assert!(MAX_BYTES <= PAYLOAD_LIMIT);
 
-/// What a host asks of the flash. From the USB tasks.
+/// A host's order for the flash. From the USB tasks.
 static MEMORY_ORDER: Signal<CriticalSectionRawMutex, MemoryOrder> = Signal::new();
 
-/// Such an order is under way. Set by the USB tasks, cleared by the memory task.
+/// True while such an order is carried out. Set by the USB tasks, cleared by the memory task.
 static MEMORY_ORDERED: AtomicBool = AtomicBool::new(false);
 
-/// What a host asks of it, and who.
+/// A host's order for the flash, and who sent it.
 struct MemoryOrder {
     action: Action,
     asked: Asked,
 }
 
-/// What is to be done.
+/// The action of an order.
 #[derive(Clone, Copy)]
 pub enum Action {
-    /// Tell what is in use, and what is kept.
+    /// Report the settings in use and the kept ones.
     Report,
-    /// Tell what the self-test finds.
+    /// Report the result of the self-test.
     Health,
-    /// Keep what is in use.
+    /// Keep these settings of those in use.
     Keep(Selection),
-    /// Keep the model that was sent, and use it.
+    /// Keep the uploaded model, and use it.
     UseModel,
-    /// Forget the kept model, and use the built-in one.
+    /// Delete the kept model, and use the built-in one.
     UseBuiltInModel,
-    /// Forget all that is kept, and use what a new device does.
+    /// Delete all kept data, and use the settings of a new device.
     Reset,
 }
 
-/// Has something done for the command `id`; `Busy` while something is.
+/// Passes an action on for the command `id`; returns `Busy` if one is already being carried out.
 pub fn order(action: Action, id: u16) -> Option<Outcome> {
     if MEMORY_ORDERED.swap(true, Ordering::Relaxed) {
         return Some(Outcome::Busy);
@@ -67,24 +67,24 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
     None
 }
 
-/// Whether something is under way.
+/// Returns whether an action is being carried out.
 pub fn is_ordered() -> bool {
     MEMORY_ORDERED.load(Ordering::Relaxed)
 }
 
-/// What is kept, and where.
+/// The kept data, and the flash that holds it.
 pub struct Memory {
     log: Log<SecondBank>,
     thermometer: Thermometer,
     record: Record,
-    /// At the start.
+    /// The content of the flash at the start.
     found: Found,
-    /// Whether `record` is what the next start reads.
+    /// True if `record` is the record that the next start reads.
     is_kept: bool,
 }
 
 impl Memory {
-    /// Reads what is kept. Call once, at the start.
+    /// Reads the kept data. Call once, at the start.
     pub fn open(bank: SecondBank, thermometer: Thermometer) -> Self {
         let mut payload = [0; PAYLOAD_LIMIT];
         let (log, length) = Log::open(bank, &mut payload);
@@ -103,12 +103,12 @@ impl Memory {
         }
     }
 
-    /// What is kept.
+    /// The kept data.
     pub fn record(&self) -> &Record {
         &self.record
     }
 
-    /// The model to begin with.
+    /// Returns the model for the start.
     pub fn model(&mut self) -> Chosen {
         match self.record.model {
             Some(kept) => model::kept(self.log.flash(), &kept),
@@ -116,7 +116,7 @@ impl Memory {
         }
     }
 
-    /// What was written when the power was cut may not read so the next time: it is written again.
+    /// A record whose writing was cut off may read differently next time, so it is written again.
     async fn settle(&mut self) {
         if self.log.is_settled() || !self.is_kept {
             return;
@@ -138,7 +138,7 @@ impl Memory {
         };
         let outcome = match outcome {
             Err(outcome) => Some(outcome),
-            // The pipeline replies, when it uses the model.
+            // The pipeline replies once it uses the model.
             Ok(next) => {
                 let order = Order::UseModel {
                     asked,
@@ -164,7 +164,7 @@ impl Memory {
         Outcome::Done
     }
 
-    /// What the self-test asks of it.
+    /// Returns the flash's part of the self-test.
     pub fn of_flash(&self) -> OfFlash {
         OfFlash {
             found: self.found,
@@ -209,7 +209,7 @@ impl Memory {
         Outcome::Done
     }
 
-    /// Which of what is in use is kept.
+    /// Returns which settings in use are kept.
     fn selection(&self, used: &InUse) -> Selection {
         Selection {
             name: used.name == self.record.name,
@@ -253,7 +253,7 @@ impl Memory {
         }
     }
 
-    /// Checks the model that was sent before the flash is touched, and keeps it.
+    /// Checks the uploaded model before the flash is written, and keeps it.
     async fn keep_model(&mut self) -> Result<Chosen, Outcome> {
         let whole = model_upload::finish().ok_or(Outcome::InvalidArgument)?;
         let file = model_slots::lend(whole.slot, whole.bytes).ok_or(Outcome::Busy)?;

@@ -1,4 +1,5 @@
-//! The model: the built-in one, or one that a host sent; and whether it is one for this sensor.
+//! Selects the model: the built-in one, or one that a host sent; and checks that it fits this
+//! sensor.
 
 use crate::camera::{self, Format};
 use crate::dtcm_table::Sensor;
@@ -14,14 +15,14 @@ use hivtac_wire::kept::KeptModel;
 use hivtac_wire::message::{ModelSource, Outcome};
 
 /// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels
-/// run it.
+/// can run it.
 static FILE: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!(env!("HIVTAC_MODEL_FILE")));
 
-/// What a computer has for the model's answer to the known question (`build.rs`).
+/// A computer's answer of the model to the known question (`build.rs`).
 static ANSWER: Option<Answer> = include!(concat!(env!("OUT_DIR"), "/known_answer.rs"));
 
-/// A file of at most so many bytes is copied to DTCM at the start, where its weights are read
-/// without waiting; a larger one is read in flash.
+/// A file of at most this many bytes is copied to DTCM at the start, where its weights are read
+/// without waiting. A larger one is read in flash.
 const NEAR_LIMIT: usize = 12 * 1024;
 /// Bytes of the copy.
 const NEAR: usize = if FILE.0.len() <= NEAR_LIMIT {
@@ -43,18 +44,18 @@ const fn beginning<const N: usize>(bytes: &[u8]) -> [u8; N] {
     copy
 }
 
-/// A model, and where it is from.
+/// A model, and its source.
 pub struct Chosen {
-    /// `None` when there is no usable one: samples then say so and have no force.
+    /// `None` if there is no usable model: samples then report that and have no force.
     pub model: Option<Model<'static>>,
-    /// Where it came from.
+    /// Its source.
     pub source: ModelSource,
-    /// The slot that it lies in, which is lent; none for a built-in one.
+    /// The slot that holds it, which is lent; `None` for a built-in model.
     pub slot: Option<u8>,
 }
 
 impl Chosen {
-    /// The built-in model, for that reason.
+    /// The built-in model, with the reason as its source.
     pub fn built_in(source: ModelSource) -> Self {
         Self {
             model: built_in(),
@@ -64,7 +65,7 @@ impl Chosen {
     }
 }
 
-/// `None`, with a log line, when the file is not usable.
+/// Returns `None`, with a log line, if the file is not usable.
 fn built_in() -> Option<Model<'static>> {
     let file = if NEAR != 0 { &COPY.0[..] } else { &FILE.0 };
     match Model::parse(file) {
@@ -76,19 +77,20 @@ fn built_in() -> Option<Model<'static>> {
     }
 }
 
-/// Whether the built-in model answers the known question as on a computer; false when it is none.
+/// Returns whether the built-in model answers the known question as on a computer; false if it is
+/// not usable.
 pub fn answers_right(sensor: &mut Sensor) -> bool {
     let answer = built_in().map(|model| sensor.known_answer(&model));
     answer.is_some() && answer == ANSWER
 }
 
-/// The sector of the flash's second bank that keeps the model of a slot: behind those of the log.
+/// The sector of the flash's second bank that keeps the model of a slot, after those of the log.
 pub fn sector(slot: u8) -> u32 {
     2 + u32::from(slot)
 }
 
-/// The model that is kept, read from the flash; the built-in one instead when that does not read,
-/// or is none for this sensor.
+/// Returns the kept model, read from the flash; the built-in one if the kept one is unreadable, or
+/// does not fit this sensor.
 pub fn kept(flash: &mut SecondBank, kept: &KeptModel) -> Chosen {
     match read(flash, kept) {
         Some(model) => Chosen {
@@ -119,18 +121,18 @@ fn read(flash: &mut SecondBank, kept: &KeptModel) -> Option<Model<'static>> {
 
 /// Why a model is refused.
 pub enum Refusal {
-    /// It is no model file, or none that is sound.
+    /// It is not a model file, or not a sound one.
     Unusable(ModelError),
-    /// It was made for another camera: lens, frame, pixels.
+    /// It was made for a different camera: lens, frame, pixels.
     Frames,
-    /// It was calibrated on the sensor with another microcontroller.
+    /// It was calibrated on a sensor with a different microcontroller.
     Unit,
-    /// Frames cannot be read as it wants.
+    /// The sensor cannot have the settings that it needs.
     Settings,
 }
 
 impl Refusal {
-    /// The reply.
+    /// Returns the reply.
     pub fn outcome(&self) -> Outcome {
         match self {
             Refusal::Unusable(_) | Refusal::Settings => Outcome::ModelUnusable,
@@ -156,7 +158,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// Reads a model file, and proves it sound and one for this sensor.
+/// Reads a model file, and proves that it is sound and fits this sensor.
 ///
 /// # Errors
 /// Why it is refused.
@@ -176,9 +178,9 @@ pub fn check(file: &'static [u8]) -> Result<Model<'static>, Refusal> {
     }
 }
 
-/// The camera's frames, and the user's `own` threshold, the one that the model was made for, or the
-/// usual one of the camera's pixels: the first that is for pixels that the camera sends. A built-in
-/// model for other pixels gives no force then, and every sample says so.
+/// Returns the settings for the camera's frames. The threshold is the first of these whose pixels
+/// the camera sends: the user's `own`, the model's, the usual one of the camera's pixels. A
+/// built-in model for other pixels then gives no force, and every sample reports that.
 pub fn settings(model: Option<&Model<'static>>, own: Option<Threshold>) -> Settings {
     let order = ByteOrder::Swapped;
     let geometry = camera::GEOMETRY;

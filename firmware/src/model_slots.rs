@@ -1,37 +1,38 @@
-//! Two places in SRAM for models that a host sends: one is in use while the other is filled.
+//! Provides two places in SRAM for models that a host sends: one is in use while the other is
+//! filled.
 //!
 //! # Design
-//! A model is run from SRAM and not from the flash that keeps it: the core that reads a bank of the
-//! flash waits while that bank is erased, for a second. A slot is filled, then *lent*, as a file
-//! that does not change until it is given back: by the memory task when it is refused, by the
-//! pipeline when another model is in use.
+//! A model runs from SRAM and not from the flash that keeps it: a core that reads a flash bank
+//! waits while that bank is erased, for a second. A slot is filled, then *lent*, as a file that
+//! does not change until it is given back. The memory task gives it back if the model is refused,
+//! the pipeline when a different model is in use.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use hivtac_wire::message::MODEL_BYTES;
 
-/// How many there are.
+/// Number of slots.
 const COUNT: usize = 2;
 
-/// Slots that may not be written. Set at boot and by the memory task; cleared by them and the
+/// Slots that must not be written. Set at boot and by the memory task; cleared by them and the
 /// pipeline.
 static LENT: [AtomicBool; COUNT] = [const { AtomicBool::new(false) }; _];
 
-/// Files lie at a multiple of four, so that kernels run them, and of a line of the data cache.
+/// Files begin at a multiple of four, so that kernels can run them, and of a data cache line.
 #[repr(C, align(32))]
 struct Files([[u8; MODEL_BYTES]; COUNT]);
 
 #[unsafe(link_section = ".sram_zero.models")]
 static mut FILES: Files = Files([[0; MODEL_BYTES]; COUNT]);
 
-/// One that is not lent.
+/// Returns a slot that is not lent; `None` if both are.
 pub fn free() -> Option<u8> {
     (0..)
         .zip(&LENT)
         .find_map(|(slot, lent)| (!lent.load(Ordering::Acquire)).then_some(slot))
 }
 
-/// Has `fill` write into a slot; `None` when it is lent, or there is no such slot. Only for the USB
-/// executor, and for the start before that: of these one runs at a time, to its end.
+/// Calls `fill` to write into a slot. Returns `None` if the slot is lent or does not exist. Only
+/// for the USB executor, and for the start before that: of these one runs at a time, to its end.
 pub fn fill<T>(slot: u8, fill: impl FnOnce(&mut [u8; MODEL_BYTES]) -> T) -> Option<T> {
     let lent = LENT.get(usize::from(slot))?;
     if lent.load(Ordering::Acquire) {
@@ -43,8 +44,8 @@ pub fn fill<T>(slot: u8, fill: impl FnOnce(&mut [u8; MODEL_BYTES]) -> T) -> Opti
     Some(fill(file))
 }
 
-/// Lends a slot's first bytes, until it is given back; `None` when it is lent, or there is no such
-/// slot.
+/// Lends a slot's first bytes, until it is given back. Returns `None` if the slot is lent or does
+/// not exist.
 pub fn lend(slot: u8, bytes: u32) -> Option<&'static [u8]> {
     let lent = LENT.get(usize::from(slot))?;
     if lent.swap(true, Ordering::AcqRel) {
@@ -55,14 +56,14 @@ pub fn lend(slot: u8, bytes: u32) -> Option<&'static [u8]> {
     file.get(..bytes as usize)
 }
 
-/// Gives a slot back: nobody uses what was lent of it any more.
+/// Gives a slot back: its lent bytes must no longer be used.
 pub fn give_back(slot: u8) {
     if let Some(lent) = LENT.get(usize::from(slot)) {
         lent.store(false, Ordering::Release);
     }
 }
 
-/// Where a slot lies that there is.
+/// Returns the address of a slot that exists.
 fn file(slot: u8) -> *mut [u8; MODEL_BYTES] {
     (&raw mut FILES)
         .cast::<[u8; MODEL_BYTES]>()

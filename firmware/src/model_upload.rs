@@ -1,4 +1,4 @@
-//! A model on its way from the host, part after part, into a slot that is not in use.
+//! Receives a model from the host, part by part, into a slot that is not in use.
 
 use crate::model_slots;
 use crate::session;
@@ -6,11 +6,11 @@ use core::cell::Cell;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use hivtac_wire::message::{MODEL_BYTES, ModelPart, Outcome};
 
-/// A model on its way. Used by the USB tasks and the memory task.
+/// The upload. Used by the USB tasks and the memory task.
 static UPLOAD: CriticalSectionMutex<Cell<Option<Upload>>> =
     CriticalSectionMutex::new(Cell::new(None));
 
-/// What has come so far.
+/// The part of the file that has been received.
 #[derive(Clone, Copy)]
 struct Upload {
     conversation: u32,
@@ -19,17 +19,17 @@ struct Upload {
     received: u32,
 }
 
-/// A file that has come whole.
+/// A file that has been received completely.
 #[derive(Clone, Copy)]
 pub struct Whole {
-    /// Where it lies.
+    /// Its slot.
     pub slot: u8,
     /// Its length.
     pub bytes: u32,
 }
 
-/// A file of so many bytes begins; what came before is forgotten. Only while the memory task has no
-/// order.
+/// Begins a file of `bytes` bytes; a previous upload is discarded. Only while the memory task has
+/// no order.
 pub fn begin(bytes: u32) -> Outcome {
     if bytes == 0 || bytes > MODEL_BYTES as u32 {
         return Outcome::InvalidArgument;
@@ -47,7 +47,7 @@ pub fn begin(bytes: u32) -> Outcome {
     }
 }
 
-/// The next bytes.
+/// Takes the next bytes.
 pub fn part(part: &ModelPart) -> Outcome {
     match take(part) {
         Some(upload) => {
@@ -58,7 +58,7 @@ pub fn part(part: &ModelPart) -> Outcome {
     }
 }
 
-/// Writes them behind what came before; `None` when they do not follow it.
+/// Writes the bytes behind the previous ones; returns `None` if they do not follow them.
 fn take(part: &ModelPart) -> Option<Upload> {
     let upload = current()?;
     let received = upload.received.checked_add(part.bytes.len() as u32)?;
@@ -75,7 +75,7 @@ fn take(part: &ModelPart) -> Option<Upload> {
     })?
 }
 
-/// The file, once it is whole. It is no upload any more.
+/// Ends the upload and returns the file; `None` if it is not complete.
 pub fn finish() -> Option<Whole> {
     let Upload {
         slot,
@@ -87,7 +87,7 @@ pub fn finish() -> Option<Whole> {
     (received == bytes).then_some(Whole { slot, bytes })
 }
 
-/// Of the present conversation.
+/// Returns the upload of the current conversation.
 fn current() -> Option<Upload> {
     let upload = UPLOAD.lock(|cell| cell.get());
     upload.filter(|upload| upload.conversation == session::number())

@@ -1,4 +1,4 @@
-//! The model in use, and how another one takes its place: between two frames.
+//! Replaces the model in use by a new one, between two frames.
 
 use crate::dtcm_table::Sensor;
 use crate::model::{self, Chosen};
@@ -6,11 +6,11 @@ use crate::model_slots;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::ModelSource;
 
-/// Where the model in use is from.
+/// The source of the model in use.
 pub struct InUse {
-    /// Where it came from.
+    /// Its source.
     pub source: ModelSource,
-    /// The slot that it lies in; none for a built-in one.
+    /// The slot that holds it; `None` for a built-in model.
     slot: Option<u8>,
 }
 
@@ -24,12 +24,12 @@ impl InUse {
     }
 }
 
-/// Has the sensor use a model. The threshold becomes the model's, unless a user has set another
-/// one; the rest position stays when markers are seen as before. `afresh` takes the model's
-/// threshold and no rest position, whatever there was.
+/// Replaces the sensor's model. The threshold becomes the new model's, unless a user has set a
+/// different one. The rest position stays if markers are found in the same way. With `afresh`, the
+/// threshold is always the model's, and the rest position is discarded.
 ///
-/// Gives the threshold that is to be in use, when it is of other pixels than the camera sends: the
-/// one before stays meanwhile, and with it there is no force.
+/// Returns the wanted threshold if its pixels differ from the camera's. Until the camera sends
+/// them, the previous threshold stays, and there is no force.
 pub fn bring_into_use(
     next: Chosen,
     afresh: bool,
@@ -52,7 +52,7 @@ pub fn bring_into_use(
         false => sensor.reconfigure(settings, next.model),
     };
     if configured.is_err() {
-        // Never: they were checked when the model was.
+        // Never happens: the settings were checked with the model.
         now.slot.into_iter().for_each(model_slots::give_back);
         return None;
     }

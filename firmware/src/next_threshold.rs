@@ -1,5 +1,5 @@
-//! A new threshold on its way: it comes into use between two frames, at once, or, when it is of
-//! another pixel format, with the first frame of that format. Until then the one before serves.
+//! Brings a new threshold into use between two frames: at once, or, if it has a different pixel
+//! format, with the first frame of that format. Until then the previous threshold stays.
 
 use crate::camera::Format;
 use crate::capture_task;
@@ -8,20 +8,20 @@ use crate::session::Asked;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::Outcome;
 
-/// The threshold that waits for the camera's pixels, if any, and who asked for it.
+/// The threshold that waits for the camera's pixels, if any, and who requested it.
 pub struct NextThreshold(Option<(Asked, Threshold)>);
 
 impl NextThreshold {
-    /// None waits.
+    /// No threshold waits.
     pub const NONE: Self = Self(None);
 
-    /// Takes a threshold, as it came, for the command `id`, while frames have the pixels of
-    /// `sensor`'s threshold: brings it into use, or asks the camera for its pixels. Tells whether
-    /// it is in use.
+    /// Takes an unchecked threshold for the command `id`, while frames have the pixel format of
+    /// `sensor`'s threshold. Brings it into use, or requests its pixel format from the camera.
+    /// Returns whether it is in use.
     ///
     /// # Errors
-    /// Why it is refused: another one waits, it means nothing, or the camera does not send such
-    /// pixels.
+    /// Why it is refused: a threshold already waits, it is invalid, or the camera does not send its
+    /// pixel format.
     pub fn take(
         &mut self,
         id: u16,
@@ -42,8 +42,8 @@ impl NextThreshold {
         Ok(false)
     }
 
-    /// Has a threshold of other pixels come into use with the first frame of them, for a command;
-    /// false when another one waits, or the camera does not send such pixels.
+    /// Makes a threshold of a different pixel format wait for the first frame of that format, for a
+    /// command. Returns false if a threshold already waits, or the camera does not send the format.
     pub fn wait_for(&mut self, asked: Asked, threshold: Threshold) -> bool {
         let format = Format::of(threshold.format()).filter(|_| self.0.is_none());
         if let Some(format) = format {
@@ -57,8 +57,8 @@ impl NextThreshold {
         capture_task::request_format(format);
     }
 
-    /// Brings the threshold that waited into use: the camera sends its pixels now. Tells who asked
-    /// for it.
+    /// Brings the waiting threshold into use, once the camera sends its pixels. Returns who
+    /// requested it; `None` if no threshold waits.
     pub fn come_into_use(&mut self, sensor: &mut Sensor) -> Option<Asked> {
         let (asked, threshold) = self.0.take()?;
         // It was checked when it came.

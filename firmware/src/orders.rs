@@ -1,4 +1,4 @@
-//! What the host wants of the pipeline.
+//! Defines the host's orders for the pipeline.
 
 use crate::model::Chosen;
 use crate::session::Asked;
@@ -14,52 +14,52 @@ use hivtac_wire::settings::RestPosition;
 #[unsafe(link_section = ".sram.orders")]
 pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 
-/// What the host wants of the pipeline; done between two frames. Each is answered with its `id`.
+/// An order for the pipeline, carried out between two frames. Each is answered with its `id`.
 pub enum Order {
     /// Use this threshold and its pixel format as soon as possible.
     SetThreshold {
-        /// Of the command.
+        /// The command's number.
         id: u16,
-        /// As it came, unchecked.
+        /// The threshold, unchecked.
         threshold: Threshold,
     },
     /// Take the mean of the next good frames as the rest position.
     Tare {
-        /// Of the command.
+        /// The command's number.
         id: u16,
-        /// How many; unchecked.
+        /// Number of frames, unchecked.
         frames: u16,
-        /// Also when something moves or touches the film.
+        /// True to accept frames in which something moves or touches the film.
         anyway: bool,
     },
-    /// Take this as the rest position, or none.
+    /// Set the rest position, or remove it.
     SetTare {
-        /// Of the command.
+        /// The command's number.
         id: u16,
-        /// As it came, unchecked.
+        /// The rest position, unchecked.
         position: Option<RestPosition>,
     },
-    /// Follow forces so from the next frame on.
+    /// Set how forces are followed, from the next frame on.
     SetTemporal {
-        /// Of the command.
+        /// The command's number.
         id: u16,
-        /// As they came, unchecked.
+        /// The settings, unchecked.
         settings: TemporalSettings,
     },
     /// Keep the next whole frame and send it.
     Snapshot(Asked),
-    /// Use another model.
+    /// Use a different model.
     UseModel {
-        /// Of the command.
+        /// Who requested it.
         asked: Asked,
         /// The model.
         next: Chosen,
-        /// With its threshold and no tare, whatever is in use.
+        /// True to use its threshold and no tare, regardless of those in use.
         afresh: bool,
     },
 }
 
-/// Passes an order on; `Busy` when too many wait.
+/// Passes an order on; returns `Busy` if too many wait.
 pub fn order(order: Order) -> Option<Outcome> {
     match ORDERS.try_send(order) {
         Ok(()) => None,

@@ -1,4 +1,4 @@
-//! Bands into samples: runs the sensing pipeline in thread mode, below everything else.
+//! Turns bands into samples: runs the sensing pipeline in thread mode, at the lowest priority.
 
 use crate::band_copy::BandCopy;
 use crate::bands::SHAPE;
@@ -48,7 +48,7 @@ pub async fn run(
         taring: None,
         snapshots,
     };
-    // Nothing but this loop waits: an async function that ends could be polled again, and panic.
+    // Only this loop waits: an async function that ends could be polled again, and panic.
     loop {
         if task.follower.is_scanning() {
             if !task.deliver_early() {
@@ -72,24 +72,24 @@ struct PipelineTask {
     model: InUse,
     next_threshold: NextThreshold,
     bands: BandCopy,
-    /// Sequence number of the band that was scanned last.
+    /// Sequence number of the last scanned band.
     last_band: u32,
     follower: Follower,
-    /// Spent on the frame under way, µs.
+    /// Time spent on the current frame, µs.
     busy_us: u32,
-    /// The frame that was measured last.
+    /// Number of the last measured frame.
     newest: u32,
-    /// Samples produced.
+    /// Number of samples produced.
     sequence: u32,
-    /// No frame was measured yet.
+    /// True until the first frame was measured.
     first: bool,
-    /// A tare under way.
+    /// The active tare.
     taring: Option<Taring>,
     snapshots: SnapshotCopy,
 }
 
 impl PipelineTask {
-    /// When a tare gives up that is still wanted, or a snapshot.
+    /// Returns when an active tare or snapshot gives up.
     fn deadline(&mut self) -> Instant {
         self.taring.take_if(|taring| !taring.is_wanted());
         self.tare_deadline().min(self.snapshots.deadline())
@@ -99,7 +99,7 @@ impl PipelineTask {
         self.taring.as_ref().map_or(Instant::MAX, Taring::deadline)
     }
 
-    /// Ends what has waited for too long.
+    /// Ends a tare or snapshot that has waited too long.
     fn give_up_overdue(&mut self) {
         let now = Instant::now();
         if self.tare_deadline() <= now {
@@ -110,8 +110,8 @@ impl PipelineTask {
         }
     }
 
-    /// Delivers the frame under way when it has all its rows and need not wait for its end; tells
-    /// whether it did.
+    /// Delivers the current frame before its end is known, if it has all its rows. Returns whether
+    /// it did.
     fn deliver_early(&mut self) -> bool {
         let complete = self.follower.is_complete();
         let early = complete && CAPTURE_EVENTS.is_empty() && !capture::has_begun_a_band();
@@ -122,7 +122,7 @@ impl PipelineTask {
         early
     }
 
-    /// Takes what the capture tells, and does what follows from it.
+    /// Handles an event of the capture.
     fn take(&mut self, CaptureEvent { event, format }: CaptureEvent) {
         if let Event::Ended { edge, how } = event
             && how != Ending::Whole
@@ -130,7 +130,7 @@ impl PipelineTask {
             defmt::warn!("frame {=u32}: {}", edge.number, defmt::Debug2Format(&how));
         }
         let action = self.follower.event(event);
-        // The first event of other pixels is that the camera was set to them.
+        // The first event with other pixels means that the camera was set to them.
         if format.pixels() != self.sensor.threshold().format() {
             self.change_format();
         }
@@ -213,13 +213,13 @@ impl PipelineTask {
         }
     }
 
-    /// Between two frames, so that none is of two models.
+    /// Called between two frames, so that no frame mixes two models.
     fn use_model(&mut self, asked: Asked, next: Chosen, afresh: bool) {
         self.give_up_tare();
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
         if afresh {
-            // The usual settings are in their ranges.
+            // The usual settings are always valid.
             let _ = self.sensor.set_temporal(TemporalSettings::USUAL);
         }
         if self.sensor.threshold() == before {
@@ -238,7 +238,7 @@ impl PipelineTask {
         match rest.transpose() {
             Ok(rest) => {
                 self.give_up_tare();
-                // It was taken at another time.
+                // It was taken at another time, so the film may have drifted.
                 let down = position.and_then(|position| position.down);
                 self.sensor.set_tare_under(rest, Drift::UNSEEN, down);
                 self.follow();
@@ -248,19 +248,20 @@ impl PipelineTask {
         }
     }
 
-    /// Tells what it measures with from now on.
+    /// Publishes the pipeline's settings.
     fn follow(&self) {
         settings::follow(self.sensor, self.model.source);
     }
 
-    /// Measures against this rest position from the next frame on, or against the model's own.
+    /// Measures against this rest position from the next frame on; with `None` against the model's
+    /// own.
     fn use_tare(&mut self, rest: Option<Rest>, drift: Drift) {
         self.sensor.set_tare(rest, drift);
         self.follow();
     }
 
-    /// Frames of other pixels come from now on: those of the threshold that waits. Markers have
-    /// other areas in them, so that no rest position holds.
+    /// Call when frames of a new pixel format come, that of the waiting threshold. Markers have
+    /// other areas in them, so the rest position is discarded.
     fn change_format(&mut self) {
         let asked = self.next_threshold.come_into_use(self.sensor);
         self.use_tare(None, Drift::NONE);
@@ -271,8 +272,8 @@ impl PipelineTask {
         }
     }
 
-    /// Goes on with the next frame. A threshold of RGB565 takes some 7 million instructions, during
-    /// which frames pass.
+    /// Continues with the next frame. A threshold of RGB565 takes some 7 million instructions,
+    /// during which frames pass.
     fn threshold_changed(&mut self) {
         self.follow();
         self.sensor.forget_frame();
@@ -317,13 +318,13 @@ impl PipelineTask {
             self.sequence = self.sequence.wrapping_add(1);
             outbox::offer_sample(sample);
         }
-        // Behind the sample, which goes first.
+        // After the sample, which goes first.
         let threshold = self.sensor.threshold();
         self.snapshots.frame(frame, time_us, threshold);
     }
 
-    /// Looks at the frame again when the pipeline asks for it and all its bands are still in the
-    /// ring. What is overwritten meanwhile leaves the measurement as it is.
+    /// Takes a second look at the frame if the pipeline wants one and all its bands are still in
+    /// the ring. If a band is overwritten meanwhile, the measurement stays unchanged.
     fn look_again(&mut self, measurement: &mut Measurement, delivery: &Delivery) {
         let Some(again) = self.sensor.look_again() else {
             return;
@@ -397,7 +398,7 @@ impl PipelineTask {
     }
 }
 
-/// When the frame was exposed that was delivered.
+/// Returns the frame number and exposure time of a delivery.
 fn moment(delivery: &Delivery) -> Moment {
     let edge = delivery.edge;
     Moment {

@@ -1,4 +1,4 @@
-//! Who may interrupt whom: the whole program's interrupt priorities in one place.
+//! Sets all interrupt priorities of the program: which task may interrupt which.
 //!
 //! | priority | who | why there |
 //! |---|---|---|
@@ -17,7 +17,7 @@ pub const CAPTURE_EXECUTOR: interrupt::Interrupt = interrupt::UART4;
 /// Interrupt whose vector runs the USB executor. The UART itself is not used.
 pub const USB_EXECUTOR: interrupt::Interrupt = interrupt::UART5;
 
-/// Of DCMI and its DMA, which are set when they are set up.
+/// Priority of DCMI and its DMA, which is set during their set-up.
 pub const CAPTURE: Priority = Priority::P1;
 
 /// Sets every other priority. Call once, before any of these interrupts is enabled.

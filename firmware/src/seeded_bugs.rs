@@ -1,8 +1,8 @@
-//! Deliberate bugs, each behind a cargo feature that is off by default.
+//! Contains deliberate bugs, each behind a cargo feature that is off by default.
 //!
-//! They exist to prove that the tests on the emulated microcontroller notice such mistakes. With no
-//! feature set every constant here has its right value and the program is the same as if this file
-//! did not exist.
+//! They prove that the tests on the emulated microcontroller detect such mistakes. Without these
+//! features every constant here has its correct value, and the program is the same as without this
+//! file.
 
 /// DMAMUX1 request line of DCMI (RM0433, table "DMAMUX1: assignment of multiplexer inputs"), or its
 /// neighbour's.
@@ -12,20 +12,20 @@ pub const DCMI_DMA_REQUEST: u8 = if cfg!(feature = "bug-dmamux-request") {
     75
 };
 
-/// True when DCMI samples on the edge on which the camera changes its data, and mistakes blanking
-/// for data.
+/// True if DCMI samples on the edge on which the camera changes its data, and takes blanking for
+/// data.
 pub const INVERTED_POLARITIES: bool = cfg!(feature = "bug-polarity");
 
-/// True when the camera's register for its format is wrong: an OV7725 left at YUV, an MT9V034 that
-/// does not bin.
+/// True if the camera's format register is wrong: an OV7725 left at YUV, an MT9V034 that does not
+/// bin.
 pub const CAMERA_REGISTER: bool = cfg!(feature = "bug-camera-register");
 
-/// The part of a band that the DMA is told to transfer: one in this many.
+/// The DMA transfers one part in this many of a band.
 pub const BAND_DIVISOR: u16 = if cfg!(feature = "bug-half-buffer") {
     2
 } else {
     1
 };
 
-/// True when USB is clocked by an oscillator that nothing trims.
+/// True if USB is clocked by an untrimmed oscillator.
 pub const USB_FROM_HSI48: bool = cfg!(feature = "bug-usb-clock");

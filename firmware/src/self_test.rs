@@ -1,16 +1,15 @@
-//! What the device finds when it looks at itself: at the start, before the first sample, and on
-//! request.
+//! Tests the device itself: at the start, before the first sample, and on request.
 //!
 //! # Design
-//! At the start it looks at what costs next to nothing: flash, model and stack by what is
-//! known of them, and the arithmetic by one answer of the built-in model. Whether the camera is the
-//! right one, its registers hold what was written and its frames take the time that they should,
-//! its set-up finds out anyhow. Only the temperature is left out, whose converter needs time.
+//! The test at the start is limited to cheap checks: flash, model and stack by their known state,
+//! and the arithmetic by one answer of the built-in model. The camera's set-up checks its identity,
+//! its registers and its frame time anyway. Only the temperature is omitted, because its converter
+//! takes time.
 //!
 //! # Limitations
-//! A model that is kept is not asked the question: its checksum says that its bytes are those that
-//! were sent, and the built-in model that kernels and arithmetic work. `docs/firmware.md` has the
-//! argument.
+//! A kept model is not asked the known question. Its checksum proves that its bytes are those that
+//! were sent, and the built-in model's answer proves kernels and arithmetic. `docs/firmware.md` has
+//! the argument.
 
 use crate::condition::{self, Condition};
 use crate::dtcm_table::Sensor;
@@ -22,30 +21,30 @@ use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::ModelSource;
 use hivtac_wire::settings::Found;
 
-/// What the self-test found at the start, bits of `Problem`. Written at boot and by the capture
-/// task; read by the memory task and the LED task.
+/// Problems found at the start, bits of `Problem`. Written at boot and by the capture task; read by
+/// the memory task and the LED task.
 static AT_START: AtomicU32 = AtomicU32::new(0);
 
-/// Why the camera could not be set up, a bit of `Problem`; 0 when it could. Written by the capture
+/// Why the camera could not be set up, a bit of `Problem`; 0 if it could. Written by the capture
 /// task; read by the memory task.
 static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
 
-/// Above this the microcontroller is hotter than its data sheet has it, hundredths of a degree.
+/// The highest temperature of the microcontroller's data sheet, hundredths of a degree.
 const HOTTEST: i16 = 8_500;
 
-/// Frames that are longer or shorter by one part in so many say that a clock is wrong: crystals
-/// differ by a tenth of a thousandth.
+/// A clock is wrong if frames are longer or shorter than one part in this many. Crystals differ by
+/// a tenth of a thousandth.
 const FRAME_TIME_PART: u32 = 100;
 
-/// What the flash's owner knows.
+/// The flash owner's part of the self-test.
 pub struct OfFlash {
-    /// What it had at the start.
+    /// The content of the flash at the start.
     pub found: Found,
-    /// Attempts to write that failed.
+    /// Number of failed attempts to write.
     pub failures: u32,
 }
 
-/// Looks at everything. The temperature is as it was read, hundredths of a degree.
+/// Runs all checks, with this temperature, hundredths of a degree.
 pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health {
     let at_start = AT_START.load(Ordering::Relaxed);
     let is_hot = temperature_centidegrees.is_none_or(|temperature| temperature > HOTTEST);
@@ -69,14 +68,14 @@ pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health 
     }
 }
 
-/// Looks at what costs next to nothing. Call once, when `sensor` is configured.
+/// Runs the cheap checks. Call once, after `sensor` is configured.
 pub fn at_start(flash: &OfFlash, sensor: &mut Sensor) {
     let wrong = !model::answers_right(sensor);
     let problems = standing(flash) | bits(&[(Problem::Arithmetic, wrong)]);
     AT_START.store(problems, Ordering::Relaxed);
 }
 
-/// What can be looked at any time.
+/// Runs the checks that are possible at any time.
 fn standing(flash: &OfFlash) -> u32 {
     let reset = faults::reset_reason();
     let model = settings::of_pipeline().and_then(|told| told.model);
@@ -103,7 +102,7 @@ fn bits(found: &[(Problem, bool)]) -> u32 {
     found.iter().map(bit).fold(0, |all, bit| all | bit)
 }
 
-/// The camera could not be set up; `starting` until it was for the first time.
+/// Records that the camera could not be set up; `starting` is true until it was set up once.
 pub fn camera_failed(error: &camera::Error, starting: bool) {
     let problem = match error {
         camera::Error::Bus(_) => Problem::CameraSilent,
@@ -116,8 +115,8 @@ pub fn camera_failed(error: &camera::Error, starting: bool) {
     }
 }
 
-/// The camera was set up, and frames took so long; nothing when none came. `starting` the first
-/// time.
+/// Records that the camera was set up, and its frame time, µs; `None` if no frame came. `starting`
+/// is true the first time.
 pub fn camera_answers(frame_us: Option<u32>, should_us: u32, starting: bool) {
     let off = |us: u32| us.abs_diff(should_us) > should_us / FRAME_TIME_PART;
     let problem = bits(&[(Problem::Clocks, frame_us.is_some_and(off))]);
@@ -127,7 +126,7 @@ pub fn camera_answers(frame_us: Option<u32>, should_us: u32, starting: bool) {
     }
 }
 
-/// Whether something was found at the start that no other pattern of the LED tells.
+/// Returns whether a problem was found at the start that the LED's other patterns do not show.
 pub fn failed_at_start() -> bool {
     const TOLD_OTHERWISE: [Problem; 5] = [
         Problem::CameraSilent,

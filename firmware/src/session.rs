@@ -1,25 +1,26 @@
-//! Whether a host listens, and what it wants: a conversation as `docs/wire.md` defines it.
+//! Holds the state of a conversation with a host, as `docs/wire.md` defines it.
 
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-/// A host speaks our version. This and the following are written by the USB tasks; this one is read
-/// by them, the pipeline and the capture task.
+/// True if the host uses our version. This and the following are written by the USB tasks; this one
+/// is read by them, the pipeline and the capture task.
 static SESSION_OPEN: AtomicBool = AtomicBool::new(false);
-/// Samples and statistics flow. Read by the pipeline and the USB tasks.
+/// True while samples and statistics are sent. Read by the pipeline and the USB tasks.
 static STREAMING: AtomicBool = AtomicBool::new(false);
-/// Samples carry markers. Read by the pipeline.
+/// True if samples carry markers. Read by the pipeline.
 static WITH_MARKERS: AtomicBool = AtomicBool::new(false);
-/// Another one for each conversation. Read by the USB tasks, the pipeline and the capture task.
+/// Number of the conversation. Read by the USB tasks, the pipeline and the capture task.
 static CONVERSATION: AtomicU32 = AtomicU32::new(0);
 
-/// A hello began a new conversation; `understood` when host and device speak the same version.
+/// Begins a conversation, after a hello; `understood` is true if host and device use the same
+/// version.
 pub fn begin(understood: bool) {
     STREAMING.store(false, Ordering::Relaxed);
     SESSION_OPEN.store(understood, Ordering::Relaxed);
     CONVERSATION.fetch_add(1, Ordering::Relaxed);
 }
 
-/// The host is gone.
+/// Ends the conversation: the host is gone.
 pub fn end() {
     begin(false);
 }
@@ -29,7 +30,7 @@ pub fn is_open() -> bool {
     SESSION_OPEN.load(Ordering::Relaxed)
 }
 
-/// Another one for each conversation, so that no reply of an earlier one reaches the next.
+/// Number of the conversation, so that no reply of an earlier one reaches the next.
 pub fn number() -> u32 {
     CONVERSATION.load(Ordering::Relaxed)
 }
@@ -39,22 +40,22 @@ pub fn stream(on: bool) {
     STREAMING.store(on, Ordering::Relaxed);
 }
 
-/// From the next sample on, with markers or without.
+/// Sends samples with or without markers, from the next one on.
 pub fn send_markers(on: bool) {
     WITH_MARKERS.store(on, Ordering::Relaxed);
 }
 
-/// True while samples shall carry the markers.
+/// True if samples carry the markers.
 pub fn wants_markers() -> bool {
     WITH_MARKERS.load(Ordering::Relaxed)
 }
 
-/// True while samples and stats flow.
+/// True while samples and stats are sent.
 pub fn is_streaming() -> bool {
     STREAMING.load(Ordering::Relaxed)
 }
 
-/// Who asked.
+/// The command that requested something, and its conversation.
 #[derive(Clone, Copy)]
 pub struct Asked {
     id: u16,
@@ -62,18 +63,18 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// By the command `id` of the present conversation.
+    /// From the command `id` of the current conversation.
     pub fn by(id: u16) -> Self {
         let conversation = number();
         Self { id, conversation }
     }
 
-    /// The command to reply to, unless its host has gone.
+    /// The command to reply to; `None` if its host has gone.
     pub fn id(self) -> Option<u16> {
         (self.conversation == number()).then_some(self.id)
     }
 
-    /// The conversation that the command came in.
+    /// The command's conversation.
     pub fn conversation(self) -> u32 {
         self.conversation
     }

@@ -1,5 +1,5 @@
-//! The settings in use, as the host sees them and as they are kept: told by the pipeline, read by
-//! the USB tasks.
+//! Holds the settings in use, as the host sees them and as they are kept. The pipeline publishes
+//! them, the USB tasks read them.
 
 use crate::dtcm_table::Sensor;
 use core::cell::Cell;
@@ -19,36 +19,37 @@ use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{ModelIdentity, ModelSource, Outcome};
 use hivtac_wire::settings::{Moved, Name, RestPosition, TareReport};
 
-/// What the pipeline measures with; nothing before it is configured. Written at boot and by the
-/// pipeline; read by the USB tasks and the memory task.
+/// The pipeline's settings; `None` before it is configured. Written at boot and by the pipeline;
+/// read by the USB tasks and the memory task.
 static PIPELINE: CriticalSectionMutex<Cell<Option<OfPipeline>>> =
     CriticalSectionMutex::new(Cell::new(None));
 
 /// The device's name. Written at boot and by the USB tasks; read by them and the memory task.
 static NAME: CriticalSectionMutex<Cell<Name>> = CriticalSectionMutex::new(Cell::new(Name::new()));
 
-/// What is known of gravity. Written at boot, by the USB tasks and, when all is forgotten, by the
-/// memory task; read by that and, before each frame, by the pipeline.
+/// The known direction of gravity. Written at boot, by the USB tasks, and by the memory task on a
+/// reset to a new device's settings. Read by the memory task and, before each frame, by the
+/// pipeline.
 static DOWN: CriticalSectionMutex<Cell<Down>> = CriticalSectionMutex::new(Cell::new(Down::Fixed));
 
-/// What the pipeline measures with.
+/// The pipeline's settings.
 #[derive(Clone)]
 pub struct OfPipeline {
     /// Its settings.
     pub settings: Settings,
-    /// Its rest position as it was taken, when one was, and gravity then.
+    /// Its rest position as it was taken, and gravity then; `None` without a rest position.
     pub tare: Option<(Rest, Option<Direction>)>,
-    /// How far re-zeroing moved it.
+    /// By how much re-zeroing has moved it.
     pub rezeroed: Px,
-    /// How far from there the untouched film was seen last.
+    /// Distance from the rest position at which the untouched film was last seen.
     pub seen: Option<MilliPx>,
     /// How it follows forces from frame to frame.
     pub temporal: TemporalSettings,
-    /// Its model, when it has one.
+    /// Its model; `None` without one.
     pub model: Option<ModelIdentity>,
 }
 
-/// Tells what the pipeline measures with from now on, its model from this source.
+/// Publishes the pipeline's settings, with the source of its model.
 pub fn follow(sensor: &Sensor, source: ModelSource) {
     let model = sensor.model().map(|model| ModelIdentity {
         crc: model.crc(),
@@ -68,7 +69,7 @@ pub fn follow(sensor: &Sensor, source: ModelSource) {
     PIPELINE.lock(|cell| cell.set(Some(told)));
 }
 
-/// What the pipeline measures with; nothing before it is configured.
+/// Returns the pipeline's settings; `None` before it is configured.
 pub fn of_pipeline() -> Option<OfPipeline> {
     PIPELINE.lock(copy)
 }
@@ -83,14 +84,14 @@ pub fn name() -> Name {
     NAME.lock(copy)
 }
 
-/// Sets what is known of gravity from the next frame on: nothing where it is no direction.
+/// Sets the direction of gravity from the next frame on: unknown if it is not a valid direction.
 pub fn set_down(down: Down) {
     let is_sound = down.told().is_none_or(Direction::is_sound);
     let known = if is_sound { down } else { Down::Unknown };
     DOWN.lock(|cell| cell.set(known));
 }
 
-/// What is known of gravity.
+/// Returns the known direction of gravity.
 pub fn down() -> Down {
     DOWN.lock(Cell::get)
 }
@@ -101,34 +102,34 @@ fn copy<T: Clone + Default>(cell: &Cell<T>) -> T {
     value
 }
 
-/// What can be kept.
+/// All settings that can be kept.
 pub struct InUse {
     /// The device's name.
     pub name: Name,
     /// The threshold.
     pub threshold: Threshold,
-    /// The rest position as it was taken, when one was.
+    /// The rest position as it was taken; `None` without one.
     pub tare: Option<RestPosition>,
-    /// How far re-zeroing moved it.
+    /// By how much re-zeroing has moved it.
     pub rezeroed: Px,
-    /// How far from there the untouched film was seen last.
+    /// Distance from the rest position at which the untouched film was last seen.
     pub seen: Option<MilliPx>,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
-    /// What is known of gravity.
+    /// The known direction of gravity.
     pub down: Down,
     /// The threshold of the model.
     of_model: Option<Threshold>,
 }
 
 impl InUse {
-    /// The threshold, unless it is that of the model.
+    /// Returns the threshold; `None` if it is the model's.
     pub fn own_threshold(&self) -> Option<Threshold> {
         Some(self.threshold).filter(|_| Some(self.threshold) != self.of_model)
     }
 }
 
-/// What is in use; nothing before the pipeline is configured.
+/// Returns the settings in use; `None` before the pipeline is configured.
 pub fn in_use() -> Option<InUse> {
     let OfPipeline {
         settings,
@@ -150,7 +151,8 @@ pub fn in_use() -> Option<InUse> {
     })
 }
 
-/// A rest position, gravity when it was taken, and by which settings its markers were seen.
+/// Returns a rest position with gravity when it was taken, and the settings with which its markers
+/// were found.
 pub fn position(rest: &Rest, down: Option<Direction>, settings: &Settings) -> RestPosition {
     RestPosition {
         format: settings.threshold.format(),
@@ -163,7 +165,8 @@ pub fn position(rest: &Rest, down: Option<Direction>, settings: &Settings) -> Re
     }
 }
 
-/// What a tare gave that is to be `rest`; the sensor still has the rest position before.
+/// Returns the report of a tare whose result is `rest`; the sensor still has the previous rest
+/// position.
 pub fn tared(rest: &Rest, sensor: &Sensor, spread: Px) -> TareReport {
     let before = sensor.tare();
     TareReport {
@@ -173,12 +176,12 @@ pub fn tared(rest: &Rest, sensor: &Sensor, spread: Px) -> TareReport {
     }
 }
 
-/// From one rest position to another.
+/// Returns the motion from one rest position to another.
 fn moved(before: &Rest, now: &Rest) -> Moved {
     let px = |px: f32| Px((65_536.0 * px) as i32);
     let motion = CameraMotion::between(before, now);
     let [x, y] = motion.shift_px;
-    // Of markers that are not all in one place the parts are of the order of one.
+    // The parts are of the order of one, unless all markers are in one place.
     let [along, across] = motion.back.map(|part| (part * (1 << 24) as f32) as i64);
     Moved {
         farthest: farthest(&before.markers(), &now.markers()),
@@ -189,17 +192,17 @@ fn moved(before: &Rest, now: &Rest) -> Moved {
     }
 }
 
-/// How far two rest positions are from each other; `None` when they are of other frames.
+/// Returns the distance between two rest positions; `None` if their markers were found differently.
 pub fn drift(one: &RestPosition, other: &RestPosition) -> Option<Px> {
     let seen = |rest: &RestPosition| (rest.format, rest.dilations, rest.centroid);
     (seen(one) == seen(other)).then(|| farthest(&one.markers, &other.markers))
 }
 
-/// The distance of the markers that are farthest from each other.
+/// Returns the largest distance between corresponding markers.
 fn farthest(one: &[Marker; 4], other: &[Marker; 4]) -> Px {
     let distance = |(one, other): (&Marker, &Marker)| {
         let [x, y] = [one.x.0.abs_diff(other.x.0), one.y.0.abs_diff(other.y.0)];
-        // Inside a picture: below 2²⁶ each.
+        // Inside a picture, both are below 2²⁶.
         let squares = [x, y].map(|side| u64::from(side) * u64::from(side));
         root(squares[0].saturating_add(squares[1]))
     };
@@ -207,10 +210,10 @@ fn farthest(one: &[Marker; 4], other: &[Marker; 4]) -> Px {
     Px(largest.min(i32::MAX as u32) as i32)
 }
 
-/// The rest position for frames that are seen by these settings.
+/// Returns the rest position for frames with these settings.
 ///
 /// # Errors
-/// Why it is none.
+/// Why it is not valid for them.
 pub fn rest(position: &RestPosition, settings: &Settings) -> Result<Rest, Outcome> {
     let seen_so = position.format == settings.threshold.format()
         && position.dilations == settings.dilations

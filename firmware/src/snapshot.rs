@@ -1,10 +1,10 @@
-//! A frame for the host, as it was captured: who asks for it, where it lies, and how it is sent.
+//! Sends a captured frame to the host: requests, memory and sending.
 //!
 //! # Design
-//! `snapshot_copy` keeps a frame in [`FRAME`]; the sender then makes a message of its next bytes
-//! whenever nothing else waits. One snapshot at a time: one that is asked for in the conversation
-//! of another is refused, and one whose conversation has ended is forgotten by pipeline and sender
-//! as soon as they look, so that it never stands in the next one's way.
+//! `snapshot_copy` keeps a frame in [`FRAME`]. The sender then makes a message of its next bytes
+//! whenever no other message waits. There is one snapshot at a time; a second one for the same
+//! conversation is refused. When its conversation has ended, pipeline and sender drop the snapshot
+//! at their next check, so it never blocks the next conversation.
 
 use crate::bands::{BAND_BYTES, SHAPE};
 use crate::orders::{self, Order};
@@ -19,8 +19,8 @@ use hivtac_wire::message::{
     DeviceMessage, Outcome, Reply, SNAPSHOT_PART_BYTES, Snapshot, SnapshotPart,
 };
 
-/// The conversation that a snapshot is under way for; 0 when none is. Set by the USB tasks, cleared
-/// by them and the pipeline.
+/// The conversation with an active snapshot; 0 if there is none. Set by the USB tasks, cleared by
+/// them and the pipeline.
 static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
 
 /// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
@@ -41,15 +41,16 @@ pub fn address(index: u16) -> u32 {
     base + u32::from(index % SHAPE.bands()) * BAND_BYTES as u32
 }
 
-/// A frame that lies in [`FRAME`], whole.
+/// A whole frame in [`FRAME`].
 pub struct Taken {
-    /// Who wants it.
+    /// Who requested it.
     pub asked: Asked,
-    /// What it is.
+    /// Its description.
     pub header: Snapshot,
 }
 
-/// Has the next whole frame sent for the command `id`; `Busy` while another one is under way.
+/// Requests the next whole frame for the command `id`; returns `Busy` if a snapshot is already
+/// active.
 pub fn ask(id: u16) -> Option<Outcome> {
     let conversation = session::number();
     if SNAPSHOT_FOR.swap(conversation, Ordering::Relaxed) == conversation {
@@ -63,15 +64,15 @@ pub fn ask(id: u16) -> Option<Outcome> {
     refused
 }
 
-/// Has the sender send a frame.
+/// Passes a frame to the sender.
 pub fn send(taken: Taken) {
     SNAPSHOT_TAKEN.signal(taken);
 }
 
-/// The snapshot is no longer under way.
+/// Ends the snapshot.
 pub fn end(asked: Asked) {
     let conversation = asked.conversation();
-    // Fails when another conversation's is under way by now.
+    // Fails if another conversation's snapshot is active by now.
     let _ = SNAPSHOT_FOR.compare_exchange(conversation, 0, Ordering::Relaxed, Ordering::Relaxed);
 }
 
@@ -80,15 +81,15 @@ pub struct Outgoing(Option<Sending>);
 
 struct Sending {
     taken: Taken,
-    /// Bytes sent; nothing before the header was.
+    /// Number of bytes sent; `None` before the header was.
     sent: Option<u32>,
 }
 
 impl Outgoing {
-    /// None is.
+    /// No snapshot is being sent.
     pub const NONE: Self = Self(None);
 
-    /// The next message of a snapshot; waits while there is none.
+    /// Returns the next message of a snapshot; waits while there is none.
     pub async fn next(&mut self) -> DeviceMessage {
         loop {
             if let Some(message) = self.message() {
@@ -99,7 +100,7 @@ impl Outgoing {
         }
     }
 
-    /// Gives the snapshot up, as its host does not read.
+    /// Gives the snapshot up, because its host does not read.
     pub fn give_up(&mut self) {
         let Some(Sending { taken, .. }) = self.0.take() else {
             return;
@@ -110,7 +111,7 @@ impl Outgoing {
         }
     }
 
-    /// The header, then the parts, then the reply.
+    /// Returns the header, then the parts, then the reply; `None` without a snapshot.
     fn message(&mut self) -> Option<DeviceMessage> {
         let sending = self.0.as_mut()?;
         let asked = sending.taken.asked;
@@ -134,11 +135,11 @@ impl Outgoing {
     }
 }
 
-/// The bytes of a part; none from the end of the frame on.
+/// Returns the bytes of a part; empty from the end of the frame on.
 fn part(offset: usize) -> Vec<u8, SNAPSHOT_PART_BYTES> {
     let length = FRAME_BYTES.saturating_sub(offset).min(SNAPSHOT_PART_BYTES);
     let mut bytes = Vec::new();
-    // Never fails: the length is at most that.
+    // Never fails: the length is within the capacity.
     let _ = bytes.resize(length, 0);
     let from = (&raw const FRAME).cast::<u8>().wrapping_add(offset);
     // SAFETY: `offset + length` lies within `FRAME`, to which no reference is ever made. It was

@@ -1,15 +1,16 @@
-//! MDMA channel 1: the bands of one frame as the sensing reads them, from DTCM into AXI SRAM.
+//! Copies the bands of one frame, as the sensing reads them, from DTCM into AXI SRAM by MDMA
+//! channel 1.
 //!
 //! # Design
-//! A frame is kept while it is scanned, band after band: the source is the buffer in which the core
-//! reads that band (`band_copy`), so that the copy is what the sensing saw. The core starts a copy
-//! and scans the band meanwhile, twice as long as the copy takes; the buffer stays until the band
-//! after the next is fetched. A frame that is not whole at its end is forgotten, and the next one
-//! is kept instead, until [`PATIENCE`] is over.
+//! A frame is kept while it is scanned, band by band. The source is the buffer in which the core
+//! reads that band (`band_copy`), so the copy equals the pixels that the sensing used. The core
+//! starts a copy and scans the band meanwhile, which takes twice as long; the buffer stays until
+//! the band after the next is fetched. A frame that is incomplete at its end is discarded, and the
+//! next one is kept instead, until [`PATIENCE`] is over.
 //!
 //! # Note
-//! It costs the camera nothing: its DMA waits for a burst of the MDMA at most, as it does without a
-//! snapshot (`capture`), for the two channels take turns at one port.
+//! It does not delay the camera: its DMA waits at most for one burst of the MDMA, as without a
+//! snapshot (`capture`), because the two channels take turns at one port.
 
 use crate::bands::{BAND_BYTES, SHAPE};
 use crate::block_move::{BlockMove, End};
@@ -23,10 +24,10 @@ use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::{Outcome, Snapshot};
 
 const CHANNEL: usize = 1;
-/// Longest wait for a whole frame: a camera that fell silent is back by then, or does not come.
+/// Longest wait for a whole frame: a silent camera is back by then, or does not come back.
 const PATIENCE: Duration = Duration::from_secs(2);
 
-/// The channel, and the snapshot that is wanted.
+/// The channel, and the requested snapshot.
 pub struct SnapshotCopy {
     _channel: Peri<'static, peripherals::MDMA_CH1>,
     mover: BlockMove<CHANNEL>,
@@ -36,8 +37,8 @@ pub struct SnapshotCopy {
 struct Wanted {
     asked: Asked,
     deadline: Instant,
-    /// Bands of the frame under way that were kept, the one that is being copied, too; nothing once
-    /// one was missed.
+    /// Number of bands of the current frame that were kept, including the one being copied; `None`
+    /// after a missed band.
     kept: Option<u16>,
 }
 
@@ -51,7 +52,7 @@ impl SnapshotCopy {
         }
     }
 
-    /// Keeps the next whole frame. One that was wanted before is no longer.
+    /// Keeps the next whole frame. A previous request is dropped.
     pub fn begin(&mut self, asked: Asked) {
         self.wanted = Some(Wanted {
             asked,
@@ -60,13 +61,13 @@ impl SnapshotCopy {
         });
     }
 
-    /// When it is too late for a whole frame.
+    /// Returns the deadline for a whole frame.
     pub fn deadline(&self) -> Instant {
         let wanted = self.wanted.as_ref();
         wanted.map_or(Instant::MAX, |wanted| wanted.deadline)
     }
 
-    /// A band is being scanned; nothing when it could not be fetched.
+    /// Call when a band is scanned; `rows` is `None` if it could not be fetched.
     pub fn band(&mut self, index: u16, rows: Option<&[u16]>) {
         let Some(wanted) = &mut self.wanted else {
             return;
@@ -87,7 +88,7 @@ impl SnapshotCopy {
         };
     }
 
-    /// A frame was measured: when it was kept whole it is sent.
+    /// Call when a frame was measured: if it was kept whole, it is sent.
     pub fn frame(&mut self, frame: u32, time_us: u64, threshold: Threshold) {
         let whole = |wanted: &mut Wanted| wanted.kept == Some(SHAPE.bands());
         let Some(wanted) = self.wanted.take_if(whole) else {
@@ -109,7 +110,7 @@ impl SnapshotCopy {
         snapshot::send(Taken { asked, header });
     }
 
-    /// There was no whole frame in time.
+    /// Gives up after the deadline.
     pub fn give_up(&mut self) {
         let Some(Wanted { asked, .. }) = self.wanted.take() else {
             return;

@@ -1,20 +1,20 @@
-//! How much of the stack was ever in use: the start paints it (`cortex-m-rt`), and what was used is
-//! painted over.
+//! Measures the stack's largest use: the start paints it (`cortex-m-rt`), and use overwrites the
+//! paint.
 
 use cortex_m_rt::STACK_PAINT_VALUE;
 
 unsafe extern "C" {
-    /// Of `memory.x`: the stack's lowest word, and the one above its highest.
+    /// From `memory.x`: the stack's lowest word, and the one above its highest.
     static _stack_end: u32;
     static _stack_start: u32;
 }
 
-/// Its size, bytes.
+/// Size of the stack, bytes.
 pub fn bytes() -> u32 {
     (&raw const _stack_start as u32).wrapping_sub(&raw const _stack_end as u32)
 }
 
-/// Bytes that were in use at most since the start.
+/// Largest number of bytes in use since the start.
 pub fn used() -> u32 {
     let lowest = &raw const _stack_end;
     let words = bytes() / 4;

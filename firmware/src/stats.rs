@@ -1,12 +1,12 @@
-//! Counters since boot, from every task and handler.
+//! Counts events since boot, from every task and handler.
 
 use crate::vsync;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_time::{Duration, Instant};
 use hivtac_wire::message::Stats;
 
-/// The time since then; none when the clock is behind that, which a difference of times would panic
-/// at. It goes back when its interrupt is late by more than half a turn of its timer.
+/// The time since `begun`; 0 if the clock is behind it, where a subtraction would panic. The clock
+/// goes back if its interrupt is late by more than half a turn of its timer.
 pub fn since(begun: Instant) -> Duration {
     Instant::now().saturating_duration_since(begun)
 }
@@ -19,15 +19,15 @@ impl Counter {
         Self(AtomicU32::new(0))
     }
 
-    /// One more.
+    /// Adds one.
     pub fn count(&self) {
         self.add(1);
     }
 
-    /// `n` more.
+    /// Adds `n`.
     pub fn add(&self, n: u32) {
         let saturating = |value: u32| Some(value.saturating_add(n));
-        // Never fails: the closure always gives a value.
+        // Never fails: the closure always returns a value.
         let _ = self
             .0
             .fetch_update(Ordering::Relaxed, Ordering::Relaxed, saturating);
@@ -43,8 +43,8 @@ impl Counter {
     }
 }
 
-/// Number of the newest frame before the camera's set-up, while that lasts. Written by the capture
-/// task; read by the USB tasks.
+/// Number of the last frame before the camera's set-up, while the set-up lasts. Written by the
+/// capture task; read by the USB tasks.
 static PASSING_OVER: AtomicU32 = AtomicU32::new(NOT_PASSING);
 
 /// [`PASSING_OVER`] while the camera is not being set up.
@@ -55,7 +55,7 @@ pub fn pass_over_frames_after(last: u32) {
     PASSING_OVER.store(last, Ordering::Relaxed);
 }
 
-/// Ends that; `newest` is the last such frame.
+/// Ends this; `newest` is the last such frame.
 pub fn end_passing_over(newest: u32) {
     DROPPED_SETUP.add(passed_over(newest));
     PASSING_OVER.store(NOT_PASSING, Ordering::Relaxed);
@@ -75,7 +75,7 @@ macro_rules! counters {
             pub static $name: Counter = Counter::new();
         )*
 
-        /// All counters. Each is exact; they are read one after the other.
+        /// Returns all counters. Each is exact; they are read one after the other.
         pub fn snapshot() -> Stats {
             let frames_exposed = vsync::newest().number;
             let mut stats = Stats {

@@ -1,4 +1,4 @@
-//! A tare under way: which command it answers, what it has, and when it gives up.
+//! Runs a tare: which command it answers, its frames so far, and its deadline.
 
 use crate::camera;
 use crate::dtcm_table::Sensor;
@@ -10,11 +10,11 @@ use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::units::Px;
 use hivtac_wire::message::Outcome;
 
-/// Every second frame may be bad, and a camera may need some time to come back.
+/// Allows every second frame to be bad, and some time for a camera to come back.
 const FRAME_TIMES_EACH: u32 = 2;
 const EXTRA: Duration = Duration::from_secs(2);
 
-/// Sums up good frames.
+/// Sums good frames.
 pub struct Taring {
     id: u16,
     conversation: u32,
@@ -23,8 +23,8 @@ pub struct Taring {
 }
 
 impl Taring {
-    /// For command `id`, over `frames` good frames; when the host `anyway`, also while something
-    /// moves or touches the film. `None` when that number is out of its range.
+    /// For the command `id`, over `frames` good frames; with `anyway` also while something moves or
+    /// touches the film. Returns `None` if `frames` is out of range.
     pub fn begin(id: u16, frames: u16, anyway: bool) -> Option<Self> {
         let frame_time = camera::frame_time(camera::report().settings.rate);
         let patience = frame_time * FRAME_TIMES_EACH * u32::from(frames) + EXTRA;
@@ -42,18 +42,18 @@ impl Taring {
         self.id
     }
 
-    /// False once the host that asked has gone.
+    /// Returns false once the host that requested it has gone.
     pub fn is_wanted(&self) -> bool {
         self.conversation == session::number()
     }
 
-    /// When there were not enough good frames.
+    /// When it gives up for lack of good frames.
     pub fn deadline(&self) -> Instant {
         self.deadline
     }
 
-    /// Takes the frame that was measured; gives the rest position once there were enough good ones,
-    /// or why there is none.
+    /// Adds the measured frame. Once there are enough good ones, returns the rest position, or why
+    /// it is refused; otherwise `None`.
     pub fn add(
         &mut self,
         sensor: &Sensor,
@@ -73,7 +73,7 @@ impl Taring {
         self.builder.spread()
     }
 
-    /// Why there were not enough good frames in time.
+    /// Returns why there were not enough good frames in time.
     pub fn given_up(&self) -> Outcome {
         if self.builder.saw_implausible() {
             Outcome::MarkersImplausible

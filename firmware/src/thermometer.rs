@@ -1,10 +1,10 @@
-//! The microcontroller's own temperature, by ADC3: channel 18, against two words that the part was
-//! calibrated with.
+//! Measures the microcontroller's own temperature by channel 18 of ADC3, against two words from the
+//! chip's factory calibration.
 //!
 //! # Design
-//! The converter is started for each reading and put to sleep behind it. Nothing else needs it, and
-//! whoever waits here gives way to everything else. One reading in 16 bits takes 0.1 ms; the
-//! sensor is good to some degrees (DS12110, temperature sensor characteristics).
+//! The converter is started for each reading and switched off afterwards, because no other code
+//! needs it. Callers wait without blocking other tasks. One reading in 16 bits takes 0.1 ms; the
+//! sensor is accurate to some degrees (DS12110, temperature sensor characteristics).
 
 use embassy_stm32::pac::adc::vals::{Adcaldif, Boost, Pcsel, Res, SampleTime};
 use embassy_stm32::pac::adccommon::vals::Presc;
@@ -15,23 +15,23 @@ use embassy_time::{Duration, Timer};
 
 /// The sensor's channel.
 const CHANNEL: usize = 18;
-/// What the sensor read at 30 °C and at 110 °C when the part was made, at 3.3 V in 16 bits
-/// (DS12110, TS_CAL1 and TS_CAL2).
+/// Factory readings of the sensor at 30 °C and at 110 °C, at 3.3 V in 16 bits (DS12110, TS_CAL1 and
+/// TS_CAL2).
 const CALIBRATION: [*const u16; 2] = [0x1FF1_E820 as *const u16, 0x1FF1_E840 as *const u16];
-/// Of these, hundredths of a degree.
+/// Temperatures of these, hundredths of a degree.
 const CALIBRATED_AT: [i32; 2] = [3_000, 11_000];
-/// What a sensor can say, hundredths of a degree.
+/// Plausible temperatures, hundredths of a degree.
 const SENSIBLE: core::ops::RangeInclusive<i32> = -5_000..=16_000;
-/// Of a step of the converter, and how often it is looked for its end.
+/// Duration of a step of the converter, and interval of checks for its end.
 const STEP: Duration = Duration::from_micros(50);
 const LOOKS: u32 = 40;
 
-/// The converter. Holding it says that nobody else uses it.
+/// The converter. Ownership proves that no other code uses it.
 pub struct Thermometer(pub Peri<'static, peripherals::ADC3>);
 
 impl Thermometer {
-    /// The temperature, hundredths of a degree Celsius; `None` when the sensor or its calibration
-    /// says nothing sensible.
+    /// Returns the temperature, hundredths of a degree Celsius; `None` if the sensor or its
+    /// calibration gives an implausible value.
     pub async fn read(&mut self) -> Option<i16> {
         wake();
         let word = convert().await;
@@ -40,7 +40,7 @@ impl Thermometer {
     }
 }
 
-/// Clocks and regulator on, the sensor, too.
+/// Switches on clocks and regulator, and the sensor.
 fn wake() {
     RCC.d3ccipr().modify(|w| w.set_adcsel(Adcsel::PER));
     RCC.ahb4enr().modify(|w| w.set_adc3en(true));
@@ -98,7 +98,7 @@ fn sleep() {
     ADC3_COMMON.ccr().modify(|w| w.set_vsenseen(false));
 }
 
-/// On the line through the two calibrated points.
+/// Interpolates on the line through the two calibrated points.
 fn temperature(word: u16) -> Option<i16> {
     // SAFETY: two words of the part's system memory, which only its maker writes.
     let [cold, hot] = CALIBRATION.map(|word| i32::from(unsafe { word.read_volatile() }));

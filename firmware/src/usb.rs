@@ -1,18 +1,18 @@
-//! USB CDC-ACM: a serial port that never makes anyone else wait.
+//! Provides a serial port over USB CDC-ACM, which never makes other tasks wait.
 //!
 //! # Design
-//! One task on an executor of its own, above processing and below capture. Four parts run side by
-//! side: the USB stack, the receiver, the sender, and a watch on DTR. Samples reach the sender
-//! through bounded queues (`outbox`).
+//! It is one task on an executor of its own, above processing and below capture. Four parts run
+//! concurrently: the USB stack, the receiver, the sender, and a watch on DTR. Samples reach the
+//! sender through bounded queues (`outbox`).
 //!
 //! # Note
-//! The sender waits at most [`WRITE_TIMEOUT`] for a packet. When the host does not read, messages
-//! are dropped whole or cut; after a cut the next frame begins with a zero byte, so that the host
-//! is in step again at once.
+//! The sender waits at most [`WRITE_TIMEOUT`] for a packet. If the host does not read, messages are
+//! dropped whole or cut. After a cut the next frame begins with a zero byte, so that the host
+//! resynchronizes at once.
 //!
 //! # Limitations
-//! Without VBUS sensing an unplugged cable looks like a host that sleeps: the conversation ends
-//! when the next host resets the bus, or closes the port.
+//! Without VBUS sensing an unplugged cable looks like a sleeping host: the conversation ends when
+//! the next host resets the bus, or closes the port.
 
 use crate::board::UsbPort;
 use crate::snapshot::Outgoing;
@@ -32,11 +32,11 @@ use hivtac_wire::usb::{MANUFACTURER, PRODUCT, PRODUCT_ID, VENDOR_ID};
 
 /// Bytes of a full-speed bulk packet.
 const PACKET: usize = 64;
-/// A host that reads fetches a packet within a millisecond or two.
+/// A reading host fetches a packet within a millisecond or two.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
-/// Stats while streaming.
+/// Period of the stats while streaming.
 const STATS_PERIOD: Duration = Duration::from_secs(1);
-/// What the board, its LED and the camera draw at most, mA.
+/// Largest current of the board, its LED and the camera, mA.
 const CURRENT: u16 = 300;
 
 bind_interrupts!(struct Irqs {
@@ -111,12 +111,12 @@ async fn receive<'d>(mut receiver: Receiver<'d, Port<'d>>) {
 }
 
 async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
-    // A zero byte before the first frame, and before one that follows a cut frame.
+    // A zero byte precedes the first frame, and each frame after a cut one.
     let mut buffer = [0; 1 + MAX_DEVICE_FRAME];
     let mut cut = true;
     let mut snapshot = Outgoing::NONE;
     loop {
-        // What waits in the outbox goes before a snapshot's parts.
+        // Messages in the outbox go before a snapshot's parts.
         let (Either::First(message) | Either::Second(message)) =
             select(outbox::next(), snapshot.next()).await;
         let Some(frame) = buffer.get_mut(1..) else {
@@ -139,7 +139,7 @@ async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
     }
 }
 
-/// Sends one frame; false when it was cut or not begun.
+/// Sends one frame; returns false if it was cut or not begun.
 async fn send_bytes<'d>(sender: &mut Sender<'d, Port<'d>>, bytes: &[u8]) -> bool {
     // A transfer ends with a short packet, which is empty when the bytes fill the last one.
     let end = bytes.len().is_multiple_of(PACKET).then_some(&[][..]);

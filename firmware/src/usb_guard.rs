@@ -1,12 +1,12 @@
-//! The OTG driver with two things put right that its control transfers leave to chance.
+//! Wraps the OTG driver to correct two faults in its control transfers.
 //!
 //! # Design
-//! A wrapper of the driver, of which only the bus and the control pipe differ: a request about an
-//! endpoint that does not exist meets an assertion in the driver (embassy-usb-synopsys-otg 0.3),
-//! so it is stalled before anybody acts on it, as USB 2.0, section 9.4 wants it. And where the
-//! standard has an endpoint begin with DATA0 anew (sections 9.1.1.5, 9.4.5: a halt that is cleared,
-//! a configuration or an interface that is set), its toggle is set so: the host begins there, and
-//! would take a packet with the other toggle for one that it has.
+//! Only the bus and the control pipe differ from the driver's. A request about an endpoint that
+//! does not exist would fail an assertion in the driver (embassy-usb-synopsys-otg 0.3). So it is
+//! stalled before any other code acts on it, as USB 2.0, section 9.4, requires. The standard also
+//! requires that an endpoint restarts with DATA0 after a halt is cleared, or a configuration or an
+//! interface is set (sections 9.1.1.5, 9.4.5). So the toggle is reset then: the host expects DATA0,
+//! and would take a packet with the other toggle for one that it already has.
 
 use embassy_stm32::pac;
 use embassy_usb::driver::{
@@ -14,7 +14,7 @@ use embassy_usb::driver::{
     EndpointError, EndpointType, Event, Unsupported,
 };
 
-/// Which endpoints there are: a bit for each number, IN and OUT.
+/// The existing endpoints: a bit for each number, IN and OUT.
 #[derive(Clone, Copy)]
 struct Allocated {
     ins: u16,
@@ -46,7 +46,7 @@ pub struct Guarded<D> {
 }
 
 impl<D> Guarded<D> {
-    /// Around a driver that has no endpoints yet but the control endpoint.
+    /// Wraps a driver that has only the control endpoint so far.
     pub fn new(driver: D) -> Self {
         Self {
             driver,
@@ -101,8 +101,8 @@ pub struct GuardedPipe<P> {
     allocated: Allocated,
 }
 
-/// The endpoint that a standard request is about, if it is about one: bmRequestType is standard
-/// (bits 6–5) and of an endpoint (bits 4–0), wIndex is its address.
+/// Returns the endpoint of a standard request to an endpoint; otherwise `None`. In bmRequestType
+/// bits 6–5 mean standard, bits 4–0 an endpoint; wIndex is its address.
 fn endpoint_of(setup: &[u8; 8]) -> Option<EndpointAddress> {
     let [request_type, _, _, _, index, _, _, _] = *setup;
     (request_type & 0x7F == 0x02).then(|| EndpointAddress::from(index & 0x8F))
@@ -199,7 +199,7 @@ impl<B: Bus> Bus for GuardedBus<B> {
     }
 }
 
-/// The next packet of a bulk or interrupt endpoint is DATA0. The toggle of the control endpoint
+/// Makes DATA0 the next packet of a bulk or interrupt endpoint. The control endpoint's toggle
 /// follows from each SETUP by itself.
 fn begin_with_data0(address: EndpointAddress) {
     let index = address.index();

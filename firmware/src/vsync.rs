@@ -1,8 +1,8 @@
 //! Counts and time-stamps the camera's VSYNC edges.
 //!
 //! The counted edge is the one that ends the vertical blanking: DCMI begins a frame at the same
-//! edge. It says that a frame is finished at the *other* edge, when blanking begins. So from a
-//! frame's first row until then the newest counted edge is the one that began it, however late a
+//! edge. DCMI reports a frame as finished at the *other* edge, when blanking begins. So from a
+//! frame's first row until then, the newest counted edge is the one that began it, however late a
 //! handler looks within that time.
 
 use core::cell::Cell;
@@ -23,8 +23,8 @@ static NEWEST_EDGE: CriticalSectionMutex<Cell<Edge>> = CriticalSectionMutex::new
 const LINE: usize = 7;
 const PORT_B: u8 = 1;
 
-/// Begins to listen. The pin itself is set up with the camera interface's pins: EXTI sees it
-/// whatever its function. The level is that of the line during vertical blanking.
+/// Begins to count edges. The pin itself is set up with the camera interface's pins: EXTI sees it
+/// in any function. `blanking_is_high` is the level of the line during vertical blanking.
 pub fn start(blanking_is_high: bool) {
     SYSCFG
         .exticr(LINE / 4)
@@ -39,12 +39,12 @@ pub fn start(blanking_is_high: bool) {
     unsafe { interrupt::EXTI9_5.enable() };
 }
 
-/// The newest edge; number 0 when there was none yet.
+/// Returns the newest edge; number 0 before the first one.
 pub fn newest() -> Edge {
     NEWEST_EDGE.lock(Cell::get)
 }
 
-/// Begins to count from zero: the next edge gets number 1.
+/// Restarts the count from zero: the next edge gets number 1.
 pub fn restart_count() {
     NEWEST_EDGE.lock(|newest| newest.set(Edge::default()));
 }
@@ -53,8 +53,8 @@ pub fn restart_count() {
 fn EXTI9_5() {
     let pending = EXTI.pr(0);
     pending.write(|w| w.set_line(LINE, true));
-    // The bus takes a write and delivers it later. Before the line falls this handler must not
-    // return, or it runs twice and counts an edge that there was not; a read waits for the write.
+    // The bus delays writes. If this handler returned before the line falls, it would run twice and
+    // count an edge that did not occur; a read waits for the write.
     let _ = pending.read();
     let time_us = Instant::now().as_micros();
     NEWEST_EDGE.lock(|newest| {
