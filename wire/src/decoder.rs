@@ -1,38 +1,38 @@
-//! Framing, the receiving side: bytes as they come into messages, garbage into counters.
+//! Decodes frames: bytes as they arrive become messages, and garbage is counted.
 
 use crate::frame::{CRC_BYTES, CRC32, Message};
 use crate::version::HelloPrefix;
 
-/// What a frame held.
+/// The content of a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Received<M> {
     /// A message of this protocol version.
     Message(M),
-    /// A hello of another protocol version or schema. Nothing else of such a peer can be
+    /// A hello of another protocol version or schema. No other message of such a peer can be
     /// understood.
     ForeignHello(HelloPrefix),
 }
 
-/// What a decoder threw away since it was made. The counters saturate.
+/// Everything that a decoder has rejected since it was created. The counters saturate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Rejected {
     /// Frames longer than the decoder holds.
     pub overlong: u32,
-    /// Frames whose COBS code runs past their end.
+    /// Frames whose COBS code exceeds their end.
     pub cobs: u32,
     /// Frames with a wrong checksum, or too short to have one.
     pub crc: u32,
-    /// Frames with a right checksum around something that is no message: unknown variant, bad
-    /// string, too short.
+    /// Frames with a right checksum around an invalid message: unknown variant, bad string, too
+    /// short.
     pub body: u32,
     /// Frames with a right checksum and bytes after the message.
     pub trailing: u32,
-    /// Bytes of all these frames, their closing zeros not counted.
+    /// Bytes of all these frames, without their closing zeros.
     pub bytes: u32,
 }
 
 impl Rejected {
-    /// Frames thrown away, all causes together.
+    /// Number of rejected frames, for all causes.
     pub fn frames(&self) -> u32 {
         [self.overlong, self.cobs, self.crc, self.body, self.trailing]
             .iter()
@@ -40,7 +40,7 @@ impl Rejected {
     }
 }
 
-/// Why a frame was thrown away.
+/// Why a frame was rejected.
 enum Reject {
     Cobs,
     Crc,
@@ -48,17 +48,17 @@ enum Reject {
     Trailing,
 }
 
-/// Cuts a byte stream at zero bytes and decodes what lies between. After any garbage it is in step
-/// again at the next zero byte. Empty frames are ignored: a sender may insert zero bytes between
-/// frames at will.
+/// Splits a byte stream at zero bytes and decodes the parts. After any garbage it resynchronizes at
+/// the next zero byte. Empty frames are ignored: a sender may insert any number of zero bytes
+/// between frames.
 ///
-/// `N`: longest frame it accepts, closing zero not counted;
+/// `N`: longest frame it accepts, without the closing zero;
 /// [`DEVICE_FRAME_LIMIT`](crate::frame::DEVICE_FRAME_LIMIT) on a host,
 /// [`HOST_FRAME_LIMIT`](crate::frame::HOST_FRAME_LIMIT) on a device.
 #[derive(Clone, Debug)]
 pub struct Decoder<const N: usize> {
     buffer: [u8; N],
-    /// Bytes of the frame so far; beyond `N` only counted.
+    /// Bytes of the frame so far; those beyond `N` are only counted.
     length: usize,
     rejected: Rejected,
 }
@@ -70,7 +70,7 @@ impl<const N: usize> Default for Decoder<N> {
 }
 
 impl<const N: usize> Decoder<N> {
-    /// A decoder that has seen nothing.
+    /// A decoder before the first byte.
     pub const fn new() -> Self {
         let rejected = Rejected {
             overlong: 0,
@@ -87,13 +87,13 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// What was thrown away so far.
+    /// Returns what was rejected so far.
     pub fn rejected(&self) -> Rejected {
         self.rejected
     }
 
-    /// Takes bytes off the front of `bytes` up to and including the end of the next message, which
-    /// it returns, or all of them. Call it until `bytes` is empty and it returns `None`.
+    /// Takes bytes from the front of `bytes`, up to the end of the next message, which it returns,
+    /// or all of them. Call it until `bytes` is empty and it returns `None`.
     pub fn feed<M: Message>(&mut self, bytes: &mut &[u8]) -> Option<Received<M>> {
         while let Some((&byte, rest)) = bytes.split_first() {
             *bytes = rest;
@@ -104,7 +104,7 @@ impl<const N: usize> Decoder<N> {
         None
     }
 
-    /// Takes one byte; returns a message when it closes one.
+    /// Takes one byte; returns a message if the byte ends one.
     pub fn push<M: Message>(&mut self, byte: u8) -> Option<Received<M>> {
         if byte != 0 {
             if let Some(free) = self.buffer.get_mut(self.length) {
@@ -124,8 +124,7 @@ impl<const N: usize> Decoder<N> {
         }
     }
 
-    /// Forgets a frame that has begun, for when the connection was lost; counts its bytes as thrown
-    /// away.
+    /// Discards an incomplete frame after the connection was lost; counts its bytes as rejected.
     pub fn reset(&mut self) {
         let length = core::mem::take(&mut self.length);
         self.count_bytes(length);
@@ -155,7 +154,7 @@ impl<const N: usize> Decoder<N> {
     }
 }
 
-/// Decodes a frame in place, its closing zero already cut off.
+/// Decodes a frame in place, without its closing zero.
 fn decode<M: Message>(frame: &mut [u8]) -> Result<Received<M>, Reject> {
     let body = checked_body(frame)?;
     if let Some(hello) = HelloPrefix::of(body)
@@ -170,7 +169,7 @@ fn decode<M: Message>(frame: &mut [u8]) -> Result<Received<M>, Reject> {
     }
 }
 
-/// Undoes COBS and checks and removes the checksum.
+/// Decodes COBS, then checks and removes the checksum.
 fn checked_body(frame: &mut [u8]) -> Result<&[u8], Reject> {
     let length = cobs::decode_in_place(frame).map_err(|_| Reject::Cobs)?;
     let content = frame.get(..length).ok_or(Reject::Cobs)?;

@@ -1,4 +1,4 @@
-//! Messages for tests: the longest of each kind, and arbitrary ones.
+//! Provides messages for tests: the longest of each kind, and arbitrary ones.
 
 use crate::health::*;
 use crate::message::*;
@@ -21,12 +21,12 @@ use hivtac_terms::units::{
 use proptest::prelude::*;
 use std::{vec, vec::Vec};
 
-/// A string as long as it can be.
+/// A string of its largest length.
 fn full<const N: usize>() -> String<N> {
     String::try_from(std::string::String::from("x").repeat(N).as_str()).unwrap()
 }
 
-/// The longest kind of threshold.
+/// A threshold with the longest encoding.
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
 
 /// An ordinary hello.
@@ -49,7 +49,7 @@ pub fn device_hello() -> DeviceHello {
     }
 }
 
-/// Every field as many bytes as it can have, for each variant.
+/// For each variant a message whose fields all have their longest encoding.
 pub fn longest_device_messages() -> Vec<DeviceMessage> {
     vec![
         DeviceMessage::Hello(DeviceHello {
@@ -132,7 +132,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
     ]
 }
 
-/// A sample with force, place and markers, each number as long as it can be.
+/// A sample with force, place and markers, each number with its longest encoding.
 pub fn longest_sample() -> Sample {
     Sample {
         sequence: u32::MAX,
@@ -162,7 +162,7 @@ pub fn longest_sample() -> Sample {
     }
 }
 
-/// A rest position, each number as long as it can be.
+/// A rest position, each number with its longest encoding.
 pub fn longest_rest() -> RestPosition {
     RestPosition {
         format: PixelFormat::Mono,
@@ -175,10 +175,10 @@ pub fn longest_rest() -> RestPosition {
     }
 }
 
-/// A direction, each number as long as it can be.
+/// A direction, each number with its longest encoding.
 pub const LONGEST_DOWN: Down = Down::Told(Direction([i16::MIN; 3]));
 
-/// Temporal settings, each number as long as it can be.
+/// Temporal settings, each number with its longest encoding.
 pub fn longest_temporal() -> TemporalSettings {
     TemporalSettings {
         contact: ContactLimits {
@@ -204,7 +204,7 @@ pub fn longest_temporal() -> TemporalSettings {
     }
 }
 
-/// Camera settings, each number as long as it can be.
+/// Camera settings, each number with its longest encoding.
 pub fn longest_camera() -> CameraSettings {
     CameraSettings {
         exposure: Some(Microseconds(u32::MAX)),
@@ -260,7 +260,7 @@ fn longest_stats() -> Stats {
     }
 }
 
-/// Every field as many bytes as it can have, for each variant.
+/// For each variant a message whose fields all have their longest encoding.
 pub fn longest_host_messages() -> Vec<HostMessage> {
     let requests = [
         Request::GetInfo,
@@ -657,7 +657,7 @@ fn any_selection() -> impl Strategy<Value = Selection> {
     )
 }
 
-/// Any of gravity, also what is no direction.
+/// Any gravity, including invalid directions.
 pub fn any_down() -> impl Strategy<Value = Down> {
     let told = any::<[i16; 3]>().prop_map(|parts| Down::Told(Direction(parts)));
     prop_oneof![Just(Down::Fixed), Just(Down::Unknown), told]
@@ -746,7 +746,7 @@ pub fn any_rest() -> impl Strategy<Value = RestPosition> {
     )
 }
 
-/// Any threshold, also one that means nothing.
+/// Any threshold, including invalid ones.
 pub fn any_threshold() -> impl Strategy<Value = Threshold> {
     prop_oneof![
         any_box().prop_map(Threshold::Rgb565),

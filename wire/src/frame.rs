@@ -1,25 +1,24 @@
-//! Framing, the sending side: one message into one frame,
-//! `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
+//! Encodes frames: one message into one frame, `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
 
 use crate::message::{DeviceMessage, HostMessage};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use postcard::ser_flavors::{Cobs, Slice, crc::CrcModifier};
 use serde::{Serialize, de::DeserializeOwned};
 
-/// CRC-32/ISO-HDLC (the one of Ethernet and zip), sent little-endian after the body.
+/// CRC-32/ISO-HDLC (that of Ethernet and zip), sent little-endian after the body.
 pub const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// Bytes of the checksum.
 pub(crate) const CRC_BYTES: usize = 4;
 
-/// Longest body a device sends in this protocol version: all its settings, each number as long as
-/// it can be.
+/// Longest body of a device in this protocol version: all its settings, each number with its
+/// longest encoding.
 pub const MAX_DEVICE_BODY: usize = 270;
 
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 144;
 
-/// Longest body a host sends in this protocol version: a full part of a model file.
+/// Longest body of a host in this protocol version: a full part of a model file.
 pub const MAX_HOST_BODY: usize = 236;
 
 /// Longest frame from the device in this protocol version, closing zero included.
@@ -31,15 +30,15 @@ pub const MAX_SAMPLE_FRAME: usize = frame_length(MAX_SAMPLE_BODY);
 /// Longest frame from the host in this protocol version, closing zero included.
 pub const MAX_HOST_FRAME: usize = frame_length(MAX_HOST_BODY);
 
-/// No protocol version has longer frames from the device. A host's decoder holds this much, so that
+/// Longest frame from the device in any protocol version. A host's decoder holds this much, so that
 /// it can name the version of any device.
 pub const DEVICE_FRAME_LIMIT: usize = 288;
 
-/// No protocol version has longer frames from the host. A device's decoder holds this much.
+/// Longest frame from the host in any protocol version. A device's decoder holds this much.
 pub const HOST_FRAME_LIMIT: usize = 256;
 
-/// Bytes of the frame around a body: checksum, one COBS byte for each 254 bytes begun, closing
-/// zero.
+/// Length of the frame of a body: with checksum, one COBS byte for each 254 bytes begun, and
+/// closing zero.
 const fn frame_length(body: usize) -> usize {
     let content = body + CRC_BYTES;
     content + 1 + content / 254 + 1
@@ -65,14 +64,14 @@ mod sealed {
     impl Sealed for crate::message::HostMessage {}
 }
 
-/// The buffer is shorter than the frame. Cannot happen with [`Message::MAX_FRAME`] bytes.
+/// The buffer is shorter than the frame, which cannot happen with [`Message::MAX_FRAME`] bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferTooSmall;
 
 /// Writes the frame of `message` to the front of `buffer` and returns it, closing zero included.
 ///
 /// # Errors
-/// [`BufferTooSmall`] when it does not fit; `buffer` is then in an unspecified state.
+/// [`BufferTooSmall`] if it does not fit; `buffer` is then in an unspecified state.
 pub fn encode<'b, M: Message>(
     message: &M,
     buffer: &'b mut [u8],
@@ -80,7 +79,7 @@ pub fn encode<'b, M: Message>(
     encode_body(message, buffer)
 }
 
-/// [`encode`] for anything, so that tests can make frames that no version of the protocol has.
+/// [`encode`] for any value, so that tests can make frames that no protocol version has.
 pub(crate) fn encode_body<'b>(
     body: &impl Serialize,
     buffer: &'b mut [u8],

@@ -1,4 +1,4 @@
-//! How a device is doing, beside its frames: what its self-test finds.
+//! Defines a device's health, apart from its frames: the result of its self-test.
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
@@ -6,40 +6,40 @@ use serde::{Deserialize, Serialize};
 /// Answer to [`GetHealth`](crate::message::Request::GetHealth).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Health {
-    /// Why the microcontroller started last.
+    /// Why the microcontroller last started.
     pub reset: ResetReason,
-    /// Of the microcontroller, hundredths of a degree Celsius; `None` when its sensor does not
-    /// tell.
+    /// Temperature of the microcontroller, hundredths of a degree Celsius; `None` if its sensor
+    /// gives no plausible value.
     pub temperature_centidegrees: Option<i16>,
-    /// Bytes of the stack that were in use at most since the start.
+    /// Largest number of bytes of the stack in use since the start.
     pub stack_used: u32,
-    /// Its size.
+    /// Size of the stack, bytes.
     pub stack_bytes: u32,
-    /// What is not right: bits of [`Problem`].
+    /// Current problems: bits of [`Problem`].
     pub problems: u32,
-    /// What was not right at the start, before the first sample: bits of [`Problem`].
+    /// Problems at the start, before the first sample: bits of [`Problem`].
     pub at_start: u32,
 }
 
 /// Why a microcontroller started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ResetReason {
-    /// Its supply came.
+    /// Power was switched on.
     PowerOn,
-    /// Its supply was too low for a moment.
+    /// The supply voltage was too low for a moment.
     BrownOut,
-    /// The reset line: a button, or a debug probe.
+    /// The reset line was pulled: by a button, or a debug probe.
     Pin,
-    /// The program: a fault, or a debug probe.
+    /// The program reset itself, after a fault, or a debug probe did.
     Software,
-    /// The watchdog: the program stood still.
+    /// The watchdog: the program was blocked.
     Watchdog,
     /// None of these.
     Other,
 }
 
-/// What the self-test finds. Its number is the bit in [`Health::problems`], and the code that users
-/// see.
+/// A problem that the self-test finds. Its number is the bit in [`Health::problems`], and the code
+/// that users see.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Problem {
@@ -47,33 +47,32 @@ pub enum Problem {
     CameraSilent = 0,
     /// There is no usable model.
     ModelMissing = 1,
-    /// The kept model does not read, or is none for this sensor; the built-in one is used.
+    /// The kept model is unreadable, or does not fit this sensor; the built-in one is used.
     ModelFallback = 2,
-    /// Kept settings are of another version of the firmware.
+    /// The kept settings are of another firmware version.
     SettingsUnread = 3,
-    /// An attempt to write to the flash failed since the start.
+    /// An attempt to write to the flash has failed since the start.
     FlashFails = 4,
-    /// Less than a quarter of the stack was left at some moment.
+    /// Less than a quarter of the stack was free at some moment.
     StackLow = 5,
-    /// The last start was the watchdog's.
+    /// The last start followed a reset by the watchdog.
     WatchdogReset = 6,
-    /// The last start was a fault's, or a debug probe's.
+    /// The last start followed a fault, or a reset by a debug probe.
     SoftwareReset = 7,
-    /// The temperature is above 85 °C, or the sensor for it does not tell.
+    /// The temperature is above 85 °C, or its sensor gives no plausible value.
     Temperature = 8,
-    /// Another camera answers than the firmware is for.
+    /// The camera is not the one that the firmware supports.
     AnotherCamera = 9,
-    /// A register of the camera did not hold what was written.
+    /// A register of the camera did not hold the written value.
     CameraRegisters = 10,
-    /// Frames take another time than they should, by the device's own clock: that or the camera's
-    /// is wrong.
+    /// The frame time is wrong by the device's own clock: this clock or the camera's is wrong.
     Clocks = 11,
-    /// The built-in model's answer to a known question is another than on a computer.
+    /// The built-in model's answer to a known question differs from a computer's.
     Arithmetic = 12,
 }
 
 impl Problem {
-    /// All of them, by their numbers.
+    /// All problems, sorted by number.
     pub const ALL: [Problem; 13] = [
         Problem::CameraSilent,
         Problem::ModelMissing,

@@ -1,5 +1,5 @@
-//! What a device keeps in its flash, as bytes: one record with all of it, so that it is changed as
-//! a whole or not at all.
+//! Encodes the data that a device keeps in its flash: one record with all of it, so that it is
+//! changed as a whole or not at all.
 
 use crate::settings::{Name, RestPosition};
 use hivtac_terms::camera::CameraSettings;
@@ -8,7 +8,7 @@ use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
 use serde::{Deserialize, Serialize};
 
-/// First byte of a record. Raised on every change of what follows.
+/// First byte of a record. Must be raised with every change of the layout.
 const VERSION: u8 = 4;
 
 /// Longest record.
@@ -17,48 +17,48 @@ pub const MAX_BYTES: usize = 204;
 /// All that a device keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Record {
-    /// What its user calls it.
+    /// Name that the user gave it.
     pub name: Name,
-    /// `None` for that of the model.
+    /// The user's threshold; `None` for that of the model.
     pub threshold: Option<Threshold>,
     /// The rest position.
     pub tare: Option<RestPosition>,
-    /// The model that was sent to it; `None` for the built-in one.
+    /// The uploaded model; `None` for the built-in one.
     pub model: Option<KeptModel>,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
-    /// How the camera is set.
+    /// The camera's settings.
     pub camera: CameraSettings,
-    /// What is known of gravity.
+    /// The known direction of gravity.
     pub down: Down,
 }
 
-/// A model file that lies in flash.
+/// A model file in flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeptModel {
-    /// Which of the places for models, 0 or 1.
+    /// The slot for models that holds it, 0 or 1.
     pub slot: u8,
-    /// Its length.
+    /// Length of the file, bytes.
     pub bytes: u32,
-    /// CRC-32 of the file without its own.
+    /// CRC-32 of the file without its own CRC.
     pub crc: u32,
 }
 
-/// The record is of another version, or none.
+/// The record is of another version, or not a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AnotherVersion;
 
 impl Record {
-    /// Its bytes, at the front of `buffer`.
+    /// Writes its bytes to the front of `buffer`, and returns them.
     pub fn to_bytes<'b>(&self, buffer: &'b mut [u8; MAX_BYTES]) -> &'b [u8] {
         // The longest record fits: tested below.
         postcard::to_slice(&(VERSION, self), buffer).map_or(&[], |bytes| bytes)
     }
 
-    /// The other way round.
+    /// Reads a record from its bytes.
     ///
     /// # Errors
-    /// [`AnotherVersion`].
+    /// [`AnotherVersion`], also if the bytes are not a record.
     pub fn of_bytes(bytes: &[u8]) -> Result<Record, AnotherVersion> {
         match postcard::take_from_bytes::<(u8, Record)>(bytes) {
             Ok(((VERSION, record), [])) => Ok(record),
@@ -105,7 +105,7 @@ mod tests {
         assert_eq!(Record::of_bytes(bytes), Ok(longest()));
     }
 
-    /// The record of a device in use must be read by every firmware with this version's number.
+    /// Every firmware with this version's number must read the record of a device in use.
     #[test]
     fn the_bytes_of_version_4() {
         let record = Record {

@@ -1,5 +1,5 @@
-//! The one contract of firmware and host: every message and the framing. Normative text:
-//! `docs/wire.md`.
+//! Defines the one contract between firmware and host: every message and the framing. Normative
+//! text: `docs/wire.md`.
 //!
 //! A frame on the wire is `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
 #![no_std]

@@ -1,4 +1,4 @@
-//! Every message, both ways.
+//! Defines every message, in both directions.
 
 use crate::health::Health;
 use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport};
@@ -16,11 +16,11 @@ use hivtac_terms::units::MicroNewtons;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
-/// Raised on every incompatible change of this file.
+/// Must be raised with every incompatible change of this file.
 pub const PROTOCOL_VERSION: u16 = 2;
 
-/// What the device sends. `Hello` stays variant 0 and keeps its first two fields for ever, so that
-/// any two versions can name each other in an error.
+/// A message from the device. `Hello` stays variant 0 and keeps its first two fields for ever, so
+/// that any two versions can name each other in an error.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum DeviceMessage {
     /// Answer to a [`HostMessage::Hello`] and to [`Request::GetInfo`].
@@ -33,33 +33,33 @@ pub enum DeviceMessage {
     Log(LogLine),
     /// Answer to a [`Command`].
     Reply(Reply),
-    /// A frame follows as it was captured, in [`SnapshotPart`]s.
+    /// A captured frame follows, in [`SnapshotPart`]s.
     Snapshot(Snapshot),
-    /// The next bytes of the frame that the newest [`Snapshot`] told of.
+    /// The next bytes of the frame that the last [`Snapshot`] announced.
     SnapshotPart(SnapshotPart),
-    /// What the board and its camera are set to.
+    /// The state of the board and its camera.
     Inspection(Inspection),
     /// Answer to [`Request::GetSettings`].
     Settings(SettingsReport),
-    /// A tare was taken; before the reply to it.
+    /// The result of a tare; sent before its reply.
     Tared(TareReport),
     /// Answer to [`Request::GetHealth`].
     Health(Health),
 }
 
-/// What the host sends.
+/// A message from the host.
 #[expect(
     clippy::large_enum_variant,
     reason = "the device has no heap, and one message at a time"
 )]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum HostMessage {
-    /// First message of a host; the device answers with its own hello and does not stream before.
+    /// First message of a host; the device answers with its own hello and streams only after it.
     Hello(HostHello),
-    /// A request that is answered by exactly one [`Reply`] with the same `id`.
+    /// A request, answered by exactly one [`Reply`] with the same `id`.
     Command(Command),
-    /// What is known of gravity on the sensor, from the next frame on. Not answered: it may come as
-    /// often as frames do, and the newest counts. What is no direction counts as unknown.
+    /// The direction of gravity on the sensor, from the next frame on. Not answered: it may be sent
+    /// for every frame, and the newest counts. An invalid direction counts as unknown.
     Down(Down),
 }
 
@@ -85,27 +85,27 @@ pub struct DeviceHello {
     pub board: String<32>,
     /// Firmware name and version.
     pub firmware: String<32>,
-    /// The model in use; `None` when there is no usable one.
+    /// The model in use; `None` if there is no usable one.
     pub model: Option<ModelIdentity>,
     /// Columns of a frame, px.
     pub width: u16,
     /// Rows of a frame, px.
     pub height: u16,
-    /// The threshold in use, and with that the pixel format.
+    /// The threshold in use, and with it the pixel format.
     pub threshold: Threshold,
     /// Lens and pixels: the name of a geometry preset, e.g. `ov7725`.
     pub preset: String<16>,
     /// 3×3 dilations of the mask, 0–3.
     pub dilations: u8,
-    /// How a marker's position is taken from its pixels.
+    /// How a marker's position is computed from its pixels.
     pub centroid: CentroidEstimator,
-    /// What its user calls it.
+    /// Name that the user gave it.
     pub name: Name,
-    /// What is sent in place of each frame's own force.
+    /// The filter of the force that is sent.
     pub filter: Filter,
 }
 
-/// Which model makes the forces.
+/// Identifies the model that makes the forces.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct ModelIdentity {
     /// CRC-32 of the model file.
@@ -114,7 +114,7 @@ pub struct ModelIdentity {
     pub name: String<32>,
     /// True when it was trained on a simulated sensor.
     pub simulated: bool,
-    /// The threshold that it was made for: with another one there is no force.
+    /// The threshold that it was made for: with a different one there is no force.
     pub threshold: Threshold,
     /// Where it came from.
     pub source: ModelSource,
@@ -123,61 +123,62 @@ pub struct ModelIdentity {
 /// Where a model in use came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum ModelSource {
-    /// It is built into the firmware.
+    /// Built into the firmware.
     BuiltIn,
-    /// A host sent it, and the device keeps it.
+    /// Sent by a host, and kept by the device.
     Kept,
-    /// It is built into the firmware, which uses it instead of the kept one: that one does not
-    /// read, or is none for this sensor.
+    /// Built into the firmware, and used instead of the kept one, which is unreadable or does not
+    /// fit this sensor.
     Fallback,
 }
 
 /// One frame's result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Sample {
-    /// Counts the samples that were produced; a gap is a sample lost on the way to the host.
+    /// Number of the sample; a gap is a sample lost on the way to the host.
     pub sequence: u32,
-    /// Counts VSYNC edges since the camera was set up; a gap while streaming is a frame that was
+    /// Number of VSYNC edges since the camera was set up; a gap while streaming is a frame that was
     /// not processed.
     pub frame: u32,
-    /// Device time of the middle of the frame's exposure, when the force is true, µs since boot.
+    /// Device time of the middle of the frame's exposure, to which the force belongs, µs since
+    /// boot.
     pub time_us: u64,
-    /// Why there is no force, or how far to trust it.
+    /// Why there is no force, or how far it can be trusted.
     pub status: Status,
-    /// The force; `None` exactly when `status` has a bit that says "no force".
+    /// The force; `None` exactly if `status` has a bit that means "no force".
     pub force: Option<Force>,
-    /// The four markers, when they were asked for ([`Request::StartWithMarkers`]) and found.
+    /// The four markers, if they were requested ([`Request::StartWithMarkers`]) and found.
     pub markers: Option<[Marker; 4]>,
 }
 
-/// Counters since boot. They wrap never in practice (32 bits at 1 kHz: 49 days) and saturate then.
+/// Counters since boot. They saturate instead of wrapping, which takes 49 days at 1 kHz (32 bits).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Stats {
-    /// VSYNC edges seen.
+    /// Number of VSYNC edges.
     pub frames_exposed: u32,
-    /// Frames that became a sample.
+    /// Frames that gave a sample.
     pub frames_processed: u32,
     /// Frames overwritten before they were processed, or whose interrupt came too late.
     pub dropped_busy: u32,
-    /// Frames thrown away after a capture overrun.
+    /// Frames rejected after a capture overrun.
     pub dropped_overrun: u32,
     /// Frames with too few or too many bytes.
     pub dropped_size: u32,
-    /// Frames that passed while the camera was set up, or a threshold was set.
+    /// Frames that passed during the set-up of the camera or of a threshold.
     pub dropped_setup: u32,
-    /// Times the camera fell silent and the capture timed out.
+    /// How often the camera fell silent and the capture timed out.
     pub camera_timeouts: u32,
-    /// Times the camera was set up again.
+    /// How often the camera was set up again.
     pub camera_restarts: u32,
-    /// Overruns the camera interface reported.
+    /// Overruns that the camera interface reported.
     pub capture_overruns: u32,
-    /// Samples that were produced but not sent, because the host did not read.
+    /// Samples that were not sent because the host did not read.
     pub usb_dropped: u32,
-    /// Frames from the host that were thrown away: bad CRC, COBS or content.
+    /// Frames from the host that were rejected: bad CRC, COBS or content.
     pub host_frames_rejected: u32,
-    /// Duration of the last frame's processing, µs.
+    /// Processing time of the last frame, µs.
     pub processing_us: u32,
-    /// From the middle of the last frame's exposure until its sample was ready, µs.
+    /// Time from the middle of the last frame's exposure until its sample was ready, µs.
     pub latency_us: u32,
     /// Device time, µs since boot.
     pub uptime_us: u64,
@@ -186,7 +187,7 @@ pub struct Stats {
 /// A line for a person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct LogLine {
-    /// How bad it is.
+    /// Its severity.
     pub level: LogLevel,
     /// Device time, µs since boot.
     pub time_us: u64,
@@ -194,7 +195,7 @@ pub struct LogLine {
     pub text: String<96>,
 }
 
-/// How bad a log line is.
+/// Severity of a log line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum LogLevel {
     /// Something failed and was recovered or given up.
@@ -205,67 +206,67 @@ pub enum LogLevel {
     Info,
 }
 
-/// A frame as it was captured, which follows.
+/// Announces a captured frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Snapshot {
-    /// Its number, that of its [`Sample`].
+    /// Number of the frame, as in its [`Sample`].
     pub frame: u32,
-    /// That of its [`Sample`].
+    /// Time of the frame, as in its [`Sample`].
     pub time_us: u64,
     /// Columns, px.
     pub width: u16,
     /// Rows, px.
     pub height: u16,
-    /// The threshold that it was read with, and with that its pixel format.
+    /// The threshold that was in use, and with it the frame's pixel format.
     pub threshold: Threshold,
-    /// Bytes that follow: all rows from the top, as the camera sent them.
+    /// Number of bytes that follow: all rows from the top, as the camera sent them.
     pub bytes: u32,
 }
 
-/// Most bytes of a frame in one [`SnapshotPart`]: a frame on the wire is then at most 254 bytes.
+/// Most bytes of a frame in one [`SnapshotPart`]: its frame on the wire is then at most 254 bytes.
 pub const SNAPSHOT_PART_BYTES: usize = 240;
 
 /// The next bytes of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct SnapshotPart {
-    /// Bytes of the frame before these.
+    /// Number of the frame's bytes before these.
     pub offset: u32,
     /// The bytes.
     pub bytes: Vec<u8, SNAPSHOT_PART_BYTES>,
 }
 
-/// Most registers of an [`Inspection`] that differ.
+/// Most differing registers in an [`Inspection`].
 pub const DIFFERENT_REGISTERS: usize = 16;
 
-/// What the board and its camera are set to: registers are read back while frames flow.
+/// The state of the board and its camera: registers are read back while frames are captured.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct Inspection {
     /// The microcontroller's revision (REV_ID): 0x2001 is X, 0x2003 V.
     pub silicon: u16,
-    /// The number by which the camera says what it is.
+    /// The camera's identification number.
     pub camera_id: u16,
-    /// The camera's registers that were read back: all that the firmware writes.
+    /// Number of camera registers that were read back: all that the firmware writes.
     pub registers: u16,
-    /// Those that hold something else than what was written, the first of them.
+    /// The first of those that do not hold the written value.
     pub different: Vec<DifferentRegister, DIFFERENT_REGISTERS>,
-    /// How long a frame should take, µs.
+    /// Expected time of a frame, µs.
     pub frame_time_us: u32,
-    /// How long a row is exposed, µs.
+    /// Exposure of a row, µs.
     pub exposure_us: u32,
-    /// The longest that it can be, µs.
+    /// Its longest possible value, µs.
     pub longest_exposure_us: u32,
     /// The camera's gain.
     pub gain_sixteenths: Q<4, u16>,
 }
 
-/// A register of the camera that does not hold what was written.
+/// A register of the camera that does not hold the written value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DifferentRegister {
     /// Its address.
     pub address: u8,
-    /// What was written.
+    /// The written value.
     pub written: u16,
-    /// What it holds.
+    /// The value that was read.
     pub found: u16,
 }
 
@@ -278,7 +279,7 @@ pub struct Command {
     pub request: Request,
 }
 
-/// What a host can ask for.
+/// A request of the host.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub enum Request {
     /// Send a hello and the stats.
@@ -287,10 +288,10 @@ pub enum Request {
     Start,
     /// Stop streaming.
     Stop,
-    /// Set the threshold and its pixel format. Answered when it holds; until then the one before
-    /// does.
+    /// Set the threshold and its pixel format. Answered once it is in use; until then the previous
+    /// one applies.
     SetThreshold(Threshold),
-    /// Take the mean of the next `frames` good frames (1–256) as the rest position. Answered when
+    /// Use the mean of the next `frames` good frames (1–256) as the rest position. Answered when
     /// done.
     Tare {
         /// How many frames to average.
@@ -298,53 +299,54 @@ pub enum Request {
     },
     /// Start streaming samples with their markers, and stats.
     StartWithMarkers,
-    /// Let what is automatic of exposure and gain find what the light needs, and stay so. Answered
+    /// Let automatic exposure and gain adapt to the light, and then keep their values. Answered
     /// when done.
     Expose,
-    /// Send the next whole frame. Answered behind its last part.
+    /// Send the next whole frame. Answered after its last part.
     Snapshot,
-    /// Read the camera's registers back and send an [`Inspection`]. Answered behind it.
+    /// Read the camera's registers back and send an [`Inspection`]. Answered after it.
     Inspect,
-    /// Send a [`SettingsReport`]. Answered behind it.
+    /// Send a [`SettingsReport`]. Answered after it.
     GetSettings,
     /// Set the device's name, until it restarts.
     SetName(Name),
-    /// Set the rest position, or forget it. Answered when it holds.
+    /// Set the rest position, or remove it. Answered once it is in use.
     SetTare(Option<RestPosition>),
-    /// Keep these settings as they are in use, through restarts. Answered when they are kept.
+    /// Keep these of the settings in use, through restarts. Answered when they are kept.
     Keep(Selection),
-    /// Set how forces are followed from frame to frame. Answered when it holds.
+    /// Set how forces are followed from frame to frame. Answered once it is in use.
     SetTemporal(TemporalSettings),
-    /// A model file of so many bytes follows, 1 to [`MODEL_BYTES`], in [`ModelPart`]s. What was
-    /// sent of another one is forgotten.
+    /// Announces a model file of `bytes` bytes, 1 to [`MODEL_BYTES`], in [`ModelPart`]s. An earlier
+    /// upload is discarded.
     BeginModel {
-        /// Bytes of the file.
+        /// Number of bytes of the file.
         bytes: u32,
     },
     /// The next bytes of the model file.
     ModelPart(ModelPart),
-    /// Check the model that was sent, keep it, and use it from a frame on. Answered when it is in
+    /// Check the uploaded model, keep it, and use it from the next frame on. Answered once it is in
     /// use.
     UseModel,
-    /// Use the built-in model from a frame on, and forget the kept one. Answered when it is in use.
+    /// Use the built-in model from the next frame on, and delete the kept one. Answered once it is
+    /// in use.
     UseBuiltInModel,
-    /// Forget all that is kept, and go on as a new device does. Answered when it is in use.
+    /// Delete all kept data, and continue like a new device. Answered once this is done.
     Reset,
-    /// As [`Request::Tare`], though something moves or touches the film.
+    /// As [`Request::Tare`], even if something moves or touches the film.
     TareAnyway {
         /// How many frames to average.
         frames: u16,
     },
-    /// Look at everything, and send a [`Health`]. Answered behind it.
+    /// Run all checks, and send a [`Health`]. Answered after it.
     GetHealth,
-    /// Restart into the microcontroller's own loader, which takes new firmware. Answered before
-    /// that.
+    /// Restart into the microcontroller's own loader, which receives new firmware. Answered before
+    /// the restart.
     StartLoader,
-    /// Set the camera. Answered when it sends frames so.
+    /// Set the camera. Answered when it sends frames with these settings.
     SetCamera(CameraSettings),
 }
 
-/// Most bytes of a model file that is sent.
+/// Most bytes of an uploaded model file.
 pub const MODEL_BYTES: usize = 96 << 10;
 
 /// Most bytes of a model file in one [`ModelPart`].
@@ -353,7 +355,7 @@ pub const MODEL_PART_BYTES: usize = 224;
 /// The next bytes of a model file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
 pub struct ModelPart {
-    /// Bytes of the file before these.
+    /// Number of the file's bytes before these.
     pub offset: u32,
     /// The bytes.
     pub bytes: Vec<u8, MODEL_PART_BYTES>,
@@ -364,45 +366,45 @@ pub struct ModelPart {
 pub struct Reply {
     /// The command's number.
     pub id: u16,
-    /// How it went.
+    /// The result of the command.
     pub outcome: Outcome,
 }
 
-/// How a command went.
+/// The result of a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Outcome {
     /// Done.
     Done,
     /// Refused: an argument is outside its range.
     InvalidArgument,
-    /// Refused: the same thing is already under way.
+    /// Refused: the same action is already being carried out.
     Busy,
-    /// Tare gave up: not enough good frames arrived in time.
+    /// The tare gave up: not enough good frames arrived in time.
     NoGoodFrames,
     /// Refused: the markers are not where a film at rest has them. Something presses it, or the
-    /// sensor is built otherwise.
+    /// sensor is built differently.
     NotAtRest,
     /// Refused: this device's camera does not send that pixel format.
     Unsupported,
     /// Refused: the images at rest are not those of four whole, equal markers. One is covered, cut,
-    /// grown, stained or glares.
+    /// grown, stained or glaring.
     MarkersImplausible,
     /// Refused: the markers moved from frame to frame.
     Unsteady,
-    /// A snapshot was given up: the host did not read.
+    /// The snapshot was given up: the host did not read.
     NotRead,
-    /// The camera does not answer, or not as the one that this firmware is for.
+    /// The camera does not answer, or is not the one that this firmware supports.
     NoCamera,
-    /// The flash is worn: nothing can be kept any more. What was kept before still is.
+    /// The flash is worn: new data cannot be kept. Earlier data is still kept.
     Worn,
-    /// Refused: what was sent is no model file that this firmware can use. A [`LogLine`] before
-    /// this says what is wrong.
+    /// Refused: the upload is not a model file that this firmware can use. A [`LogLine`] before
+    /// this names the fault.
     ModelUnusable,
     /// Refused: the model was made for another sensor, camera or frame. A [`LogLine`] before this
-    /// says which.
+    /// names the difference.
     AnotherSensor,
-    /// Refused: something touches the film, as the rest position from before tells, that of the
-    /// unit's calibration, or how units are built.
+    /// Refused: something touches the film. The comparison is with the previous rest position, with
+    /// that of the unit's calibration, or with how units are built.
     Touched {
         /// The force that it looks like, µN.
         looks_like: MicroNewtons,

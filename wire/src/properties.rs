@@ -1,4 +1,4 @@
-//! Properties of framing, for any messages and any bytes.
+//! Tests properties of framing, for any messages and any bytes.
 
 use crate::decoder::{Decoder, Received};
 use crate::examples::{any_device_message, any_host_message};
@@ -21,7 +21,7 @@ fn frame_of_body(body: &impl serde::Serialize) -> Vec<u8> {
     encode_body(body, &mut [0; 512]).unwrap().to_vec()
 }
 
-/// Everything the decoder makes of `bytes`.
+/// Everything that the decoder returns for `bytes`.
 fn decode_all<M: Message, const N: usize>(
     decoder: &mut Decoder<N>,
     mut bytes: &[u8],
@@ -70,7 +70,8 @@ proptest! {
         prop_assert_eq!(received, [Received::Message(message)]);
     }
 
-    /// Garbage costs at most what it touches: the message after its closing zero arrives.
+    /// Garbage costs at most the frames that it touches: the message after its closing zero
+    /// arrives.
     #[test]
     fn garbage_between_frames_is_dropped_and_counted(
         garbage in proptest::collection::vec(1_u8.., 1..600),
@@ -99,8 +100,8 @@ proptest! {
         prop_assert_eq!(decoder.rejected().frames(), 1);
     }
 
-    /// In the content a flipped bit is one wrong bit, which CRC-32 always finds; in COBS' code
-    /// bytes it moves zeros, and in the closing zero it joins two frames: garbled content that
+    /// In the content a flipped bit is one wrong bit, which CRC-32 always detects. In COBS' code
+    /// bytes it moves zeros, and in the closing zero it joins two frames: the garbled content
     /// passes a CRC-32 once in 2³².
     #[test]
     fn a_flipped_bit_never_gives_a_wrong_message(
@@ -144,7 +145,7 @@ proptest! {
         prop_assert_eq!(rejected.body + rejected.trailing, rejected.frames());
     }
 
-    /// Whatever a later version puts after the prefix, both versions can be named.
+    /// For any later version, whatever follows the prefix, both versions can be named.
     #[test]
     fn any_later_hello_is_named(
         protocol in 2_u16..,
@@ -158,7 +159,7 @@ proptest! {
     }
 }
 
-/// Bytes without postcard's length in front.
+/// Bytes without postcard's length prefix.
 struct Raw<'a>(&'a [u8]);
 
 impl serde::Serialize for Raw<'_> {

@@ -1,4 +1,4 @@
-//! A device's settings: what its user gave it, in use and kept.
+//! Defines a device's settings, in use and kept.
 
 use heapless::String;
 use hivtac_terms::camera::{CameraLimits, CameraSettings};
@@ -15,18 +15,18 @@ use serde::{Deserialize, Serialize};
 /// Longest name, bytes of UTF-8.
 pub const NAME_BYTES: usize = 24;
 
-/// A name that a user gave a device, empty when there is none.
+/// The name that a user gave a device; empty if there is none.
 pub type Name = String<NAME_BYTES>;
 
-/// A rest position that was taken on a device, and by which settings its markers were seen: it
-/// means nothing under others.
+/// A rest position that was taken on a device, and the settings with which its markers were found.
+/// It is not valid with other settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct RestPosition {
-    /// Of the frames.
+    /// Pixel format of the frames.
     pub format: PixelFormat,
     /// 3×3 dilations of the mask, 0–3.
     pub dilations: u8,
-    /// How a marker's position is taken from its pixels.
+    /// How a marker's position is computed from its pixels.
     pub centroid: CentroidEstimator,
     /// The four markers at rest.
     pub markers: [Marker; 4],
@@ -34,7 +34,7 @@ pub struct RestPosition {
     pub rect_center: (Px, Px),
     /// Its mean area, px².
     pub rect_area: Q<16, i64>,
-    /// Where gravity pulled then; `None` where nobody said.
+    /// The direction of gravity then; `None` if unknown.
     pub down: Option<Direction>,
 }
 
@@ -45,74 +45,75 @@ pub struct SettingsReport {
     pub name: Name,
     /// The threshold in use.
     pub threshold: Threshold,
-    /// The rest position as it was taken, when one was; re-zeroing may have moved the one in use.
+    /// The rest position as it was taken; `None` without one. Re-zeroing may have moved the one in
+    /// use.
     pub tare: Option<RestPosition>,
-    /// Which of them will be the same after a restart.
+    /// Which of the settings will be the same after a restart.
     pub kept: Selection,
-    /// What the device found in its flash at the start.
+    /// The content of the flash at the start.
     pub found: Found,
-    /// Sectors of the flash that were erased so far to keep settings.
+    /// Number of flash sectors erased so far to keep settings.
     pub erases: u32,
-    /// Attempts to write that failed since the start.
+    /// Number of failed attempts to write since the start.
     pub failures: u32,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
-    /// How far re-zeroing moved the rest position that is in use from `tare`: the coordinate of a
-    /// marker that it moved farthest.
+    /// By how much re-zeroing has moved the rest position from `tare`: the coordinate that it moved
+    /// most.
     pub rezeroed: Px,
-    /// How far from the rest position in use the untouched film was seen last, a mean of a second:
-    /// the coordinate of a marker that was farthest. `None` until it was seen, and without a rest
+    /// Distance from the rest position in use at which the untouched film was last seen, a mean of
+    /// a second: the largest one of a coordinate. `None` until it was seen, and without a rest
     /// position.
     pub seen: Option<MilliPx>,
-    /// How far the rest position in use is from the kept one, by the marker that moved most: the
-    /// drift since then. `None` unless there are both, for the same frames.
+    /// Distance of the rest position in use from the kept one, of the marker that moved most: the
+    /// drift since then. `None` unless both exist, for the same frames.
     pub drift: Option<Px>,
-    /// How the camera is set.
+    /// The camera's settings and limits.
     pub camera: CameraReport,
-    /// What is known of gravity.
+    /// The known direction of gravity.
     pub down: Down,
 }
 
-/// How the camera is set, and what it can be set to.
+/// The camera's settings and limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct CameraReport {
-    /// What was asked for.
+    /// The requested settings.
     pub settings: CameraSettings,
-    /// How long a row is exposed, as it was set or found; 0 before the camera was set up.
+    /// Exposure of a row, as set or found; 0 before the camera was set up.
     pub exposure: Microseconds,
-    /// The gain, likewise.
+    /// The gain, as set or found; 0 before the camera was set up.
     pub gain: Sixteenths,
-    /// What it can be set to.
+    /// The limits of its settings.
     pub limits: CameraLimits,
 }
 
-/// What a tare gave.
+/// The result of a tare.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct TareReport {
     /// The rest position, in use from now on.
     pub rest: RestPosition,
     /// Largest standard deviation of a marker's coordinate over the frames.
     pub spread: Px,
-    /// How far it is from the rest position before; `None` when there was none.
+    /// The motion from the previous rest position; `None` if there was none.
     pub moved: Option<Moved>,
 }
 
-/// How far a rest position is from another one, and what a camera's motion explains of that.
+/// The motion from one rest position to another, and the part that a motion of the camera explains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Moved {
-    /// How far the marker moved that moved most.
+    /// Distance of the marker that moved most.
     pub farthest: Px,
-    /// How far the markers' middle moved, (x, y).
+    /// Shift of the markers' middle, (x, y).
     pub shift: (Px, Px),
-    /// How far they turned about it, x towards y.
+    /// Turn about the middle, x towards y.
     pub turn: MilliDegrees,
-    /// How much larger their pattern is, in parts of it.
+    /// Relative increase of the pattern's size.
     pub larger: Q<16>,
-    /// How far beside that they are: the coordinate of a marker that is farthest.
+    /// The rest of the motion: the coordinate of a marker that is farthest.
     pub beside: Px,
 }
 
-/// Some of the settings.
+/// A selection of settings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Selection {
     /// The name.
@@ -123,9 +124,9 @@ pub struct Selection {
     pub tare: bool,
     /// How forces are followed from frame to frame.
     pub temporal: bool,
-    /// How the camera is set.
+    /// The camera's settings.
     pub camera: bool,
-    /// What is known of gravity.
+    /// The known direction of gravity.
     pub down: bool,
 }
 
@@ -150,14 +151,14 @@ impl Selection {
     };
 }
 
-/// What a device found in its flash.
+/// The content of a device's flash at its start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub enum Found {
-    /// Nothing: no settings were ever kept.
+    /// No settings: none were ever kept.
     Nothing,
-    /// What it kept.
+    /// Settings of this version.
     Settings,
-    /// What firmware of another version kept, and this one does not read. It stays until settings
+    /// Settings of another firmware version, which this one does not read. They stay until settings
     /// are kept anew.
     AnotherVersion,
 }

@@ -1,13 +1,13 @@
-//! Which protocol a peer speaks: version number, schema hash, and the part of a hello that never
+//! Identifies a peer's protocol: version number, schema hash, and the part of a hello that never
 //! changes.
 
 use crate::message::{DeviceMessage, HostHello, HostMessage, PROTOCOL_VERSION};
 use postcard_schema::key::hash::fnv1a64::hash_ty_path;
 use serde::Deserialize;
 
-/// Changes when any message changes: FNV-1a over names and types of all fields and variants of both
-/// message enums, in order (`postcard-schema`). It does not see the capacity of strings and the
-/// meaning of status bits: a change of those raises [`PROTOCOL_VERSION`].
+/// Changes with every message: FNV-1a over names and types of all fields and variants of both
+/// message enums, in order (`postcard-schema`). It does not cover the capacity of strings and the
+/// meaning of status bits: their changes must raise [`PROTOCOL_VERSION`].
 pub const SCHEMA_HASH: u64 =
     u64::from_le_bytes(hash_ty_path::<(DeviceMessage, HostMessage)>("hivtac"));
 
@@ -22,14 +22,14 @@ pub struct HelloPrefix {
 }
 
 impl HelloPrefix {
-    /// The prefix that this crate puts into its hellos.
+    /// The prefix of this crate's hellos.
     pub const OURS: HelloPrefix = HelloPrefix {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
     };
 
-    /// Reads the prefix of a message body (COBS and checksum already removed), whatever follows it.
-    /// `None` when it is no hello.
+    /// Reads the prefix of a message body (without COBS and checksum), whatever follows it. Returns
+    /// `None` if it is not a hello.
     pub fn of(body: &[u8]) -> Option<HelloPrefix> {
         match postcard::take_from_bytes::<(u32, HelloPrefix)>(body) {
             Ok(((0, prefix), _)) => Some(prefix),
@@ -37,7 +37,7 @@ impl HelloPrefix {
         }
     }
 
-    /// True when the sender speaks exactly this crate's messages.
+    /// Returns whether the sender uses exactly this crate's messages.
     pub fn is_ours(&self) -> bool {
         *self == Self::OURS
     }
@@ -57,7 +57,8 @@ mod tests {
     use super::*;
     use crate::examples;
 
-    /// A change of any message must be seen here, and in `docs/wire.md` and the golden vectors.
+    /// Shows a change of any message, which must also be made in `docs/wire.md` and the golden
+    /// vectors.
     #[test]
     fn the_schema_hash_is_that_of_docs_wire_md() {
         assert_eq!(SCHEMA_HASH, 0x1685_7a08_3232_eb66, "{SCHEMA_HASH:#018x}");
@@ -74,7 +75,7 @@ mod tests {
         assert_eq!(HelloPrefix::of(body), Some(HelloPrefix::OURS));
     }
 
-    /// Version 1's hello of a host, and the start of that of a device.
+    /// A host's hello of version 1, and the start of a device's.
     #[test]
     fn a_hello_of_version_1_is_named() {
         let body = [
