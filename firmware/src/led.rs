@@ -74,9 +74,9 @@ fn phase(now: Instant, period: Duration) -> f32 {
 }
 
 /// Brightness, 0 to 1, at a phase of the breath: ((1 − cos 2πp) / 2)², squared because the eye is
-/// more sensitive to little light. The error of `micromath`'s cosine is at most 0.0011, which is at
-/// most 0.0007 here (both over 4,001 phases): less than a tenth of the smallest step that an eye
-/// sees.
+/// more sensitive to little light. The error of `micromath`'s cosine is at most 0.0011, which makes
+/// at most 0.0007 here (both over 4,001 phases). That is less than a tenth of the smallest step
+/// that an eye sees.
 fn brightness(phase: f32) -> f32 {
     let half = (1.0 - (phase * core::f32::consts::TAU).cos()) / 2.0;
     half * half

@@ -2,7 +2,7 @@
 //! tasks go on.
 //!
 //! # Design
-//! The first two sectors of the flash's second bank hold a log of one record ([`Log`]): after a
+//! The first two sectors of the flash's second bank hold a log of one record ([`Log`]). After a
 //! power cut at any moment the device has the old record or the new one. A record of a different
 //! version is not read, and not overwritten until something is kept. The next two sectors hold one
 //! model each; the record names the kept one, after it was read back.

@@ -9,8 +9,8 @@
 //! next one is kept instead, until [`PATIENCE`] is over.
 //!
 //! # Note
-//! It does not delay the camera: its DMA waits at most for one burst of the MDMA, as without a
-//! snapshot (`capture`), because the two channels take turns at one port.
+//! It does not delay the camera. The camera's DMA waits at most for one burst of the MDMA, as
+//! without a snapshot (`capture`), because the two channels take turns at one port.
 
 use crate::bands::{BAND_BYTES, SHAPE};
 use crate::block_move::{BlockMove, End};

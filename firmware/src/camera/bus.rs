@@ -1,11 +1,11 @@
 //! Drives the camera's control bus, I²C1.
 //!
 //! # Design
-//! A failed transfer is repeated on a freed bus. Two causes are known. A microcontroller reset in
-//! the middle of a byte leaves the camera waiting for the rest of it, holding SDA low; the camera's
-//! own reset, if it has one, comes later. And I²C1 may report a bus error that did not happen
-//! (errata ES0396, "spurious bus error detection in master mode"), upon which the HAL aborts the
-//! transfer.
+//! A failed transfer is repeated on a freed bus. Two causes are known. First, after a
+//! microcontroller reset in the middle of a byte the camera waits for the rest of it, and holds SDA
+//! low. The camera's own reset, if it has one, comes later. Second, I²C1 may report a bus error
+//! that did not happen (errata ES0396, "spurious bus error detection in master mode"). The HAL then
+//! aborts the transfer.
 
 use super::free_bus::{self, Lines};
 use embassy_embedded_hal::SetConfig;

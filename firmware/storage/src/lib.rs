@@ -2,7 +2,7 @@
 //! registers.
 //!
 //! There are two ways to keep bytes, in separate sectors. A [`Log`] has one small record, which is
-//! rewritten as a whole each time: after a power cut at any operation it reads as the old or as the
+//! rewritten as a whole each time. After a power cut at any operation it reads as the old or as the
 //! new record. A [`blob`] has a sector and is large. A record of the log names it, written after
 //! the blob was read back; this record proves that the blob is whole.
 //!

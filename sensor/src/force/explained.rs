@@ -69,9 +69,9 @@ impl Resting {
         self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
     }
 
-    /// For markers that rest at `rest`, and at `flat` under the gravity of the model's film. The
-    /// unit that the model was made on uses what the model knows of it, any other unit its rest
-    /// picture. The camera of a calibrated unit may have been mounted anew.
+    /// For markers that rest at `rest`, and at `flat` under the gravity of the model's film. For
+    /// the unit that the model was made on, the mounting comes from the model; for any other unit,
+    /// from its rest picture. The camera of a calibrated unit may have been mounted anew.
     fn new(
         forward: &Forward<'_>,
         rest: &Rest,

@@ -21,8 +21,8 @@
 //! < 0. Inversely, α = atan2(Fx, −Fz), −180° < α ≤ 180°, and β = atan2(Fy, √(Fx² + Fz²)), −90° ≤ β
 //! ≤ 90°. α is 0 if β = ±90° or F = 0; β is 0 if F = 0.
 //!
-//! Errors of the conversions, which the tests assert: angles from a vector at most 0.51 m°, |F| at
-//! most 0.5 µN; a vector from angles at most 0.6 µN in each component up to 10 N, 9 µN at 2,147 N.
+//! Largest errors of the conversions, which the tests assert. Vector to angles: angles 0.51 m°, |F|
+//! 0.5 µN. Angles to vector, each component: 0.6 µN up to 10 N, 9 µN at 2,147 N.
 
 pub mod features;
 pub mod forward;

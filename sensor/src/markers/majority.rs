@@ -6,7 +6,7 @@
 
 use crate::markers::mask::{MAX_WORDS, any_set, last_word_bits, words_of};
 
-/// The two rows before the next one, and what was changed so far.
+/// The two rows before the next one, and the number of pixels changed so far.
 #[derive(Clone, Debug)]
 pub struct Majority {
     rows: [[u32; MAX_WORDS]; 2],

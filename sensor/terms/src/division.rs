@@ -1,10 +1,10 @@
 //! Divides 64-bit numbers exactly with 32-bit instructions, several times as fast on a Cortex-M as
 //! the compiler's library.
 //!
-//! With B = 2³², a divisor d of B/2 or more and v = ⌊(B² − 1)/d⌋ − B, dividing two words by d takes
+//! Let B = 2³², d a divisor of B/2 or more, and v = ⌊(B² − 1)/d⌋ − B. Dividing two words by d takes
 //! two products and two corrections (Möller and Granlund, *Improved division by invariant
-//! integers*, 2011, Algorithm 4). v itself takes two divisions of 32 bits, and is computed once for
-//! all dividends.
+//! integers*, 2011, Algorithm 4). Computing v takes two divisions of 32 bits, once for all
+//! dividends.
 
 /// A divisor, for any number of dividends.
 #[derive(Clone, Copy, Debug)]

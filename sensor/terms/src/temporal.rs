@@ -102,8 +102,9 @@ pub struct Creep {
 }
 
 impl TemporalSettings {
-    /// A contact from 2 mN on until 1 mN; a slip of 60 µm within 50 ms, from a tenth of the normal
-    /// force on; no filter; re-zeroing as [`Rezero::USUAL`]; a film as [`Creep::USUAL`].
+    /// A contact begins at 2 mN and ends below 1 mN. A slip is 60 µm within 50 ms, with a
+    /// tangential force of at least a tenth of the normal one. No filter; re-zeroing as
+    /// [`Rezero::USUAL`]; a film as [`Creep::USUAL`].
     pub const USUAL: TemporalSettings = TemporalSettings {
         contact: ContactLimits {
             begins: UnsignedMicroNewtons(2_000),

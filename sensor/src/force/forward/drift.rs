@@ -9,8 +9,8 @@ use super::solve::Column;
 /// What may have happened to a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
-    /// Standard uncertainties of what no frame has shown, relative to the pattern's radius: of a
-    /// shift along x and along y each, of a turn, and of a change of scale.
+    /// Standard uncertainties of drift that no frame has shown, relative to the pattern's radius:
+    /// shift along x and along y each, turn, change of scale.
     pub unseen: [f32; 3],
     /// Distance of the untouched film's markers from the rest position when they were last seen,
     /// px.

@@ -81,8 +81,8 @@ pub struct Estimate {
 }
 
 impl Forward<'_> {
-    /// Takes steps from a guess. If they end at a load that does not explain the markers, or get
-    /// stuck, takes steps from where the markers moved most, too; these succeed where a guess was
+    /// Takes steps from a guess. If they get stuck, or end at a load that does not explain the
+    /// markers, also takes steps from where the markers moved most. These succeed where a guess was
     /// bad. Returns the better load. Compiled once, because the near memory is scarce.
     #[inline(never)]
     pub fn estimate(

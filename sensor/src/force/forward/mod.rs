@@ -73,7 +73,7 @@ pub struct Forward<'a> {
     /// How to read a unit's mounting from its rest picture.
     pub rest_image: RestImage,
     /// Focal lengths per px of the camera of the model's own unit ([`Mounting::per_px`]); `None` if
-    /// only its rest picture says.
+    /// its rest picture determines them.
     pub per_px: Option<[f32; 2]>,
     /// How well markers are seen.
     pub noise: Noise,

@@ -185,8 +185,9 @@ impl CameraMotion {
 
 impl Mounting {
     /// The same film, seen as at `rest` by a camera that moved since `own`. Returns `None` for
-    /// another unit's film: no shift of an eighth of the pattern's radius, turn of 3° and change of
-    /// scale of 1 % brings all markers within [`NEAR`] of `own`.
+    /// another unit's film, whose markers no small motion brings within [`NEAR`] of `own`. A small
+    /// motion is a shift of an eighth of the pattern's radius, a turn of 3° and a change of scale
+    /// of 1 %.
     pub fn remounted(&self, rest: &Rest, own: &Rest) -> Option<Mounting> {
         let motion = CameraMotion::between(own, rest);
         motion.is_remounting().then(|| Mounting {

@@ -11,7 +11,7 @@ pub const UNKNOWNS: usize = 5;
 /// Equations of the markers: x and y of each.
 pub const EQUATIONS: usize = 8;
 /// A column whose remainder after Gram–Schmidt is below this fraction of the whole column cannot be
-/// distinguished from those before it: the tables' slopes are exact to some 10⁻³ of the largest.
+/// distinguished from those before it. The tables' slopes are exact to some 10⁻³ of the largest.
 const LEAST_OWN: f32 = 1e-3;
 
 /// A column of the markers' equations.

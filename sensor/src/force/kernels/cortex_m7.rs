@@ -25,10 +25,10 @@ unsafe extern "C" {
     /// has prepared.
     ///
     /// *Composite lanes.* A word of weights holds two columns in each signed 16-bit half: 256·w₁ +
-    /// w₀. With the inputs as a₁ and x = 256·a₀ − a₁, and SXTB16 giving w₀ of both halves,
+    /// w₀. The inputs are a₁ and x = 256·a₀ − a₁, and SXTB16 gives w₀ of both halves. Then
     /// `SMLAD(word, a₁) + SMLAD(SXTB16(word), x)` = Σ (256·w₁ + w₀)·a₁ + w₀·(256·a₀ − a₁) = 256·Σ
-    /// (w₀·a₀ + w₁·a₁): four products in two multiplications and one extension, at the price of a
-    /// shift by 8 at the end of a row.
+    /// (w₀·a₀ + w₁·a₁). That is four products in two multiplications and one extension, at the
+    /// price of a shift by 8 at the end of a row.
     ///
     /// *No overflow.* Sums are modulo 2³², so only the last one of a row has to fit: |256·Σ w·a| <
     /// 2³¹ holds because |Σ w·a| ≤ 512 · 127 · 127 = 8,258,048 < 2²³ for every layer that a model
@@ -113,8 +113,8 @@ unsafe extern "C" {
     );
 
     /// Equals `portable::spline`. A pair of products is one SMUAD or SMLAD, a sum along y one
-    /// SMLAWB or SMLAWT; while those of one term are made, the term before is multiplied with its
-    /// factors.
+    /// SMLAWB or SMLAWT. While those of one term are computed, the previous term is multiplied with
+    /// its factors.
     ///
     /// *No overflow.* As shown at `portable::spline`, for any coefficients.
     ///

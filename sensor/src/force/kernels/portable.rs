@@ -25,9 +25,9 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
 /// memory, those along y `line` bytes apart, and the next term begins `node` bytes later.
 /// Coefficients beyond the end count as zero.
 ///
-/// If the absolute weights add up to at most 2¹⁵ + 4, a sum along x is below 2¹⁵ · (2¹⁵ + 4) < 2³¹,
-/// and one over both axes below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰, for any coefficients. Not
-/// inlined, as [`multiply`].
+/// Let the absolute weights add up to at most 2¹⁵ + 4. Then a sum along x is below 2¹⁵ · (2¹⁵ + 4)
+/// < 2³¹. One over both axes is below 2¹⁵ · (2¹⁵ + 4)² / 2¹⁶ + 4 < 2³⁰. Both hold for any
+/// coefficients. Not inlined, as [`multiply`].
 #[cfg_attr(armv7em, inline(never))]
 pub fn spline(
     steps: &[u8],

@@ -2,11 +2,11 @@
 //!
 //! Each limit is between the effect of a load on the markers and that of a false, cut or half dark
 //! marker. The effect of loads was measured on rendered frames of the film's curves at QVGA and
-//! 800×600, both presets: forces to 0.25 N tilted by up to 12°, tip offsets to 0.5 mm. Each limit's
-//! comment gives the largest value seen. Lengths that come from the pixel grid do not grow with the
-//! frame. A model of presses in the middle would give wrong forces for presses far off it; they are
-//! refused because they strain the pattern. A model with place outputs has wider limits
-//! ([`Reading`]).
+//! 800×600, both presets. Forces were up to 0.25 N tilted by up to 12°, tip offsets up to 0.5 mm.
+//! Each limit's comment gives the largest value seen. Lengths that come from the pixel grid do not
+//! grow with the frame. A model of presses in the middle would give wrong forces for presses far
+//! off it; they are refused because they strain the pattern. A model with place outputs has wider
+//! limits ([`Reading`]).
 
 use super::{
     Found, Image,
@@ -39,8 +39,8 @@ const SCALE: (f32, f32) = (0.852, 2.0);
 /// Width across the radius may deviate by [`Reading::width`] of it, and by this many px (largest
 /// seen: 0.3). Detects eaten or swollen edges.
 const WIDTH_PIXELS: f32 = 0.35;
-/// The narrowest marker's aspect over the widest's is at least 1 less 0.05, less 0.5 px of its
-/// width, less 6 times the taper, less the shift over the rest's half side. The film is steeper on
+/// The narrowest marker's aspect over the widest's is at least 1 minus the following: 0.05, 0.5 px
+/// of its width, 6 times the taper, and the shift over the rest's half side. The film is steeper on
 /// the side that comes nearer, and where an off-centre tip is. Detects one marker eaten or cut
 /// along the radius.
 const ASPECT: f32 = 0.05;
