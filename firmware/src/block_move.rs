@@ -23,9 +23,10 @@ const ALL_FLAGS: u32 = 0x1F;
 /// One end of a move: the address of its first byte.
 #[derive(Clone, Copy)]
 pub enum End {
-    /// On the AXI bus, like AXI SRAM and flash: words of 8 bytes.
+    /// An address on the AXI bus, such as AXI SRAM and flash: words of 8 bytes.
     Axi(u32),
-    /// In DTCM: words of 4 bytes, because larger ones are not allowed there (RM0433, MDMA_CxTCR).
+    /// An address in DTCM: words of 4 bytes, because larger ones are not allowed there (RM0433,
+    /// MDMA_CxTCR).
     Tcm(u32),
 }
 
@@ -33,7 +34,7 @@ pub enum End {
 pub struct BlockMove<const CHANNEL: usize>;
 
 impl<const CHANNEL: usize> BlockMove<CHANNEL> {
-    /// For the owner of this channel's peripheral.
+    /// A mover for the owner of this channel's peripheral.
     pub fn new() -> Self {
         RCC.ahb3enr().modify(|w| w.set_mdmaen(true));
         Self

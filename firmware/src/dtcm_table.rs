@@ -5,7 +5,7 @@ use hivtac_sensor::pipeline;
 use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 use static_cell::ConstStaticCell;
 
-/// In `.bss`, which is in DTCM.
+/// The table lies in `.bss`, which is in DTCM.
 static TABLE: ConstStaticCell<ByteTable> = ConstStaticCell::new(ByteTable::CLOSED);
 
 /// The pipeline, its threshold table in DTCM.

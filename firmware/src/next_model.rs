@@ -15,7 +15,7 @@ pub struct InUse {
 }
 
 impl InUse {
-    /// Of the model that the sensor begins with.
+    /// The source and slot of the sensor's first model.
     pub fn of(chosen: &Chosen) -> Self {
         Self {
             source: chosen.source,

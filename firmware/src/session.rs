@@ -63,7 +63,7 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// From the command `id` of the current conversation.
+    /// A request by the command `id` of the current conversation.
     pub fn by(id: u16) -> Self {
         let conversation = number();
         Self { id, conversation }

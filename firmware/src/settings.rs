@@ -39,7 +39,7 @@ pub struct OfPipeline {
     pub settings: Settings,
     /// Its rest position as it was taken, and gravity then; `None` without a rest position.
     pub tare: Option<(Rest, Option<Direction>)>,
-    /// By how much re-zeroing has moved it.
+    /// Distance by which re-zeroing has moved it.
     pub rezeroed: Px,
     /// Distance from the rest position at which the untouched film was last seen.
     pub seen: Option<MilliPx>,
@@ -110,7 +110,7 @@ pub struct InUse {
     pub threshold: Threshold,
     /// The rest position as it was taken; `None` without one.
     pub tare: Option<RestPosition>,
-    /// By how much re-zeroing has moved it.
+    /// Distance by which re-zeroing has moved it.
     pub rezeroed: Px,
     /// Distance from the rest position at which the untouched film was last seen.
     pub seen: Option<MilliPx>,

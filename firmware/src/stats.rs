@@ -50,7 +50,7 @@ static PASSING_OVER: AtomicU32 = AtomicU32::new(NOT_PASSING);
 /// [`PASSING_OVER`] while the camera is not being set up.
 const NOT_PASSING: u32 = u32::MAX;
 
-/// From now on, every frame after number `last` counts as dropped.
+/// Counts every frame after number `last` as dropped, from now on.
 pub fn pass_over_frames_after(last: u32) {
     PASSING_OVER.store(last, Ordering::Relaxed);
 }

@@ -49,7 +49,7 @@ pub(crate) enum Told {
 /// A rest position that forces are measured against, and its changes since it was taken.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tare {
-    /// As it was taken.
+    /// The rest position as it was taken.
     taken: Rest,
     /// Gravity then, in g, film frame; `None` if unknown.
     down: Option<Gravity>,
@@ -156,7 +156,7 @@ impl Tare {
         &self.rest
     }
 
-    /// By how much re-zeroing has moved the coordinate that it moved most.
+    /// The distance by which re-zeroing has moved the coordinate that it moved most.
     pub fn farthest(&self) -> Px {
         let far = self.moved.iter().map(|moved| Px(moved.0.abs()));
         far.max().unwrap_or_default()
@@ -306,7 +306,7 @@ mod tests {
             }
         }
 
-        /// For this many ms; without features if something touches.
+        /// Follows for this many ms; without features if something touches.
         fn for_ms(&mut self, ms: u64, features: Option<&Features>) {
             self.with(&LIMITS, ms, features);
         }

@@ -32,7 +32,7 @@ pub struct RestPosition {
     pub markers: [Marker; 4],
     /// The mean centre of their bounding rectangle, (x, y).
     pub rect_center: (Px, Px),
-    /// Its mean area, px².
+    /// Mean area of that rectangle, px².
     pub rect_area: Q<16, i64>,
     /// The direction of gravity then; `None` if unknown.
     pub down: Option<Direction>,
@@ -58,8 +58,8 @@ pub struct SettingsReport {
     pub failures: u32,
     /// How forces are followed from frame to frame.
     pub temporal: TemporalSettings,
-    /// By how much re-zeroing has moved the rest position from `tare`: the coordinate that it moved
-    /// most.
+    /// The distance by which re-zeroing has moved the rest position from `tare`: the coordinate
+    /// that it moved most.
     pub rezeroed: Px,
     /// Distance from the rest position in use at which the untouched film was last seen, a mean of
     /// a second: the largest one of a coordinate. `None` until it was seen, and without a rest

@@ -24,11 +24,11 @@ pub struct Band {
 /// How a frame ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Ending {
-    /// With exactly its number of bytes.
+    /// The frame has exactly its number of bytes.
     Whole,
-    /// With fewer.
+    /// The frame has fewer bytes.
     Short,
-    /// With more.
+    /// The frame has more bytes.
     Long,
     /// The DMA was too slow for the camera interface.
     Overrun,

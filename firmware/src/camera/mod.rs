@@ -36,7 +36,8 @@ use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
 
-/// From VSYNC to the middle of the exposure, µs. Written by the capture task; read by the pipeline.
+/// Time from VSYNC to the middle of the exposure, µs. Written by the capture task; read by the
+/// pipeline.
 static EXPOSURE_MIDDLE_US: AtomicI32 = AtomicI32::new(0);
 
 /// The camera's settings. Written at boot and by the capture task; read by the USB tasks, the

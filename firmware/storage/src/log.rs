@@ -181,7 +181,7 @@ impl<F: Flash> Log<F> {
             let header = read.ok().as_ref().and_then(Header::of);
             let record = header.filter(|header| self.take(place, header, payload));
             if read != Ok(BLANK) && self.is_newest_in(sector) {
-                // In unreadable data, this word may be the last one, followed by a seal.
+                // An unreadable record may end with this word; the next one may be its seal.
                 self.end = Some(place.behind(record.map_or(2, |header| header.words() + 1)));
                 self.settled &= record.is_some();
             }

@@ -84,7 +84,7 @@ pub struct Polar {
 }
 
 impl Polar {
-    /// Of a vector (Fx, Fy, Fz). |F| saturates at 2,147.483647 N.
+    /// The angles and size of a vector (Fx, Fy, Fz). |F| saturates at 2,147.483647 N.
     pub fn of_vector(vector: [MicroNewtons; 3]) -> Polar {
         let [x, y, z] = vector.map(|component| i64::from(component.0));
         let magnitude = rounded_root(vector.map(square).iter().sum());

@@ -204,7 +204,7 @@ impl Screen {
         [pixel >> 11, pixel >> 6 & 31, pixel & 31]
     }
 
-    /// By how much the channel exceeds its limit; 0 if it does not.
+    /// The amount by which the channel exceeds its limit; 0 if it does not.
     #[inline(always)]
     fn above(&self, channel: u16, a: u16, b: u16) -> u16 {
         // Signed, because the vector units of older processors have only that maximum; all values

@@ -66,7 +66,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         self.tare.as_ref().and_then(Tare::seen)
     }
 
-    /// By how much re-zeroing has moved the coordinate that it moved most.
+    /// The distance by which re-zeroing has moved the coordinate that it moved most.
     pub fn rezeroed(&self) -> Px {
         self.tare.as_ref().map_or(Px(0), Tare::farthest)
     }

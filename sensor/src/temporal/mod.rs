@@ -55,7 +55,7 @@ pub struct Temporal {
 }
 
 impl Temporal {
-    /// With the usual settings, before the first frame.
+    /// The state before the first frame, with the usual settings.
     pub const fn new() -> Temporal {
         Temporal {
             settings: TemporalSettings::USUAL,

@@ -45,7 +45,7 @@ macro_rules! integers {
                 (self.0 + const { 1 << (F - 1) }) >> F
             }
 
-            /// As floating point, for display, files and tests; exact up to 2⁵³.
+            /// The number in floating point, for display, files and tests; exact up to 2⁵³.
             pub fn to_f64(self) -> f64 {
                 self.0 as f64 / (1_u64 << F) as f64
             }
@@ -67,13 +67,13 @@ impl<const F: u32> Q<F, i64> {
         Q(whole << F)
     }
 
-    /// With fewer fractional bits; the others are cut off.
+    /// The number with fewer fractional bits; the others are cut off.
     pub const fn floor_to<const G: u32>(self) -> Q<G, i64> {
         Q(self.0 >> const { F - G })
     }
 
-    /// With fewer fractional bits, rounded to nearest; halves round up. Adding the half must not
-    /// overflow.
+    /// The number with fewer fractional bits, rounded to nearest; halves round up. Adding the half
+    /// must not overflow.
     pub const fn rounded_to<const G: u32>(self) -> Q<G, i64> {
         Q((self.0 + const { 1 << (F - G - 1) }) >> const { F - G })
     }

@@ -40,9 +40,9 @@ pub struct Force {
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
 )]
 pub struct Place {
-    /// To the right in the image.
+    /// Coordinate to the right in the image.
     pub x: SignedMicrometres,
-    /// Down in the image.
+    /// Coordinate down in the image.
     pub y: SignedMicrometres,
     /// Standard uncertainty of each coordinate: the root of half the trace of their 2×2 covariance.
     /// If the covariance is the same in all directions, 95 of 100 true places are within 2.448

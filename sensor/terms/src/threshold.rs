@@ -162,7 +162,8 @@ impl HsvBox {
     /// Largest hue.
     pub const MAX_HUE: u8 = 179;
 
-    /// From its six limits, in the order of the fields, unchecked: as in files and commands.
+    /// The box with these six limits, in the order of the fields, unchecked: as in files and
+    /// commands.
     pub const fn of_limits(limits: [u8; 6]) -> HsvBox {
         let [
             hue_low,

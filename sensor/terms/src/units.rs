@@ -24,7 +24,7 @@ impl Px {
         Px(pixels << Self::FRACTION_BITS)
     }
 
-    /// From a length in pixels; saturates at ± 32,768 px.
+    /// A length in pixels; saturates at ± 32,768 px.
     pub fn saturated(length: Q<16, i64>) -> Px {
         Px(length.bits().clamp(i32::MIN.into(), i32::MAX.into()) as i32)
     }

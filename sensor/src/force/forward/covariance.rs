@@ -15,8 +15,8 @@ pub const LARGEST_STEP: f32 = 1e-3;
 const TRIANGLE: usize = EQUATIONS * (EQUATIONS + 1) / 2;
 /// Bytes of a knot: a step and the entries of the factor.
 const KNOT: usize = 4 + 2 * TRIANGLE;
-/// For a unit of which only a rest picture is known, if the file has no grid for it: standard
-/// uncertainty as a fraction of the motion. `OF_ITSELF` is that of each coordinate of a marker,
+/// Standard uncertainty as a fraction of the motion, for a unit of which only a rest picture is
+/// known, if the file has no grid for it. `OF_ITSELF` is that of each coordinate of a marker,
 /// `OF_ALL` that of all coordinates together.
 const OF_ITSELF: f32 = 0.03;
 const OF_ALL: f32 = 0.1;
@@ -42,7 +42,7 @@ pub struct CovarianceGrid<'a> {
 pub enum Unknown<'a> {
     /// Negligible compared with noise.
     Nothing,
-    /// As the model file says.
+    /// The covariance grid of the model file.
     Grid(CovarianceGrid<'a>),
     /// As much as may differ between units, relative to the motion.
     Unit,

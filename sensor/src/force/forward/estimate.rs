@@ -130,13 +130,13 @@ impl Forward<'_> {
 /// Standard uncertainties of a load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sigma {
-    /// Of the direction, both axes across it together, rad.
+    /// Uncertainty of the direction, both axes across it together, rad.
     pub direction: f32,
-    /// Of |F|, N.
+    /// Uncertainty of |F|, N.
     pub magnitude_n: f32,
     /// The part of `magnitude_n` that noise leaves in the size alone, N.
     pub by_noise_n: f32,
-    /// Of each coordinate of the place, mm: the root of half their covariance's trace.
+    /// Uncertainty of each coordinate of the place, mm: the root of half their covariance's trace.
     pub place_mm: f32,
 }
 
@@ -146,7 +146,7 @@ impl Estimate {
         (0.0..=UNEXPLAINED).contains(&self.unexplained)
     }
 
-    /// By what factor the residual exceeds the markers' stated noise, at least 1.
+    /// The factor by which the residual exceeds the markers' stated noise, at least 1.
     fn noisier(&self) -> f32 {
         libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
     }

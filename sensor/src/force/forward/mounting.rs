@@ -147,7 +147,7 @@ pub struct CameraMotion {
 }
 
 impl CameraMotion {
-    /// From `before` to `now`.
+    /// The motion from `before` to `now`.
     pub fn between(before: &Rest, now: &Rest) -> CameraMotion {
         let places = [now, before].map(places_px);
         let [at, at_before] = places.each_ref().map(middle);

@@ -24,8 +24,8 @@ pub type Markers = [[f32; 2]; DOTS];
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tables<'a> {
     terms: Terms,
-    /// By function and term, f32 each: functions of even powers of the tilt's second part, then
-    /// those of odd powers.
+    /// Coefficients by function and term, f32 each: functions of even powers of the tilt's second
+    /// part, then those of odd powers.
     functions: [&'a [[u8; 4]]; 2],
     dots: [Table<'a>; DOTS],
 }

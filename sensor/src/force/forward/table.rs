@@ -22,7 +22,7 @@ pub struct Table<'a> {
     /// The direction of the first part of the functions' tilt.
     away: [f32; 2],
     functions: usize,
-    /// By node along y, output, function and node along x, i16 each.
+    /// Coefficients by node along y, output, function and node along x, i16 each.
     steps: &'a [u8],
 }
 
@@ -136,7 +136,7 @@ mod tests {
 
     const FUNCTIONS: usize = 3;
     const STEP: f32 = 1e-4;
-    /// Of 30°.
+    /// Cosine and sine of 30°.
     const AWAY: [f32; 2] = [0.866_025_4, 0.5];
 
     /// Nodes every mm from −3 to 3.

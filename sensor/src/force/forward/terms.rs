@@ -163,7 +163,7 @@ fn tilted<const G: usize>(groups: &[[f32; 2]; G], tilts: &[[f32; 3]; G]) -> Fact
 }
 
 impl Sizes {
-    /// At a size ≥ 0.
+    /// The factors at a size ≥ 0.
     pub fn at(size: f32, limits: &Limits) -> Sizes {
         let rate = 2.0 / limits.size;
         let x = rate * size - 1.0;
@@ -180,7 +180,7 @@ impl Sizes {
 }
 
 impl Powers {
-    /// Of one part of a tilt, rad.
+    /// The powers of one part of a tilt, rad.
     pub fn at(part: f32, limits: &Limits) -> Powers {
         let by_largest = 1.0 / limits.tilt;
         let base = part * by_largest;

@@ -106,12 +106,12 @@ pub struct Hanging {
     /// The uncertain effect at rest, and its relative standard uncertainty.
     moved: Column,
     unsure: f32,
-    /// For an unknown gravity: the effect of gravity along x and along y.
+    /// The effect of gravity along x and along y, if gravity is unknown.
     along: Option<[Column; 2]>,
 }
 
 impl<'a> Weight<'a> {
-    /// From the bytes of a file. Returns `None` if their number is not [`BYTES`], or a step is not
+    /// Reads the bytes of a file. Returns `None` if their number is not [`BYTES`], or a step is not
     /// within [`LEGAL`].
     pub fn under_load_of(bytes: &'a [u8]) -> Option<&'a [[u8; BLOCK]]> {
         let (blocks, rest) = bytes.as_chunks();

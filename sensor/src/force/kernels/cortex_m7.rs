@@ -1,4 +1,4 @@
-//! Kernels for Cortex-M4 and M7, in assembly, scheduled for the M7's two issues a cycle.
+//! Implements kernels for Cortex-M4 and M7 in assembly, scheduled for the M7's two issues a cycle.
 //!
 //! All of them lie in sections `.itcm.*`, which a linker script can put into the memory nearest to
 //! the core. Cycles are those of LLVM's model of the core (`llvm-mca -mtriple=thumbv7em-none-eabihf

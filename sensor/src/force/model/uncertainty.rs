@@ -32,13 +32,13 @@ pub struct Uncertainty {
 /// Standard uncertainties at one |F|; those of forces are 0 to [`LARGEST_UNCERTAINTY`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct UncertaintyKnot {
-    /// Of the force's part across itself, in two dimensions. Divided by |F| it is the direction's
-    /// uncertainty in radians.
+    /// Uncertainty of the force's part across itself, in two dimensions. Divided by |F| it is the
+    /// direction's uncertainty in radians.
     pub across: MicroNewtons,
-    /// Of |F|.
+    /// Uncertainty of |F|.
     pub along: MicroNewtons,
-    /// Of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 if the model has
-    /// no place outputs.
+    /// Uncertainty of each coordinate of the place, at most [`LARGEST_PLACE_UNCERTAINTY`]; 0 if the
+    /// model has no place outputs.
     pub place: Micrometres,
 }
 

@@ -16,7 +16,7 @@ pub struct Central {
 const PIXEL_VARIANCE: f32 = 1.0 / 12.0;
 
 impl Central {
-    /// Of a blob of at least one pixel; `by_area` is one over its area.
+    /// Moments of a blob of at least one pixel; `by_area` is one over its area.
     ///
     /// Sums are first taken exactly about the whole pixel next to the mean: no term exceeds 3 ·
     /// 640,000 · 799³ < 2⁵¹. They are then corrected to the mean, which is (a, b) away.

@@ -151,7 +151,7 @@ pub struct Finder {
 }
 
 impl Finder {
-    /// For frames that are scanned with these settings.
+    /// A finder for frames that are scanned with these settings.
     pub fn new(settings: &Settings) -> Finder {
         let geometry = &settings.geometry;
         let edge = nominal_edge(settings.dilations);

@@ -70,8 +70,8 @@ pub fn nominal_edge(dilations: u8) -> Px {
 }
 
 impl Shape {
-    /// Of a blob of at least one pixel. Returns `None` if its position is unknown because no pixel
-    /// has a weight.
+    /// The shape of a blob of at least one pixel. Returns `None` if its position is unknown because
+    /// no pixel has a weight.
     pub fn of_blob(blob: &Blob, estimator: CentroidEstimator) -> Option<Shape> {
         let (x, y) = match estimator {
             CentroidEstimator::BinaryMask => blob.centroid(),

@@ -93,7 +93,7 @@ pub struct Trust {
     grid_of_means: f32,
     /// Largest hollowness.
     hollow: f32,
-    /// By how much the diameters of the passed pixels may be smaller than the mask's, px.
+    /// Difference that is allowed between the mask's diameters and those of the passed pixels, px.
     rim: f32,
     /// Strain as the displacement of one marker that causes it, px; `None` against a model's rest.
     displacement: Option<f32>,
@@ -217,7 +217,7 @@ impl Trust {
         let skew = self.grid * SKEW_PIXELS * radial.by_across
             + taper * self.reading.skew_by_taper
             + self.reading.skew_always;
-        // For a marker that is wider than at rest by the optics.
+        // The limit grows if the optics make the marker wider than at rest.
         let wider = larger(expected * self.by_rest_width, 1.0);
         let bent = width * width * taper * self.reading.lean_by_taper;
         let lean = (LEAN * wider + bent) * (0.5 * (self.grid + 1.0));
