@@ -46,9 +46,9 @@ const BUILT: Drift = Drift {
 const AREAS: [f32; 2] = [0.5, 6.0];
 
 impl Resting {
-    /// Takes a model that takes steps, and the rest position of the markers. The film's weight needs
-    /// no correction: gravity is as it was when the rest position was taken. Returns
-    /// `None` if the model takes no steps.
+    /// Takes a model that takes steps, and the rest position of the markers. The film's weight
+    /// needs no correction: gravity is as it was when the rest position was taken. Returns `None`
+    /// if the model takes no steps.
     pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
         Resting::of_turned(model, rest, None)
     }

@@ -22,7 +22,7 @@ pub fn rescale_input(value: i64, multiplier: u32, shift: u8) -> i16 {
 /// [`rescale_input`] for 32 bits, which hold every difference of coordinates in a frame.
 #[inline(always)]
 pub fn rescale_small_input(value: i32, multiplier: u32, shift: u8) -> i16 {
-    // Equal to the definition with m and 2^s both multiplied by 2^[`SPARE_BITS`].
+    // Equal to the definition with m and 2^s both multiplied by 2^`SPARE_BITS`.
     let beyond = u32::from(shift).wrapping_sub(33 - SPARE_BITS);
     if beyond < 31 {
         let rounded = of_high_word(value, multiplier << SPARE_BITS, beyond);
