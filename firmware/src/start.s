@@ -1,7 +1,7 @@
-// Runs right after a reset, before any memory is initialized, and so uses registers only: starts
-// the part's own loader if the program asked for it (loader.rs), switches on the clocks of SRAM1 to
-// 3, loads .itcm and .sram (memory.x) from flash in double words, as ITCM's error correction has
-// them, and clears .sram_zero.
+// Runs right after a reset, before any memory is initialized, and so uses registers only. Starts
+// the microcontroller's own loader if the program requested it (loader.rs), and switches on the
+// clocks of SRAM1 to SRAM3. Loads .itcm and .sram (memory.x) from flash in double words, the unit
+// of ITCM's error correction, and clears .sram_zero.
 
     .syntax unified
     .section .text.__pre_init, "ax", %progbits

@@ -175,7 +175,7 @@ impl Trust {
             return larger(STRAIN_FOREIGN, always);
         };
         // A marker's distance from the centre is √2 half sides. Displaced by δ it causes a strain
-        // of δ over four of those, and √2 times as much taper, which no tip causes.
+        // of δ over four of those, and √2 times as much taper: that part is not from a tip.
         let displaced = displacement / (FOUR_DISTANCES * now.half_side);
         let tapered = larger(taper - displaced * core::f32::consts::SQRT_2, 0.0);
         let limit = displaced
@@ -276,8 +276,8 @@ fn are_alike(densities: [f32; 4], more: f32) -> bool {
 }
 
 /// The mean weight of a marker without the edge that the mask adds. The edge weighs little, and is
-/// a larger part of a narrow image: e/a + e/b of an ellipse a by b, if it adds e to both. Without
-/// it, images of different aspects are comparable.
+/// a larger part of a narrow image: e/a + e/b of an ellipse a by b, if it adds e to both. Only
+/// without the edge are images of different aspects comparable.
 fn inner_density(image: &Image, edge: f32) -> f32 {
     let outer = edge * image.radial.by_across + edge / image.radial.along;
     image.density / larger(1.0 - outer, 0.125)
