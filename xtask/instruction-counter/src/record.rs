@@ -1,10 +1,7 @@
 //! What was executed while the program asked for it to be recorded.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
-
-/// Bytes of a cache line of the Cortex-M7: loads are told apart no finer.
-const LINE: u64 = 32;
 
 /// What a call of one of the program's marking functions means.
 #[derive(Clone, Copy)]
@@ -23,7 +20,7 @@ struct Block {
     mark: Option<Mark>,
 }
 
-/// Blocks, how they followed each other, and loads.
+/// Blocks, and how they followed each other.
 pub struct Record {
     blocks: Vec<Block>,
     recording: bool,
@@ -32,8 +29,6 @@ pub struct Record {
     before: Option<usize>,
     /// How often a block ran in a part after another.
     runs: BTreeMap<(u8, Option<usize>, usize), u64>,
-    /// Loads in a part by the number of the cache line.
-    loads: BTreeMap<(u8, u64), u64>,
 }
 
 impl Record {
@@ -45,7 +40,6 @@ impl Record {
             part: 0,
             before: None,
             runs: BTreeMap::new(),
-            loads: BTreeMap::new(),
         }
     }
 
@@ -75,32 +69,35 @@ impl Record {
         }
     }
 
-    /// Something is loaded.
-    pub fn load(&mut self, address: u64) {
-        if self.recording {
-            *self.loads.entry((self.part, address / LINE)).or_default() += 1;
-        }
-    }
-
     /// Everything, in the lines that the crate's documentation describes.
     pub fn report(&self) -> String {
-        let mut text = String::new();
-        for (number, block) in self.blocks.iter().enumerate() {
-            if self.runs.keys().any(|(_, _, ran)| *ran == number) {
-                let _ = write!(text, "block {number:x}");
-                for address in &block.addresses {
-                    let _ = write!(text, " {address:x}");
-                }
-                text.push('\n');
-            }
+        let (mut text, mut runs) = (String::new(), BTreeMap::<_, u64>::new());
+        let numbers = self.write_blocks(&mut text);
+        for (&(part, before, block), count) in &self.runs {
+            let before = before.map(|before| numbers[before]);
+            *runs.entry((part, before, numbers[block])).or_default() += count;
         }
-        for ((part, before, number), count) in &self.runs {
-            let before = before.map_or("-".to_owned(), |before| format!("{before:x}"));
-            let _ = writeln!(text, "run {part} {before} {number:x} {count}");
-        }
-        for ((part, line), count) in &self.loads {
-            let _ = writeln!(text, "load {part} {:x} {count}", line * LINE);
+        for ((part, before, block), count) in runs {
+            let before = before.map_or("-".to_owned(), |before| before.to_string());
+            let _ = writeln!(text, "run {part} {before} {block} {count}");
         }
         text
+    }
+
+    /// Writes each block that ran once, and gives the number among these by that of translation.
+    fn write_blocks(&self, text: &mut String) -> Vec<usize> {
+        let ran: BTreeSet<usize> = self.runs.keys().map(|(.., block)| *block).collect();
+        let mut numbers = vec![usize::MAX; self.blocks.len()];
+        let mut known = BTreeMap::new();
+        for number in ran {
+            let addresses = &self.blocks[number].addresses;
+            let next = known.len();
+            numbers[number] = *known.entry(addresses).or_insert_with(|| {
+                let words = addresses.iter().map(|address| format!(" {address:x}"));
+                let _ = writeln!(text, "block{}", words.collect::<String>());
+                next
+            });
+        }
+        numbers
     }
 }

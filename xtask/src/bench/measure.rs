@@ -1,55 +1,36 @@
 //! One case in QEMU: what each of its stages costs.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::iter::Sum;
-use std::ops::{Add, AddAssign};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 
-use super::cases::{Case, Work, neurons};
-use super::disassembly;
-use super::mca::{self, Mca};
-use super::memory::Loads;
-use super::record::{Part, Record};
+use super::cases::{Case, Work};
+use super::cycles::Model;
+use super::record::Record;
 use super::stages::Stages;
-use crate::process;
+use crate::{artifacts, process};
+
+/// The emulator, up to how scripts are handed to the image.
+const QEMU: &str = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial none \
+    -d plugin -semihosting-config";
 
 /// Executed instructions, and what LLVM's model of the core makes of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Cost {
     /// Exact.
     pub instructions: u64,
-    /// Modelled, in memory without wait states; `None` without LLVM.
-    pub cycles: Option<f64>,
+    /// Modelled, in memory without wait states; not a number without LLVM.
+    pub cycles: f64,
 }
 
-impl Add for Cost {
-    type Output = Cost;
-
-    fn add(self, other: Cost) -> Cost {
-        let cycles = match (self.cycles, other.cycles) {
-            (Some(a), Some(b)) => Some(a + b),
-            (one, other) => one.or(other),
-        };
-        Cost {
-            instructions: self.instructions + other.instructions,
-            cycles,
-        }
-    }
-}
-
-impl AddAssign for Cost {
-    fn add_assign(&mut self, other: Cost) {
-        *self = *self + other;
-    }
-}
-
-impl Sum for Cost {
-    fn sum<I: Iterator<Item = Cost>>(costs: I) -> Cost {
-        costs.fold(Cost::default(), Add::add)
+impl Cost {
+    /// Of some costs together.
+    pub fn sum<'c>(costs: impl Iterator<Item = &'c Cost>) -> Cost {
+        costs.fold(Cost::default(), |sum, cost| Cost {
+            instructions: sum.instructions + cost.instructions,
+            cycles: sum.cycles + cost.cycles,
+        })
     }
 }
 
@@ -61,26 +42,19 @@ pub struct Measured {
     pub stages: BTreeMap<&'static str, Cost>,
     /// What happens once the last band of rows is there.
     pub last_band: Cost,
-    /// Whether the model is run then, and not before.
-    pub answers_last: bool,
     /// The loops of the network that multiply.
     pub inner_loop: Cost,
-    /// How often a predictor that always guesses a block's usual successor is wrong.
-    pub mispredictions: u64,
-    /// Where data was loaded from.
-    pub loads: Loads,
 }
 
 impl Measured {
     /// Everything together.
     pub fn total(&self) -> Cost {
-        self.stages.values().copied().sum()
+        Cost::sum(self.stages.values())
     }
 
     /// Some stages together.
     pub fn of(&self, stages: &[&str]) -> Cost {
-        let costs = stages.iter().filter_map(|stage| self.stages.get(stage));
-        costs.copied().sum()
+        Cost::sum(stages.iter().filter_map(|stage| self.stages.get(stage)))
     }
 }
 
@@ -91,144 +65,100 @@ pub struct Bench {
     folder: PathBuf,
     stages: Stages,
     /// `None` without LLVM.
-    mca: Option<Mca>,
+    model: Option<Model>,
 }
 
 impl Bench {
-    /// Measures on `image` with QEMU's `plugin`; writes what it needs into `folder`.
-    ///
-    /// # Errors
-    /// When the image cannot be read, or LLVM does not know the core.
-    pub fn new(image: PathBuf, plugin: PathBuf, folder: PathBuf) -> Result<Bench> {
-        let mca = if mca::is_installed() {
-            let disassembly = disassembly::disassemble(&image)?;
-            Some(Mca::new(disassembly, folder.join("blocks.s"))?)
-        } else {
-            None
-        };
+    /// Measures on `image`; writes what it needs into `folder`.
+    pub fn new(image: PathBuf, folder: PathBuf) -> Result<Bench> {
         Ok(Bench {
+            plugin: artifacts::instruction_counter(plugin_version()?)?,
             stages: Stages::of_image(&image)?,
+            model: Model::new(&image, folder.join("blocks.s"))?,
             image,
-            plugin,
             folder,
-            mca,
         })
-    }
-
-    /// Runs all cases.
-    ///
-    /// # Errors
-    /// When QEMU or LLVM fail.
-    pub fn measure_all(&mut self, cases: Vec<Case>) -> Result<Vec<Measured>> {
-        cases.into_iter().map(|case| self.measure(case)).collect()
     }
 
     /// Runs one case.
-    ///
-    /// # Errors
-    /// When QEMU or LLVM fail.
-    fn measure(&mut self, case: Case) -> Result<Measured> {
-        let record = self.record(&case.file)?;
-        let cycles = match &mut self.mca {
-            Some(mca) => mca.cycles(&record)?.into_iter().map(Some).collect(),
-            None => vec![None; record.blocks().len()],
+    pub fn measure(&mut self, case: Case) -> Result<Measured> {
+        let record = self.record(&case)?;
+        let cycles = match &mut self.model {
+            Some(model) => model.cycles(&record)?,
+            None => vec![f64::NAN; record.blocks.len()],
         };
-        let parts = self.stages(&record, Part::Whole, &cycles)?;
-        let last_band = self.stages(&record, Part::LastBand, &cycles)?;
+        let everything = |_: u64, _: &str| true;
+        let last_band = self.costs(&record, true, &cycles, everything)?;
+        let mut inner_loop = Cost::default();
+        if let Work::Network(widths) = &case.work {
+            // What runs more often than there are neurons multiplies. An instruction may lie in
+            // several blocks: the first round of a loop is one with what comes before it.
+            let (executions, neurons) = (record.executions(), widths[1..].iter().sum());
+            let multiplies =
+                |address: u64, stage: &str| stage == "network" && executions[&address] > neurons;
+            inner_loop = Cost::sum(self.costs(&record, false, &cycles, multiplies)?.values());
+        }
         Ok(Measured {
-            inner_loop: self.inner_loop(&case, &record, &cycles)?,
+            stages: self.costs(&record, false, &cycles, everything)?,
+            last_band: Cost::sum(last_band.values()),
+            inner_loop,
             case,
-            stages: parts,
-            answers_last: last_band.contains_key("network"),
-            last_band: last_band.into_values().sum(),
-            mispredictions: record.unusual_exits(),
-            loads: Loads::of(&record),
         })
     }
 
-    fn record(&self, script: &Path) -> Result<Record> {
+    fn record(&self, case: &Case) -> Result<Record> {
         let (log, results) = (self.folder.join("record"), self.folder.join("results"));
-        process::run_quietly(&mut qemu(&self.image, &self.plugin, script, &results, &log))?;
-        let text =
-            fs::read_to_string(&log).with_context(|| format!("reading {}", log.display()))?;
-        Record::parse(&text)
+        let (script, results) = (case.file.display(), results.display());
+        let arguments = format!("arg=hivtac-qemu-image,arg={script},arg={results}");
+        let mut command = process::command(QEMU);
+        command.arg(format!("enable=on,target=native,{arguments}"));
+        command.arg("-kernel").arg(&self.image);
+        command.arg("-plugin").arg(&self.plugin).arg("-D").arg(&log);
+        process::output(&mut command)?;
+        Record::parse(&process::read(&log)?)
     }
 
-    /// What each stage costs in one part.
-    fn stages(
+    /// What each stage costs, in all or in the last band, of the instructions that count.
+    fn costs(
         &mut self,
         record: &Record,
-        part: Part,
-        cycles: &[Option<f64>],
+        only_last_band: bool,
+        cycles: &[f64],
+        counts: impl Fn(u64, &str) -> bool,
     ) -> Result<BTreeMap<&'static str, Cost>> {
         let mut stages = BTreeMap::<_, Cost>::new();
-        let blocks = record.blocks().iter().zip(record.counts(part)).zip(cycles);
+        let blocks = record
+            .blocks
+            .iter()
+            .zip(record.counts(only_last_band))
+            .zip(cycles);
         for ((block, count), cycles) in blocks.filter(|((_, count), _)| *count > 0) {
             // A block that the compiler made of several stages is shared by their instructions.
-            let share = |cycles: f64| cycles * count as f64 / block.len() as f64;
+            let cycles = cycles * count as f64 / block.len() as f64;
             for address in block {
-                if let Some(stage) = self.stages.stage(*address)? {
-                    *stages.entry(stage).or_default() += Cost {
-                        instructions: count,
-                        cycles: cycles.map(share),
-                    };
+                let stage = self.stages.stage(*address)?;
+                if let Some(stage) = stage.filter(|stage| counts(*address, stage)) {
+                    let sum = stages.entry(stage).or_default();
+                    *sum = Cost::sum(
+                        [
+                            *sum,
+                            Cost {
+                                instructions: count,
+                                cycles,
+                            },
+                        ]
+                        .iter(),
+                    );
                 }
             }
         }
         Ok(stages)
     }
-
-    /// The instructions of the network that run more often than there are neurons: those that
-    /// multiply.
-    fn inner_loop(&mut self, case: &Case, record: &Record, cycles: &[Option<f64>]) -> Result<Cost> {
-        let Work::Network(widths) = &case.work else {
-            return Ok(Cost::default());
-        };
-        let mut sum = Cost::default();
-        let executions = record.executions();
-        let blocks = record.blocks().iter().zip(record.counts(Part::Whole));
-        for ((block, count), cycles) in blocks.zip(cycles) {
-            // An instruction may lie in several blocks: the first round of a loop is one with what
-            // comes before it.
-            let share = |cycles: f64| cycles * count as f64 / block.len() as f64;
-            for address in block {
-                let often = executions[address] > neurons(widths);
-                if often && self.stages.stage(*address)? == Some("network") {
-                    sum += Cost {
-                        instructions: count,
-                        cycles: cycles.map(share),
-                    };
-                }
-            }
-        }
-        Ok(sum)
-    }
-}
-
-fn qemu(image: &Path, plugin: &Path, script: &Path, results: &Path, log: &Path) -> Command {
-    let (script, results) = (script.display(), results.display());
-    let mut command = Command::new("qemu-system-arm");
-    command
-        .args(["-M", "mps2-an500", "-display", "none", "-monitor", "none"])
-        .args(["-serial", "none", "-semihosting-config"])
-        .arg(format!(
-            "enable=on,target=native,arg=hivtac-qemu-image,arg={script},arg={results}"
-        ))
-        .arg("-plugin")
-        .arg(plugin)
-        .args(["-d", "plugin", "-D"])
-        .arg(log)
-        .arg("-kernel")
-        .arg(image);
-    command
 }
 
 /// The version of the plugin interface that this QEMU accepts: 1 before QEMU 9, 2 from then on.
-///
-/// # Errors
-/// When QEMU does not say its version.
-pub fn plugin_version() -> Result<u32> {
-    let text = process::output(Command::new("qemu-system-arm").arg("--version"))?;
+fn plugin_version() -> Result<u32> {
+    let text = process::output(&mut process::command("qemu-system-arm --version"))?;
     let major = major_version(&text).with_context(|| format!("no version in `{text}`"))?;
     Ok(if major < 9 { 1 } else { 2 })
 }
@@ -248,16 +178,5 @@ mod tests {
         assert_eq!(major_version(debian), Some(7));
         assert_eq!(major_version("QEMU emulator version 10.0.2"), Some(10));
         assert_eq!(major_version("something else"), None);
-    }
-
-    #[test]
-    fn costs_add_up() {
-        let cost = |instructions, cycles| Cost {
-            instructions,
-            cycles,
-        };
-        let sum: Cost = [cost(3, Some(1.5)), cost(4, Some(2.0))].into_iter().sum();
-        assert_eq!(sum, cost(7, Some(3.5)));
-        assert_eq!([cost(3, None)].into_iter().sum::<Cost>().cycles, None);
     }
 }

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use addr2line::Loader;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 
 /// The modules of each stage, a line each.
 const LISTED: &str = include_str!("../../../sensing/stages.txt");
@@ -40,29 +40,26 @@ pub struct Stages {
 
 impl Stages {
     /// Of the image in this file.
-    ///
-    /// # Errors
-    /// When the image cannot be read or has no line table.
     pub fn of_image(image: &Path) -> Result<Stages> {
-        let loader = Loader::new(image)
-            .map_err(|error| anyhow!("{error}"))
-            .with_context(|| format!("reading the line table of {}", image.display()))?;
-        Ok(Stages {
-            loader,
-            known: HashMap::new(),
-        })
+        let loader = Loader::new(image).map_err(|error| anyhow!("{}: {error}", image.display()))?;
+        let known = HashMap::new();
+        Ok(Stages { loader, known })
     }
 
     /// The stage of the instruction at an address, one of [`ORDER`], or `None` for the harness.
-    ///
-    /// # Errors
-    /// When the line table is not sound there.
     pub fn stage(&mut self, address: u64) -> Result<Option<&'static str>> {
         if let Some(known) = self.known.get(&address) {
             return Ok(*known);
         }
-        let stage = match stage(&self.files(address)?) {
-            Some("library") => self.stage_of_symbol(address).or(Some("library")),
+        let files = self
+            .files(address)
+            .map_err(|error| anyhow!("{address:#x}: {error}"))?;
+        let stage = match stage(&files) {
+            // Assembly has no line table; its names say what it is.
+            Some("library") => {
+                let name = self.loader.find_symbol(address);
+                name.and_then(stage_of_name).or(Some("library"))
+            }
             stage => stage,
         };
         self.known.insert(address, stage);
@@ -70,27 +67,14 @@ impl Stages {
     }
 
     /// The source files of the functions that an instruction was inlined through, innermost first.
-    fn files(&self, address: u64) -> Result<Vec<String>> {
-        let problem = |error: String| anyhow!("looking up {address:#x}: {error}");
-        let mut frames = self
-            .loader
-            .find_frames(address)
-            .map_err(|error| problem(error.to_string()))?;
+    fn files(&self, address: u64) -> Result<Vec<String>, Box<dyn std::error::Error>> {
+        let mut frames = self.loader.find_frames(address)?;
         let mut files = Vec::new();
-        while let Some(frame) = frames.next().map_err(|error| problem(error.to_string()))? {
-            files.extend(
-                frame
-                    .location
-                    .and_then(|location| location.file)
-                    .map(str::to_owned),
-            );
+        while let Some(frame) = frames.next()? {
+            let file = frame.location.and_then(|location| location.file);
+            files.extend(file.map(str::to_owned));
         }
         Ok(files)
-    }
-
-    /// Assembly has no line table; its names say what it is.
-    fn stage_of_symbol(&self, address: u64) -> Option<&'static str> {
-        stage_of_name(self.loader.find_symbol(address)?)
     }
 }
 
@@ -107,9 +91,8 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         let name = within.split(['/', '.']).next()?;
         Some(format!("{package}/{name}"))
     })?;
-    ORDER
-        .into_iter()
-        .find(|stage| modules_of(stage).any(|name| name == module))
+    let has_it = |stage: &&str| modules_of(stage).any(|name| name == module);
+    ORDER.into_iter().find(has_it)
 }
 
 /// The modules of a stage: package and name.
@@ -152,19 +135,20 @@ mod tests {
     fn the_innermost_function_of_the_sensing_decides() {
         let core = "/rustc/1/library/core/src/slice.rs";
         let (label, scanner) = ("/p/markers/src/label.rs", "/p/markers/src/scanner.rs");
+        let units = "/p/terms/src/units.rs";
         assert_eq!(
             stage_of(&[core, label, scanner]),
             Some("runs, labels, moments")
         );
         assert_eq!(stage_of(&[core, scanner]), Some("pipeline"));
-        assert_eq!(
-            stage_of(&["/p/terms/src/units.rs", label]),
-            Some("runs, labels, moments")
-        );
+        assert_eq!(stage_of(&[units, label]), Some("runs, labels, moments"));
         assert_eq!(
             stage_of(&["/p/markers/src/rules/shape.rs"]),
             Some("markers")
         );
+        assert_eq!([stage_of(&[]), stage_of(&[core])], [Some("library"); 2]);
+        assert_eq!(stage_of(&["/p/tests/src/golden.rs"]), None);
+        assert_eq!(stage_of_name("hivtac_threshold_row"), Some("threshold"));
     }
 
     #[test]
@@ -173,32 +157,15 @@ mod tests {
         let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
         listed.sort();
         let modules = |package: &&str| {
-            let folder = crate::workspace::folder(package).join("src");
-            let entries = std::fs::read_dir(folder).unwrap();
+            let folder = crate::toolchain::at(package).join("src");
             let name = |entry: std::io::Result<std::fs::DirEntry>| {
                 let path = entry.unwrap().path();
                 format!("{package}/{}", path.file_stem().unwrap().to_str().unwrap())
             };
-            entries.map(name).collect::<Vec<_>>()
+            folder.read_dir().unwrap().map(name).collect::<Vec<_>>()
         };
         let mut found: Vec<String> = PACKAGES.iter().flat_map(modules).collect();
         found.sort();
         assert_eq!(listed, found);
-    }
-
-    #[test]
-    fn what_lies_outside_is_library_or_harness() {
-        assert_eq!(stage_of(&[]), Some("library"));
-        assert_eq!(
-            stage_of(&["/rustc/1/library/core/src/slice.rs"]),
-            Some("library")
-        );
-        assert_eq!(stage_of(&["/p/tests/src/golden.rs"]), None);
-    }
-
-    #[test]
-    fn assembly_is_known_by_its_name() {
-        assert_eq!(stage_of_name("hivtac_threshold_row"), Some("threshold"));
-        assert_eq!(stage_of_name("memset"), None);
     }
 }

@@ -1,0 +1,185 @@
+//! Cycles of blocks of instructions on LLVM's model of the Cortex-M7 (`llvm-mca`).
+//!
+//! The core issues in order, so a block's cost is by how much later the instruction after it issues
+//! when the block is there: cycles(before + block + tail) − cycles(before + tail), where *before*
+//! is what usually ran before it and the tail waits for nothing. Since two instructions may issue
+//! in a cycle, this is the mean over both ways in which the pairs can fall. A block that follows
+//! itself is timed as the loop that it is.
+
+use std::collections::{BTreeMap, HashMap};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use super::lowering::{FILLER, disassemble};
+use super::record::Record;
+use crate::process;
+
+const MCA: &str = "llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7 -iterations=1 \
+    -instruction-info=0 -resource-pressure=0";
+
+/// How much of what came before a block is timed with it, in instructions.
+const CONTEXT: usize = 24;
+/// Repetitions of a loop: the difference between the two is what is timed.
+const LOOPS: (usize, usize) = (8, 24);
+/// Instructions of the tail: longer than any latency.
+const TAIL: usize = 24;
+/// Regions that one run of the analyzer takes.
+const BATCH: usize = 500;
+
+/// Loops whose cycles are known from the core's rules: two issues in a cycle, one multiplication,
+/// one store, two loads, and two cycles from a load to the address that it gives.
+const KNOWN: [(&[&str], f64); 7] = [
+    (&["add r0, r1, r2", "add r3, r1, r2"], 1.0),
+    (&["add r0, r0, r1"], 1.0),
+    (&["smlad r4, r5, r0, r4", "sxtb16 r3, r2"], 1.0),
+    (&["smlad r4, r5, r0, r4", "smlad r6, r5, r0, r6"], 2.0),
+    (&["str r3, [r0]", "str r4, [r0, #4]"], 2.0),
+    (&["ldr r3, [r0]", "ldr r4, [r0, #4]"], 1.0),
+    (&["ldr r0, [r0]"], 2.0),
+];
+
+/// LLVM's analyzer, with what it has said so far.
+pub struct Model {
+    /// What each instruction of the image is to it, by the address.
+    lines: BTreeMap<u64, Vec<String>>,
+    /// Where its input is written.
+    file: PathBuf,
+    /// Cycles by the text of the instructions.
+    known: HashMap<String, f64>,
+}
+
+/// Texts whose mean cycles differ by so many times what is looked for.
+struct Timing {
+    with: [String; 2],
+    without: [String; 2],
+    times: f64,
+}
+
+impl Model {
+    /// For an image; `file` is written to. `None` without LLVM.
+    pub fn new(image: &Path, file: PathBuf) -> Result<Option<Model>> {
+        let programs = ["llvm-mca", "llvm-objdump"].map(process::find_program);
+        if programs.iter().any(Option::is_none) {
+            process::say(
+                "no modelled cycles: llvm-mca and llvm-objdump are missing; install the package \
+                 llvm (Debian's name)",
+            );
+            return Ok(None);
+        }
+        let (lines, known) = (disassemble(image)?, HashMap::new());
+        let mut model = Model { lines, file, known };
+        for (lines, expected) in KNOWN {
+            let block: Vec<String> = lines.iter().map(|&line| line.to_owned()).collect();
+            let found = model.evaluate(&[timing(0, &[block], &[Some(0)])])?[0];
+            ensure!(
+                found == expected,
+                "this llvm-mca gives {found} cycles to {lines:?} and not {expected}: its model of \
+                 the core is not the one that this project's figures stand on (LLVM 14 to 22)"
+            );
+        }
+        Ok(Some(model))
+    }
+
+    /// Modelled cycles of one execution of each block.
+    pub fn cycles(&mut self, record: &Record) -> Result<Vec<f64>> {
+        let text = |block: &Vec<u64>| -> Result<Vec<String>> {
+            let lines = block.iter().map(|address| {
+                let lines = self.lines.get(address).map(Vec::as_slice);
+                lines.with_context(|| format!("llvm-objdump shows nothing at {address:#x}"))
+            });
+            Ok(lines.collect::<Result<Vec<_>>>()?.concat())
+        };
+        let texts = record.blocks.iter().map(text).collect::<Result<Vec<_>>>()?;
+        let before = record.usual_predecessors();
+        let timings = (0..texts.len()).map(|index| timing(index, &texts, &before));
+        self.evaluate(&timings.collect::<Vec<_>>())
+    }
+
+    /// Asks the analyzer for what is not known yet.
+    fn evaluate(&mut self, timings: &[Timing]) -> Result<Vec<f64>> {
+        let texts = timings
+            .iter()
+            .flat_map(|it| it.with.iter().chain(&it.without));
+        let mut texts: Vec<&String> = texts.filter(|it| !self.known.contains_key(*it)).collect();
+        texts.sort();
+        texts.dedup();
+        for batch in texts.chunks(BATCH) {
+            let cycles = self.ask(batch)?;
+            self.known
+                .extend(batch.iter().map(|&text| text.clone()).zip(cycles));
+        }
+        let sum = |texts: &[String; 2]| self.known[&texts[0]] + self.known[&texts[1]];
+        let each = |it: &Timing| (sum(&it.with) - sum(&it.without)) / 2.0 / it.times;
+        Ok(timings.iter().map(each).collect())
+    }
+
+    fn ask(&self, texts: &[&String]) -> Result<Vec<f64>> {
+        let region = |text: &&String| format!("# LLVM-MCA-BEGIN\n{text}# LLVM-MCA-END\n");
+        process::write(&self.file, &texts.iter().map(region).collect::<String>())?;
+        let output = process::output(process::command(MCA).arg(&self.file))?;
+        let totals = output
+            .lines()
+            .filter_map(|line| line.strip_prefix("Total Cycles:"));
+        let cycles = totals.map(|total| Ok(total.trim().parse()?));
+        let cycles = cycles.collect::<Result<Vec<_>>>()?;
+        let all = cycles.len() == texts.len();
+        ensure!(all, "llvm-mca left out regions of {}", self.file.display());
+        Ok(cycles)
+    }
+}
+
+fn timing(index: usize, texts: &[Vec<String>], before: &[Option<usize>]) -> Timing {
+    let block = &texts[index];
+    if before[index] == Some(index) {
+        let (few, many) = LOOPS;
+        let [without, with] =
+            [few, many].map(|times| both_ways(&vec![block.clone(); times].concat()));
+        return Timing {
+            with,
+            without,
+            times: (many - few) as f64,
+        };
+    }
+    let context = context(index, texts, before);
+    Timing {
+        with: both_ways(&[context.as_slice(), block].concat()),
+        without: both_ways(&context),
+        times: 1.0,
+    }
+}
+
+/// What usually ran before a block: its last instructions.
+fn context(index: usize, texts: &[Vec<String>], before: &[Option<usize>]) -> Vec<String> {
+    let mut context = Vec::new();
+    let mut at = index;
+    while let Some(previous) = before[at].filter(|_| context.len() < CONTEXT) {
+        context = [texts[previous].clone(), context].concat();
+        at = previous;
+    }
+    context.split_off(context.len().saturating_sub(CONTEXT))
+}
+
+/// The lines and the tail, beginning with the first or the second instruction of a pair.
+fn both_ways(lines: &[String]) -> [String; 2] {
+    let text = lines.join("\n") + if lines.is_empty() { "" } else { "\n" };
+    let tail = format!("{FILLER}\n").repeat(TAIL);
+    [format!("{text}{tail}"), format!("{FILLER}\n{text}{tail}")]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_block_is_timed_behind_what_usually_precedes_it_and_a_loop_as_such() {
+        let texts = [vec!["a".to_owned()], vec!["b".to_owned()]];
+        let behind = timing(1, &texts, &[None, Some(0)]);
+        assert!(behind.with[0].starts_with("a\nb\n") && behind.without[0].starts_with("a\nmov"));
+        let looping = timing(0, &texts, &[Some(0), None]);
+        assert_eq!(
+            (looping.with[0].matches("a\n").count(), looping.times),
+            (24, 16.0)
+        );
+    }
+}
