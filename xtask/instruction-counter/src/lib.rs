@@ -3,16 +3,17 @@
 //!
 //! Recording begins when the program calls a function named `counting_begins` and ends when it
 //! calls `counting_ends`, as often as it likes; what runs after a call of `last_band_begins` is
-//! told apart from what ran before. At the end of the run the plugin writes to QEMU's log:
+//! told apart from what ran before. At the end of the run the plugin writes to QEMU's log one JSON
+//! object:
 //!
 //! ```text
-//! block ADDRESS …               the addresses of a block's instructions, in order, in hexadecimal
-//! run PART FROM TO COUNT        block TO ran so often right after block FROM (`-`: after a call)
+//! {"blocks":[[ADDRESS,…],…],"runs":[[LAST_BAND,FROM,TO,COUNT],…]}
 //! ```
 //!
-//! PART is 0, and 1 from the last band of rows on. FROM and TO count the lines of blocks from 0;
-//! blocks that QEMU translated several times count as one. A program that takes no interrupt and no
-//! fault leaves a block only at its end, so the counts are exact.
+//! A block is the addresses of its instructions, in order; block TO ran so often right after block
+//! FROM, which is `null` after a call. Blocks that QEMU translated several times count as one. A
+//! program that takes no interrupt and no fault leaves a block only at its end, so the counts are
+//! exact.
 
 mod qemu;
 mod record;

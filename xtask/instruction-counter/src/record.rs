@@ -1,7 +1,6 @@
 //! What was executed while the program asked for it to be recorded.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
 
 /// What a call of one of the program's marking functions means.
 #[derive(Clone, Copy)]
@@ -69,35 +68,34 @@ impl Record {
         }
     }
 
-    /// Everything, in the lines that the crate's documentation describes.
+    /// Everything, as the crate's documentation describes.
     pub fn report(&self) -> String {
-        let (mut text, mut runs) = (String::new(), BTreeMap::<_, u64>::new());
-        let numbers = self.write_blocks(&mut text);
+        let (blocks, numbers) = self.blocks_that_ran();
+        let mut runs = BTreeMap::<_, u64>::new();
         for (&(part, before, block), count) in &self.runs {
             let before = before.map(|before| numbers[before]);
             *runs.entry((part, before, numbers[block])).or_default() += count;
         }
-        for ((part, before, block), count) in runs {
-            let before = before.map_or("-".to_owned(), |before| before.to_string());
-            let _ = writeln!(text, "run {part} {before} {block} {count}");
-        }
-        text
+        let runs = runs.into_iter().map(|((part, before, block), count)| {
+            let before = before.map_or("null".to_owned(), |before| before.to_string());
+            format!("[{},{before},{block},{count}]", part == 1)
+        });
+        let runs: Vec<String> = runs.collect();
+        format!("{{\"blocks\":{blocks:?},\"runs\":[{}]}}\n", runs.join(","))
     }
 
-    /// Writes each block that ran once, and gives the number among these by that of translation.
-    fn write_blocks(&self, text: &mut String) -> Vec<usize> {
+    /// Each block that ran, once, and its number among these by that of translation.
+    fn blocks_that_ran(&self) -> (Vec<&Vec<u64>>, Vec<usize>) {
         let ran: BTreeSet<usize> = self.runs.keys().map(|(.., block)| *block).collect();
         let mut numbers = vec![usize::MAX; self.blocks.len()];
-        let mut known = BTreeMap::new();
+        let (mut blocks, mut known) = (Vec::new(), BTreeMap::new());
         for number in ran {
             let addresses = &self.blocks[number].addresses;
-            let next = known.len();
             numbers[number] = *known.entry(addresses).or_insert_with(|| {
-                let words = addresses.iter().map(|address| format!(" {address:x}"));
-                let _ = writeln!(text, "block{}", words.collect::<String>());
-                next
+                blocks.push(addresses);
+                blocks.len() - 1
             });
         }
-        numbers
+        (blocks, numbers)
     }
 }

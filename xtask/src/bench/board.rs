@@ -4,7 +4,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use super::cases;
+use super::measure;
 use super::tables::decimal;
 use crate::{artifacts, process, toolchain};
 
@@ -44,7 +44,7 @@ pub fn lint() -> Result<()> {
 
 fn command() -> Result<Command> {
     let data = toolchain::work_folder("bench")?;
-    cases::write(&data)?;
+    measure::cases(&data)?;
     let mut command = toolchain::build_for_target("");
     command
         .args(["--package", PACKAGE])

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 
 use super::lowering::{FILLER, disassemble};
-use super::record::Record;
+use super::measure::Record;
 use crate::process;
 
 const MCA: &str = "llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7 -iterations=1 \
@@ -83,15 +83,14 @@ impl Model {
 
     /// Modelled cycles of one execution of each block.
     pub fn cycles(&mut self, record: &Record) -> Result<Vec<f64>> {
-        let text = |block: &Vec<u64>| -> Result<Vec<String>> {
-            let lines = block.iter().map(|address| {
-                let lines = self.lines.get(address).map(Vec::as_slice);
-                lines.with_context(|| format!("llvm-objdump shows nothing at {address:#x}"))
-            });
-            Ok(lines.collect::<Result<Vec<_>>>()?.concat())
-        };
-        let texts = record.blocks.iter().map(text).collect::<Result<Vec<_>>>()?;
-        let before = record.usual_predecessors();
+        let mut texts = Vec::new();
+        for block in &record.blocks {
+            let lines = block.iter().map(|address| self.lines.get(address));
+            let lines: Option<Vec<_>> = lines.map(|it| it.map(Vec::as_slice)).collect();
+            let lines = lines.with_context(|| format!("llvm-objdump left out some of {block:x?}"));
+            texts.push(lines?.concat());
+        }
+        let before = usual_predecessors(record);
         let timings = (0..texts.len()).map(|index| timing(index, &texts, &before));
         self.evaluate(&timings.collect::<Vec<_>>())
     }
@@ -121,23 +120,39 @@ impl Model {
         let totals = output
             .lines()
             .filter_map(|line| line.strip_prefix("Total Cycles:"));
-        let cycles = totals.map(|total| Ok(total.trim().parse()?));
-        let cycles = cycles.collect::<Result<Vec<_>>>()?;
+        let cycles: Result<Vec<f64>, _> = totals.map(|total| total.trim().parse()).collect();
+        let cycles = cycles.context("what llvm-mca says")?;
         let all = cycles.len() == texts.len();
         ensure!(all, "llvm-mca left out regions of {}", self.file.display());
         Ok(cycles)
     }
 }
 
+/// The block that most often came right before each one.
+fn usual_predecessors(record: &Record) -> Vec<Option<usize>> {
+    let mut steps = BTreeMap::<_, u64>::new();
+    for (_, before, block, count) in &record.runs {
+        if let Some(before) = before {
+            *steps.entry((*before, *block)).or_default() += count;
+        }
+    }
+    let mut best = vec![(0, None); record.blocks.len()];
+    for ((from, to), count) in steps {
+        if count > best[to].0 {
+            best[to] = (count, Some(from));
+        }
+    }
+    best.into_iter().map(|(_, from)| from).collect()
+}
+
 fn timing(index: usize, texts: &[Vec<String>], before: &[Option<usize>]) -> Timing {
     let block = &texts[index];
     if before[index] == Some(index) {
         let (few, many) = LOOPS;
-        let [without, with] =
-            [few, many].map(|times| both_ways(&vec![block.clone(); times].concat()));
+        let repeated = |times| both_ways(&vec![block.clone(); times].concat());
         return Timing {
-            with,
-            without,
+            with: repeated(many),
+            without: repeated(few),
             times: (many - few) as f64,
         };
     }
@@ -171,15 +186,21 @@ fn both_ways(lines: &[String]) -> [String; 2] {
 mod tests {
     use super::*;
 
+    /// Block 0 runs three times, then comes block 1.
     #[test]
     fn a_block_is_timed_behind_what_usually_precedes_it_and_a_loop_as_such() {
+        let blocks = vec![Vec::new(); 2];
+        let runs = vec![
+            (false, None, 0, 1),
+            (false, Some(0), 0, 2),
+            (true, Some(0), 1, 1),
+        ];
+        let before = usual_predecessors(&Record { blocks, runs });
         let texts = [vec!["a".to_owned()], vec!["b".to_owned()]];
-        let behind = timing(1, &texts, &[None, Some(0)]);
+        let behind = timing(1, &texts, &before);
         assert!(behind.with[0].starts_with("a\nb\n") && behind.without[0].starts_with("a\nmov"));
-        let looping = timing(0, &texts, &[Some(0), None]);
-        assert_eq!(
-            (looping.with[0].matches("a\n").count(), looping.times),
-            (24, 16.0)
-        );
+        let looping = timing(0, &texts, &before);
+        let count = looping.with[0].matches("a\n").count();
+        assert_eq!((count, looping.times), (24, 16.0));
     }
 }

@@ -1,61 +1,108 @@
-//! One case in QEMU: what each of its stages costs.
+//! The cases that `benchmark-cases` (in `tests`) writes, each in QEMU: what its stages cost.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::ops::AddAssign;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use serde::Deserialize;
 
-use super::cases::{Case, Work};
 use super::cycles::Model;
-use super::record::Record;
 use super::stages::Stages;
-use crate::{artifacts, process};
+use crate::process::{self, command};
+use crate::{artifacts, toolchain};
 
 /// The emulator, up to how scripts are handed to the image.
 const QEMU: &str = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial none \
     -d plugin -semihosting-config";
 
-/// Executed instructions, and what LLVM's model of the core makes of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// One script, as `benchmark-cases` describes it.
+#[derive(Deserialize)]
+pub struct Case {
+    pub work: Work,
+    file: PathBuf,
+    /// Columns and rows of the frame, or of the frames that the model is for.
+    pub size: [u64; 2],
+    /// Pixel format of that frame: `rgb565`, `yuv422` or `mono`.
+    pub format: String,
+}
+
+/// What a case runs.
+#[derive(Deserialize)]
+pub enum Work {
+    /// One frame, from its first row to the force; what is special about it, empty for the usual
+    /// one.
+    Frame(String),
+    /// One inference of a model with these layer widths.
+    Network(Vec<u64>),
+    /// The network of a model that tells places, and so many steps from its answer.
+    Steps(u64),
+    /// The threshold's table of 64 KiB, made once for each threshold.
+    Table,
+}
+
+/// Writes all scripts into a folder.
+pub fn cases(folder: &Path) -> Result<Vec<Case>> {
+    let mut command = std::process::Command::new(artifacts::benchmark_cases()?);
+    let lines = process::output(command.current_dir(toolchain::at("")).arg(folder))?;
+    let cases: Result<_, _> = lines.lines().map(serde_json::from_str).collect();
+    cases.context("what benchmark-cases says")
+}
+
+/// Executed instructions, exactly, and what LLVM's model of the core makes of them in memory without
+/// wait states: not a number without LLVM.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
-    /// Exact.
     pub instructions: u64,
-    /// Modelled, in memory without wait states; not a number without LLVM.
     pub cycles: f64,
 }
 
-impl Cost {
-    /// Of some costs together.
-    pub fn sum<'c>(costs: impl Iterator<Item = &'c Cost>) -> Cost {
-        costs.fold(Cost::default(), |sum, cost| Cost {
-            instructions: sum.instructions + cost.instructions,
-            cycles: sum.cycles + cost.cycles,
-        })
+impl AddAssign for Cost {
+    fn add_assign(&mut self, other: Cost) {
+        self.instructions += other.instructions;
+        self.cycles += other.cycles;
+    }
+}
+
+/// The costs of stages.
+#[derive(Default)]
+pub struct Costs(BTreeMap<&'static str, Cost>);
+
+impl Costs {
+    pub fn get(&self, stage: &str) -> Option<Cost> {
+        self.0.get(stage).copied()
+    }
+
+    /// Of some stages together, or of all when none is named.
+    pub fn sum(&self, stages: &[&str]) -> Cost {
+        let mut sum = Cost::default();
+        for (stage, cost) in &self.0 {
+            if stages.is_empty() || stages.contains(stage) {
+                sum += *cost;
+            }
+        }
+        sum
     }
 }
 
 /// What one case took.
 pub struct Measured {
-    /// The case.
     pub case: Case,
-    /// Cost of each stage.
-    pub stages: BTreeMap<&'static str, Cost>,
+    pub stages: Costs,
     /// What happens once the last band of rows is there.
-    pub last_band: Cost,
-    /// The loops of the network that multiply.
-    pub inner_loop: Cost,
+    pub last_band: Costs,
+    /// What runs more often than a network has neurons: its multiplications.
+    pub inner_loop: Costs,
 }
 
-impl Measured {
-    /// Everything together.
-    pub fn total(&self) -> Cost {
-        Cost::sum(self.stages.values())
-    }
-
-    /// Some stages together.
-    pub fn of(&self, stages: &[&str]) -> Cost {
-        Cost::sum(stages.iter().filter_map(|stage| self.stages.get(stage)))
-    }
+/// What the plugin (`xtask/instruction-counter`) recorded of one run.
+#[derive(Deserialize)]
+pub struct Record {
+    /// The instructions of each block, by their addresses, in order.
+    pub blocks: Vec<Vec<u64>>,
+    /// Whether the last band of rows was there, the block before, the block, and how often it ran
+    /// after that; the first after a call has none before.
+    pub runs: Vec<(bool, Option<usize>, usize, u64)>,
 }
 
 /// The image with all that is needed to measure cases on it.
@@ -87,96 +134,71 @@ impl Bench {
             Some(model) => model.cycles(&record)?,
             None => vec![f64::NAN; record.blocks.len()],
         };
-        let everything = |_: u64, _: &str| true;
-        let last_band = self.costs(&record, true, &cycles, everything)?;
-        let mut inner_loop = Cost::default();
-        if let Work::Network(widths) = &case.work {
-            // What runs more often than there are neurons multiplies. An instruction may lie in
-            // several blocks: the first round of a loop is one with what comes before it.
-            let (executions, neurons) = (record.executions(), widths[1..].iter().sum());
-            let multiplies =
-                |address: u64, stage: &str| stage == "network" && executions[&address] > neurons;
-            inner_loop = Cost::sum(self.costs(&record, false, &cycles, multiplies)?.values());
-        }
-        Ok(Measured {
-            stages: self.costs(&record, false, &cycles, everything)?,
-            last_band: Cost::sum(last_band.values()),
-            inner_loop,
+        let mut measured = Measured {
             case,
-        })
+            stages: Costs::default(),
+            last_band: Costs::default(),
+            inner_loop: Costs::default(),
+        };
+        let neurons = match &measured.case.work {
+            Work::Network(widths) => widths[1..].iter().sum(),
+            _ => u64::MAX,
+        };
+        // An instruction may lie in several blocks: the first round of a loop is one with what comes
+        // before it.
+        let mut executions = BTreeMap::<u64, u64>::new();
+        for (_, _, block, count) in &record.runs {
+            for address in &record.blocks[*block] {
+                *executions.entry(*address).or_default() += count;
+            }
+        }
+        for &(is_last_band, _, block, instructions) in &record.runs {
+            let addresses = &record.blocks[block];
+            // A block that the compiler made of several stages is shared by their instructions.
+            let cycles = cycles[block] * instructions as f64 / addresses.len() as f64;
+            for address in addresses {
+                let Some(stage) = self.stages.stage(*address)? else {
+                    continue;
+                };
+                let multiplies = stage == "network" && executions[address] > neurons;
+                for (costs, counts) in [
+                    (&mut measured.stages, true),
+                    (&mut measured.last_band, is_last_band),
+                    (&mut measured.inner_loop, multiplies),
+                ] {
+                    if counts {
+                        *costs.0.entry(stage).or_default() += Cost {
+                            instructions,
+                            cycles,
+                        };
+                    }
+                }
+            }
+        }
+        Ok(measured)
     }
 
     fn record(&self, case: &Case) -> Result<Record> {
         let (log, results) = (self.folder.join("record"), self.folder.join("results"));
         let (script, results) = (case.file.display(), results.display());
         let arguments = format!("arg=hivtac-qemu-image,arg={script},arg={results}");
-        let mut command = process::command(QEMU);
-        command.arg(format!("enable=on,target=native,{arguments}"));
-        command.arg("-kernel").arg(&self.image);
-        command.arg("-plugin").arg(&self.plugin).arg("-D").arg(&log);
-        process::output(&mut command)?;
-        Record::parse(&process::read(&log)?)
-    }
-
-    /// What each stage costs, in all or in the last band, of the instructions that count.
-    fn costs(
-        &mut self,
-        record: &Record,
-        only_last_band: bool,
-        cycles: &[f64],
-        counts: impl Fn(u64, &str) -> bool,
-    ) -> Result<BTreeMap<&'static str, Cost>> {
-        let mut stages = BTreeMap::<_, Cost>::new();
-        let blocks = record
-            .blocks
-            .iter()
-            .zip(record.counts(only_last_band))
-            .zip(cycles);
-        for ((block, count), cycles) in blocks.filter(|((_, count), _)| *count > 0) {
-            // A block that the compiler made of several stages is shared by their instructions.
-            let cycles = cycles * count as f64 / block.len() as f64;
-            for address in block {
-                let stage = self.stages.stage(*address)?;
-                if let Some(stage) = stage.filter(|stage| counts(*address, stage)) {
-                    let sum = stages.entry(stage).or_default();
-                    *sum = Cost::sum(
-                        [
-                            *sum,
-                            Cost {
-                                instructions: count,
-                                cycles,
-                            },
-                        ]
-                        .iter(),
-                    );
-                }
-            }
-        }
-        Ok(stages)
+        let mut qemu = command(QEMU);
+        qemu.arg(format!("enable=on,target=native,{arguments}"));
+        qemu.arg("-kernel").arg(&self.image);
+        qemu.arg("-plugin").arg(&self.plugin).arg("-D").arg(&log);
+        process::output(&mut qemu)?;
+        let record = serde_json::from_str(&process::read(&log)?);
+        record.with_context(|| format!("what the plugin wrote: {}", log.display()))
     }
 }
 
 /// The version of the plugin interface that this QEMU accepts: 1 before QEMU 9, 2 from then on.
 fn plugin_version() -> Result<u32> {
-    let text = process::output(&mut process::command("qemu-system-arm --version"))?;
-    let major = major_version(&text).with_context(|| format!("no version in `{text}`"))?;
+    let text = process::output(&mut command("qemu-system-arm --version"))?;
+    // `QEMU emulator version 7.2.22 (Debian …`
+    let version = text
+        .split_once("version ")
+        .and_then(|(_, rest)| rest.split('.').next());
+    let major: u32 = version.context("no version of QEMU")?.parse()?;
     Ok(if major < 9 { 1 } else { 2 })
-}
-
-fn major_version(text: &str) -> Option<u32> {
-    let (_, version) = text.split_once("version ")?;
-    version.split('.').next()?.parse().ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_version_of_qemu_is_found() {
-        let debian = "QEMU emulator version 7.2.22 (Debian 1:7.2+dfsg-7+deb12u18+b3)\nCopyright";
-        assert_eq!(major_version(debian), Some(7));
-        assert_eq!(major_version("QEMU emulator version 10.0.2"), Some(10));
-        assert_eq!(major_version("something else"), None);
-    }
 }

@@ -3,11 +3,9 @@
 //! core.
 
 pub mod board;
-mod cases;
 mod cycles;
 mod lowering;
 mod measure;
-mod record;
 mod stages;
 mod tables;
 
@@ -20,8 +18,6 @@ use serde::{Deserialize, Serialize};
 use crate::{artifacts, packages, process, size, toolchain};
 use tables::Item;
 
-/// The command that makes the baseline what is measured now.
-const REFRESH: &str = "cargo xtask bench --write-baseline";
 const BASELINE: &str = "xtask/baseline.json";
 const DOCUMENT: &str = "docs/results/performance.md";
 
@@ -50,30 +46,28 @@ impl Bench {
         }
         packages::ensure_qemu()?;
         let folder = toolchain::work_folder("bench")?;
-        let mut bench = measure::Bench::new(artifacts::qemu_image()?, folder.clone())?;
-        let cases = cases::write(&folder)?.into_iter();
-        let measured = cases
-            .map(|case| bench.measure(case))
-            .collect::<Result<Vec<_>>>()?;
-        let items = tables::items(&measured);
+        let cases = measure::cases(&folder)?.into_iter();
+        let mut bench = measure::Bench::new(artifacts::qemu_image()?, folder)?;
+        let measured: Result<Vec<_>> = cases.map(|case| bench.measure(case)).collect();
+        let measured = measured?;
+        let items: Vec<Item> = measured.iter().flat_map(tables::items).collect();
         let tables = tables::all(&items, &measured);
         match self.json {
             true => println!("{}", serde_json::json!({ "items": items })),
             false => process::print(&tables),
         }
+        let (document, baseline) = (toolchain::at(DOCUMENT), toolchain::at(BASELINE));
         if self.write_docs {
-            let document = process::read(&toolchain::at(DOCUMENT))?;
-            let document = replaced(&document, "bench", &tables)?;
-            let document = replaced(&document, "memory", &size::memories()?)?;
-            process::write(&toolchain::at(DOCUMENT), &document)?;
+            let text = replaced(&process::read(&document)?, "bench", &tables)?;
+            let text = replaced(&text, "memory", &size::memories()?)?;
+            process::write(&document, &text)?;
         }
         let now = Baseline::of(&items)?;
         if self.write_baseline {
             let text = serde_json::to_string_pretty(&now)? + "\n";
-            return process::write(&toolchain::at(BASELINE), &text);
+            return process::write(&baseline, &text);
         }
-        let committed = process::read(&toolchain::at(BASELINE))?;
-        let committed: Baseline = serde_json::from_str(&committed).context(BASELINE)?;
+        let committed: Baseline = serde_json::from_str(&process::read(&baseline)?)?;
         committed.check(&now)
     }
 }
@@ -89,10 +83,15 @@ struct Baseline {
 
 impl Baseline {
     fn of(items: &[Item]) -> Result<Baseline> {
-        let counts = items.iter().map(|item| (item.label(), item.instructions));
+        let mut instructions = BTreeMap::new();
+        for item in items {
+            let label = format!("{}, {} {}", item.item, item.frame, item.format);
+            instructions.insert(label, item.instructions);
+        }
+        let compiler = toolchain::compiler()?;
         Ok(Baseline {
-            compiler: toolchain::compiler()?,
-            instructions: counts.collect(),
+            compiler,
+            instructions,
         })
     }
 
@@ -101,27 +100,28 @@ impl Baseline {
         let labels = self.instructions.keys().chain(now.instructions.keys());
         let mut changes = 0;
         for label in labels.collect::<BTreeSet<_>>() {
-            let counts = [self, now].map(|counts| counts.instructions.get(label).copied());
+            let counts = [self, now].map(|it| it.instructions.get(label));
             if counts[0] != counts[1] {
                 changes += 1;
-                let [before, now] =
-                    counts.map(|count| count.map_or("none".into(), tables::decimal));
-                process::say(&format!("{label}: {before} → {now} instructions"));
+                process::say(&format!(
+                    "{label}: {:?} → {:?} instructions",
+                    counts[0], counts[1]
+                ));
             }
         }
-        let (compiler, all) = (&now.compiler, now.instructions.len());
-        if self.compiler != *compiler {
+        if self.compiler != now.compiler {
             process::say(&format!(
-                "instruction counts are not gated: the baseline is for {}, this is {compiler}",
-                self.compiler
+                "instruction counts are not gated: the baseline is for {}, this is {}",
+                self.compiler, now.compiler
             ));
             return Ok(());
         }
         ensure!(
             changes == 0,
             "{changes} instruction counts differ from the baseline's; when they are meant to, \
-             `{REFRESH}` and commit it"
+             `cargo xtask bench --write-baseline` and commit it"
         );
+        let all = now.instructions.len();
         process::say(&format!("all {all} instruction counts are the baseline's"));
         Ok(())
     }
@@ -143,18 +143,15 @@ fn replaced(document: &str, name: &str, text: &str) -> Result<String> {
 mod tests {
     use super::*;
 
-    fn baseline(compiler: &str, counts: &[(&str, f64)]) -> Baseline {
-        let counts = counts
-            .iter()
-            .map(|(label, count)| ((*label).to_owned(), *count));
-        Baseline {
-            compiler: compiler.to_owned(),
-            instructions: counts.collect(),
-        }
-    }
-
     #[test]
     fn one_instruction_or_item_more_or_less_is_refused_of_the_same_compiler() {
+        let baseline = |compiler: &str, counts: &[(&str, f64)]| Baseline {
+            compiler: compiler.to_owned(),
+            instructions: counts
+                .iter()
+                .map(|(label, count)| ((*label).into(), *count))
+                .collect(),
+        };
         let committed = baseline("rustc 1", &[("blobs", 100.0)]);
         assert!(committed.check(&committed).is_ok());
         let two = [("blobs", 100.0), ("mac", 1.0)];

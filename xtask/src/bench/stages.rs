@@ -54,12 +54,10 @@ impl Stages {
         let files = self
             .files(address)
             .map_err(|error| anyhow!("{address:#x}: {error}"))?;
+        // Assembly has no line table; its names say what it is.
+        let named = || stage_of_name(self.loader.find_symbol(address)?);
         let stage = match stage(&files) {
-            // Assembly has no line table; its names say what it is.
-            Some("library") => {
-                let name = self.loader.find_symbol(address);
-                name.and_then(stage_of_name).or(Some("library"))
-            }
+            Some("library") => named().or(Some("library")),
             stage => stage,
         };
         self.known.insert(address, stage);
@@ -122,33 +120,24 @@ fn stage_of_name(name: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    fn stage_of(files: &[&str]) -> Option<&'static str> {
-        stage(
-            &files
-                .iter()
-                .map(|&file| file.to_owned())
-                .collect::<Vec<_>>(),
-        )
-    }
-
     #[test]
     fn the_innermost_function_of_the_sensing_decides() {
-        let core = "/rustc/1/library/core/src/slice.rs";
-        let (label, scanner) = ("/p/markers/src/label.rs", "/p/markers/src/scanner.rs");
-        let units = "/p/terms/src/units.rs";
-        assert_eq!(
-            stage_of(&[core, label, scanner]),
-            Some("runs, labels, moments")
+        let (core, scanner) = (
+            "/rustc/1/library/core/src/slice.rs",
+            "/p/markers/src/scanner.rs",
         );
-        assert_eq!(stage_of(&[core, scanner]), Some("pipeline"));
-        assert_eq!(stage_of(&[units, label]), Some("runs, labels, moments"));
-        assert_eq!(
-            stage_of(&["/p/markers/src/rules/shape.rs"]),
-            Some("markers")
-        );
-        assert_eq!([stage_of(&[]), stage_of(&[core])], [Some("library"); 2]);
-        assert_eq!(stage_of(&["/p/tests/src/golden.rs"]), None);
-        assert_eq!(stage_of_name("hivtac_threshold_row"), Some("threshold"));
+        let (label, units) = ("/p/markers/src/label.rs", "/p/terms/src/units.rs");
+        for (files, expected) in [
+            (&[core, label, scanner][..], Some("runs, labels, moments")),
+            (&[core, scanner], Some("pipeline")),
+            (&[units, label], Some("runs, labels, moments")),
+            (&["/p/markers/src/rules/shape.rs"], Some("markers")),
+            (&[core], Some("library")),
+            (&["/p/tests/src/golden.rs"], None),
+        ] {
+            let files: Vec<String> = files.iter().map(|&file| file.to_owned()).collect();
+            assert_eq!(stage(&files), expected, "{files:?}");
+        }
     }
 
     #[test]
@@ -156,15 +145,14 @@ mod tests {
         let stages = ORDER.into_iter().chain(["caller"]);
         let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
         listed.sort();
-        let modules = |package: &&str| {
+        let mut found = Vec::new();
+        for package in PACKAGES {
             let folder = crate::toolchain::at(package).join("src");
-            let name = |entry: std::io::Result<std::fs::DirEntry>| {
+            for entry in folder.read_dir().unwrap() {
                 let path = entry.unwrap().path();
-                format!("{package}/{}", path.file_stem().unwrap().to_str().unwrap())
-            };
-            folder.read_dir().unwrap().map(name).collect::<Vec<_>>()
-        };
-        let mut found: Vec<String> = PACKAGES.iter().flat_map(modules).collect();
+                found.push(format!("{package}/{}", path.file_stem().unwrap().display()));
+            }
+        }
         found.sort();
         assert_eq!(listed, found);
     }

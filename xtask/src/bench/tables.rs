@@ -5,8 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::cases::Work;
-use super::measure::{Cost, Measured};
+use super::measure::{Cost, Measured, Work};
 use super::stages::ORDER;
 use crate::size::grouped;
 
@@ -15,7 +14,7 @@ const CLOCK_MHZ: f64 = 480.0;
 
 /// One measured item. Its three numbers are per frame, or per inference; those of `mac` are per
 /// multiplication.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Serialize)]
 pub struct Item {
     /// `threshold`, `blobs`, `frame full`, `latency`, `network …`, `mac` or `table` (the
     /// threshold's, of 256 × 256 values); of a frame that is not the usual one, what it is follows
@@ -34,90 +33,70 @@ pub struct Item {
 }
 
 impl Item {
-    fn new(measured: &Measured, name: &str, cost: Cost, count: f64) -> Item {
+    fn new(measured: &Measured, item: String, cost: Cost, count: u64) -> Item {
         // Whole cycles, or thousandths of them for one multiplication.
-        let steps = if count > 1.0 { 1000.0 } else { 1.0 };
-        let each = |number: f64| (number / count * steps).round() / steps;
+        let steps = if count > 1 { 1000.0 } else { 1.0 };
+        let each = |number: f64| (number / count as f64 * steps).round() / steps;
         let instructions = cost.instructions as f64;
+        let ([width, height], format) = (measured.case.size, measured.case.format.clone());
         Item {
-            item: name.to_owned(),
-            frame: measured.case.frame(),
-            format: measured.case.format.clone(),
+            item,
+            frame: format!("{width}x{height}"),
+            format,
             instructions: each(instructions),
             modelled_cycles: each(cost.cycles),
             floor_cycles: each(instructions / 2.0),
         }
     }
 
-    /// What it is, in one line.
-    pub fn label(&self) -> String {
-        format!("{}, {} {}", self.item, self.frame, self.format)
-    }
-
     fn row(&self) -> String {
-        let Item {
-            item,
-            frame,
-            format,
-            instructions,
-            modelled_cycles: cycles,
-            floor_cycles,
-        } = self;
-        let [counted, modelled, floor] = [*instructions, *cycles, *floor_cycles].map(decimal);
-        let start = format!("| {item} | {frame} | {format} | {counted} | {modelled} | {floor}");
+        let (item, frame, cycles) = (&self.item, &self.frame, self.modelled_cycles);
+        let numbers = cells([self.instructions, cycles, self.floor_cycles]);
+        let start = format!("| {item} | {frame} | {} |{numbers}", self.format);
         if item == "mac" || cycles.is_nan() {
-            return format!("{start} | | | |");
+            return format!("{start} | | |");
         }
         let sides = frame.split('x').filter_map(|side| side.parse::<f64>().ok());
-        let is_of_pixels = !item.starts_with("network") && !item.starts_with("latency");
-        let per_pixel = is_of_pixels.then(|| format!("{:.2}", cycles / sides.product::<f64>()));
+        let per_pixel = match item.starts_with("network") || item.starts_with("latency") {
+            true => String::new(),
+            false => format!("{:.2}", cycles / sides.product::<f64>()),
+        };
         let (time, rate) = (
             cycles / CLOCK_MHZ,
             decimal((CLOCK_MHZ * 1e6 / cycles).round()),
         );
-        format!(
-            "{start} | {} | {time:.1} | {rate} |",
-            per_pixel.unwrap_or_default()
-        )
+        format!("{start} {per_pixel} | {time:.1} | {rate} |")
     }
 }
 
-/// All items of all cases.
-pub fn items(measured: &[Measured]) -> Vec<Item> {
-    measured.iter().flat_map(items_of).collect()
-}
-
-fn items_of(measured: &Measured) -> Vec<Item> {
-    let total = measured.total();
-    let one = |name: &str| Item::new(measured, name, total, 1.0);
+/// All items of a case.
+pub fn items(measured: &Measured) -> Vec<Item> {
+    let stages = &measured.stages;
+    let one = |name: String, cost| Item::new(measured, name, cost, 1);
+    let whole = |name: String| one(name, stages.sum(&[]));
     match &measured.case.work {
         Work::Frame(special) => {
             let comma = if special.is_empty() { "" } else { ", " };
-            let costs = [
-                ("threshold", measured.of(&["threshold"])),
-                ("blobs", measured.of(&["dilation", "runs, labels, moments"])),
-                ("frame full", total),
-                ("latency", measured.last_band),
-            ];
-            let item =
-                |(part, cost)| Item::new(measured, &format!("{part}{comma}{special}"), cost, 1.0);
-            costs.map(item).into()
+            let item = |part, cost| one(format!("{part}{comma}{special}"), cost);
+            let blobs = stages.sum(&["dilation", "runs, labels, moments"]);
+            vec![
+                item("threshold", stages.sum(&["threshold"])),
+                item("blobs", blobs),
+                item("frame full", stages.sum(&[])),
+                item("latency", measured.last_band.sum(&[])),
+            ]
         }
-        Work::Table => vec![one("table")],
-        Work::Steps(1) => vec![one("network and 1 step")],
-        Work::Steps(steps) => vec![one(&format!("network and {steps} steps"))],
+        Work::Table => vec![whole("table".to_owned())],
+        Work::Steps(1) => vec![whole("network and 1 step".to_owned())],
+        Work::Steps(steps) => vec![whole(format!("network and {steps} steps"))],
         Work::Network(widths) => {
             let names: Vec<String> = widths.iter().map(u64::to_string).collect();
-            let mut items = vec![one(&format!("network {}", names.join("-")))];
+            let mut items = vec![whole(format!("network {}", names.join("-")))];
             // The loops of narrow layers say little about the loop.
             if widths.iter().any(|&width| width >= 128) {
-                let count: u64 = widths.windows(2).map(|pair| pair[0] * pair[1]).sum();
-                items.push(Item::new(
-                    measured,
-                    "mac",
-                    measured.inner_loop,
-                    count as f64,
-                ));
+                let count = widths.windows(2).map(|pair| pair[0] * pair[1]).sum();
+                let cost = measured.inner_loop.sum(&[]);
+                items.push(Item::new(measured, "mac".to_owned(), cost, count));
             }
             items
         }
@@ -135,7 +114,7 @@ pub fn all(items: &[Item], measured: &[Measured]) -> String {
     }
     for measured in measured {
         let is_usual = matches!(&measured.case.work, Work::Frame(special) if special.is_empty());
-        if is_usual && measured.case.frame() == "320x240" {
+        if is_usual && measured.case.size == [320, 240] {
             let (format, stages) = (&measured.case.format, stages(measured));
             let _ = write!(
                 text,
@@ -150,22 +129,28 @@ pub fn all(items: &[Item], measured: &[Measured]) -> String {
 const FROM_MOMENTS: [&str; 5] = ["markers", "features", "network", "angles, force", "library"];
 
 fn stages(measured: &Measured) -> String {
-    let head = "| stage | instructions | modelled cycles | floor |\n|---|---:|---:|---:|\n";
+    let stages = &measured.stages;
     let known = ORDER
         .iter()
-        .filter_map(|stage| Some((*stage, *measured.stages.get(stage)?)));
+        .filter_map(|stage| Some((*stage, stages.get(stage)?)));
     let sums = [
-        ("from the moments to the force", measured.of(&FROM_MOMENTS)),
-        ("together", measured.total()),
+        ("from the moments to the force", stages.sum(&FROM_MOMENTS)),
+        ("together", stages.sum(&[])),
     ];
-    let row = |(stage, cost): (&str, Cost)| {
+    let mut text = "| stage | instructions | modelled cycles | floor |\n".to_owned();
+    text += "|---|---:|---:|---:|\n";
+    for (stage, cost) in known.chain(sums) {
         let counted = cost.instructions as f64;
-        let [counted, cycles, floor] =
-            [counted, cost.cycles, counted / 2.0].map(|number| decimal(number.round()));
-        format!("| {stage} | {counted} | {cycles} | {floor} |\n")
-    };
-    let rows: String = known.chain(sums).map(row).collect();
-    format!("{head}{rows}")
+        let numbers = [counted, cost.cycles, counted / 2.0].map(f64::round);
+        let _ = writeln!(text, "| {stage} |{}", cells(numbers));
+    }
+    text
+}
+
+fn cells(numbers: [f64; 3]) -> String {
+    numbers
+        .map(|number| format!(" {} |", decimal(number)))
+        .concat()
 }
 
 /// A number that is not negative, with a comma after each three digits, and with up to three
@@ -174,14 +159,13 @@ pub fn decimal(number: f64) -> String {
     if number.is_nan() {
         return "–".to_owned();
     }
-    let thousandths = (number * 1000.0).round() as u64;
-    let whole = grouped(thousandths / 1000);
-    match thousandths % 1000 {
-        0 => whole,
-        rest => format!("{whole}.{rest:03}")
-            .trim_end_matches('0')
-            .to_owned(),
-    }
+    let text = format!("{number:.3}");
+    let (whole, rest) = text.split_at(text.len() - 4);
+    let whole = grouped(whole.parse().unwrap_or(0));
+    format!(
+        "{whole}{}",
+        rest.trim_end_matches('0').trim_end_matches('.')
+    )
 }
 
 #[cfg(test)]
@@ -198,10 +182,9 @@ mod tests {
             modelled_cycles: 96_000.0,
             floor_cycles: 76_800.5,
         };
-        assert!(
-            item.row()
-                .ends_with("| 96,000 | 76,800.5 | 1.25 | 200.0 | 5,000 |")
-        );
+        let row = item.row();
+        let end = "| 96,000 | 76,800.5 | 1.25 | 200.0 | 5,000 |";
+        assert!(row.ends_with(end), "{row}");
         item.modelled_cycles = f64::NAN;
         assert!(item.row().ends_with("| – | 76,800.5 | | | |"));
         let json = serde_json::to_string(&item).unwrap();
