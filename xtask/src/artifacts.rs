@@ -30,13 +30,8 @@ pub enum Board {
 }
 
 /// Features of the firmware that each seed one bug which the rig must notice.
-const SEEDED_BUGS: [&str; 5] = [
-    "bug-dmamux-request",
-    "bug-polarity",
-    "bug-camera-register",
-    "bug-half-buffer",
-    "bug-usb-clock",
-];
+const SEEDED_BUGS: &str =
+    "bug-dmamux-request bug-polarity bug-camera-register bug-half-buffer bug-usb-clock";
 
 /// The programs that the tests of the rig and those across rooms run.
 pub struct Programs {
@@ -54,7 +49,7 @@ impl Programs {
             let elf = build(&mut command, "hivtac-firmware")?;
             copy(&elf, &bugs.join(name).with_extension("elf"))
         };
-        for bug in SEEDED_BUGS {
+        for bug in SEEDED_BUGS.split(' ') {
             keep(firmware_command(Board::Weact, bug), bug)?;
         }
         let mut yuv422 = firmware_command(Board::Weact, "");
@@ -62,10 +57,8 @@ impl Programs {
         keep(yuv422, "yuv422")?;
         for bug in ["", "bug-polarity", "bug-camera-register"] {
             let name = format!("openmv-h7-{bug}");
-            keep(
-                firmware_command(Board::OpenmvH7, bug),
-                name.trim_end_matches('-'),
-            )?;
+            let command = firmware_command(Board::OpenmvH7, bug);
+            keep(command, name.trim_end_matches('-'))?;
         }
         // Last, so that what cargo leaves behind is the firmware without a bug.
         let firmware = firmware(Board::Weact)?;
@@ -74,9 +67,8 @@ impl Programs {
 
     /// Tells a test runner where they lie.
     pub fn name_to(&self, command: &mut Command) {
-        command
-            .env("HIVTAC_ELF", &self.firmware)
-            .env("HIVTAC_BUG_ELFS", &self.bugs);
+        command.env("HIVTAC_ELF", &self.firmware);
+        command.env("HIVTAC_BUG_ELFS", &self.bugs);
     }
 }
 
@@ -97,12 +89,12 @@ pub fn firmware_command(board: Board, feature: &str) -> Command {
 
 /// The host tool, as it is installed.
 pub fn host_tool() -> Result<PathBuf> {
-    kept(&mut host_command("hivtac"), "tool")
+    kept(host_command("hivtac"), "tool")
 }
 
 /// The same with all that `hivtac serve` can, which the tool of users has only when they ask for it.
 pub fn serving_tool() -> Result<PathBuf> {
-    kept(&mut serving_command(), "serving-tool")
+    kept(serving_command(), "serving-tool")
 }
 
 fn serving_command() -> Command {
@@ -113,33 +105,19 @@ fn serving_command() -> Command {
 
 /// The host tool in a folder of its own: cargo puts that with other features in its place, which
 /// another step may be running.
-fn kept(command: &mut Command, folder: &str) -> Result<PathBuf> {
+fn kept(mut command: Command, folder: &str) -> Result<PathBuf> {
     static BUILDING: Mutex<()> = Mutex::new(());
     let _one_at_a_time = BUILDING.lock();
     let kept = work_folder(folder)?.join("hivtac");
     // By another name first: a program that runs cannot be written over.
     let fresh = kept.with_extension("new");
-    copy(&build(command, "hivtac")?, &fresh)?;
+    copy(&build(&mut command, "hivtac")?, &fresh)?;
     std::fs::rename(&fresh, &kept).with_context(|| format!("renaming {}", fresh.display()))?;
     Ok(kept)
 }
 
-/// The calibration.
-pub fn calibrate() -> Result<PathBuf> {
-    host_program("hivtac-calibrate")
-}
-
-/// What writes the scripts of the benchmarks.
-pub fn benchmark_cases() -> Result<PathBuf> {
-    host_program("benchmark-cases")
-}
-
-/// The rig.
-pub fn rig() -> Result<PathBuf> {
-    host_program("hivtac-rig")
-}
-
-fn host_program(name: &str) -> Result<PathBuf> {
+/// A program that runs on this computer: the rig, the calibration, what writes benchmarks.
+pub fn host_program(name: &str) -> Result<PathBuf> {
     build(&mut host_command(name), name)
 }
 
@@ -260,23 +238,4 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     let copied = std::fs::copy(from, to);
     copied.with_context(|| format!("copying {} to {}", from.display(), to.display()))?;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use serde_json::json;
-
-    use super::*;
-
-    #[test]
-    fn programs_and_libraries_are_found_in_the_messages_of_cargo() {
-        let mut message = json!({
-            "reason": "compiler-artifact", "target": { "name": "it" },
-            "filenames": ["/t/it.so"], "executable": "/t/it"
-        });
-        assert_eq!(artifact(&message, "it"), Some(PathBuf::from("/t/it")));
-        assert_eq!(artifact(&message, "another"), None);
-        message["executable"] = Value::Null;
-        assert_eq!(artifact(&message, "it"), Some(PathBuf::from("/t/it.so")));
-    }
 }

@@ -10,7 +10,6 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
-use serde::Deserialize;
 
 use crate::artifacts::{self, Board};
 use crate::{process, toolchain};
@@ -35,9 +34,10 @@ impl Demo {
         let built = start.elapsed().as_secs_f64();
         let folder = toolchain::work_folder("demo")?;
         let files = ["truth.jsonl", "arrivals.jsonl", "rig.log"];
-        let [truth, arrivals, log] = files.map(|name| folder.join(name));
-        if let Err(error) = self.show(&programs, &truth, &arrivals, &log) {
-            let text = std::fs::read_to_string(&log).unwrap_or_default();
+        let logs = files.map(|name| folder.join(name));
+        let [truth, _, log] = &logs;
+        if let Err(error) = self.show(&programs, &logs) {
+            let text = std::fs::read_to_string(log).unwrap_or_default();
             let lines: Vec<&str> = text.lines().collect();
             let last = lines[lines.len().saturating_sub(20)..].join("\n");
             eprintln!("\nThe last lines of the rig's log:\n{last}");
@@ -57,20 +57,18 @@ impl Demo {
         );
         std::thread::scope(|scope| {
             let firmware = scope.spawn(|| artifacts::firmware(self.board));
-            let (rig, tool) = (artifacts::rig(), artifacts::host_tool());
+            let (rig, tool) = (
+                artifacts::host_program("hivtac-rig"),
+                artifacts::host_tool(),
+            );
             let firmware = firmware.join();
             let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))?;
             Ok([firmware?, rig?, tool?])
         })
     }
 
-    fn show(
-        &self,
-        programs: &[PathBuf; 3],
-        truth: &Path,
-        arrivals: &Path,
-        log: &Path,
-    ) -> Result<()> {
+    fn show(&self, programs: &[PathBuf; 3], logs: &[PathBuf; 3]) -> Result<()> {
+        let [truth, arrivals, log] = logs;
         let [firmware, rig, tool] = programs;
         let (frames, board) = (self.frames.to_string(), self.board.to_possible_value());
         let board = board.context("a board without a name")?;
@@ -105,37 +103,25 @@ impl Rig {
     fn start(command: &mut Command, log: &Path) -> Result<Rig> {
         process::say(&format!("+ {command:?}"));
         let file = File::create(log).with_context(|| format!("creating {}", log.display()))?;
-        command
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(file);
-        let process = command
-            .spawn()
-            .with_context(|| format!("starting {command:?}"))?;
+        command.stdin(Stdio::null()).stdout(Stdio::piped());
+        let process = command.stderr(file).spawn().context("starting the rig")?;
         let port = String::new();
         let mut rig = Rig { process, port };
         let stdout = rig.process.stdout.take().context("the rig's output")?;
-        // `ready … pty=PATH`
         let mut line = String::new();
         BufReader::new(stdout).read_line(&mut line)?;
-        let path = line
-            .strip_prefix("ready ")
-            .and_then(|rest| rest.split_once("pty="));
-        let (_, path) = path.with_context(|| format!("the rig did not get ready: `{line}`"))?;
-        rig.port = path.trim_end().to_owned();
+        // `ready … pty=PATH`
+        let path = line.trim_end().split_once("pty=").map(|(_, path)| path);
+        let path = path.with_context(|| format!("the rig did not get ready: `{line}`"))?;
+        rig.port = path.to_owned();
         Ok(rig)
     }
 
     /// Waits for the rig to end by itself, as it does when its client has left.
     fn finish(mut self) -> Result<()> {
-        for _ in 0..1500 {
-            if let Some(status) = self.process.try_wait()? {
-                ensure!(status.success(), "the rig failed ({status})");
-                return Ok(());
-            }
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
-        bail!("the rig did not end within 30 s");
+        let status = self.process.wait()?;
+        ensure!(status.success(), "the rig failed ({status})");
+        Ok(())
     }
 }
 
@@ -147,31 +133,26 @@ impl Drop for Rig {
     }
 }
 
-/// A line of the rig's logs.
-#[derive(Deserialize)]
-struct Line {
-    frame: u64,
-    time_s: f64,
-}
-
 /// When, by frame.
-fn times(log: &Path) -> Result<BTreeMap<u64, f64>> {
-    let text = process::read(log)?;
-    let lines = text.lines().map(serde_json::from_str);
-    let times = lines.map(|line| line.map(|Line { frame, time_s }| (frame, time_s)));
-    let times: Result<_, _> = times.collect();
-    times.with_context(|| format!("reading {}", log.display()))
+type Times = BTreeMap<u64, f64>;
+
+/// As a log of the rig says it.
+fn times(log: &Path) -> Result<Times> {
+    let mut times = Times::new();
+    for line in process::read(log)?.lines() {
+        let line: serde_json::Value = serde_json::from_str(line)?;
+        let time = line["frame"].as_u64().zip(line["time_s"].as_f64());
+        let (frame, time_s) = time.with_context(|| format!("reading {line}"))?;
+        times.insert(frame, time_s);
+    }
+    Ok(times)
 }
 
 /// Frames a second that samples arrived of, by the middles of their exposures, and the mean time
 /// from there to the last byte of a sample on USB, ms.
-fn rate_and_latency(
-    exposed: &BTreeMap<u64, f64>,
-    arrived: &BTreeMap<u64, f64>,
-) -> Result<(f64, f64)> {
-    let both = arrived.iter();
-    let both = both.filter_map(|(frame, there)| Some((*exposed.get(frame)?, *there)));
-    let both: Vec<(f64, f64)> = both.collect();
+fn rate_and_latency(exposed: &Times, arrived: &Times) -> Result<(f64, f64)> {
+    let both = |(frame, there): (&u64, &f64)| Some((*exposed.get(frame)?, *there));
+    let both: Vec<(f64, f64)> = arrived.iter().filter_map(both).collect();
     let [(first, _), .., (last, _)] = both[..] else {
         bail!("fewer than two samples arrived");
     };
@@ -186,10 +167,10 @@ mod tests {
 
     #[test]
     fn rate_and_latency_are_those_of_frames_that_both_logs_tell_of() {
-        let exposed = BTreeMap::from([(7, 0.1), (8, 0.106), (9, 0.112)]);
-        let arrived = BTreeMap::from([(7, 0.105), (8, 0.113)]);
+        let exposed = Times::from([(7, 0.1), (8, 0.106), (9, 0.112)]);
+        let arrived = Times::from([(7, 0.105), (8, 0.113)]);
         let (rate_hz, latency_ms) = rate_and_latency(&exposed, &arrived).unwrap();
         assert!((rate_hz - 1.0 / 0.006).abs() < 1e-6 && (latency_ms - 6.0).abs() < 1e-9);
-        assert!(rate_and_latency(&exposed, &BTreeMap::new()).is_err());
+        assert!(rate_and_latency(&exposed, &Times::new()).is_err());
     }
 }

@@ -51,7 +51,11 @@ pub fn run() -> Result<()> {
 /// while building is not attacked, and is that of the other tests.
 fn build() -> Result<PathBuf> {
     let mut command = cargo("build --package hivtac-fuzz --bins --profile", "");
-    command.args([artifacts::TOOLS, "--target", &toolchain::host()?]);
+    command.args([
+        artifacts::TOOLS,
+        "--target",
+        &toolchain::rustc("--print host-tuple")?,
+    ]);
     let program = artifacts::build(command.env("RUSTFLAGS", COVERAGE), "model")?;
     Ok(program.with_file_name(""))
 }

@@ -11,7 +11,6 @@ mod report;
 mod size;
 mod test;
 mod toolchain;
-mod width;
 
 use std::process::ExitCode;
 

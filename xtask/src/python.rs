@@ -107,6 +107,6 @@ fn test(python: &Path, file: &str, tool: &Path, tally: &mut Tally) -> Result<()>
     command.env("HIVTAC_ELF", artifacts::firmware(Board::Weact)?);
     command
         .env("HIVTAC_TOOL", tool)
-        .env("HIVTAC_RIG", artifacts::rig()?);
+        .env("HIVTAC_RIG", artifacts::host_program("hivtac-rig")?);
     run_tests(&mut command, tally)
 }

@@ -111,10 +111,8 @@ impl Report {
         if result == "FAILED" {
             let said = std::fs::read(&log).unwrap_or_default();
             // At once, so that no line of another thread is in between.
-            println!(
-                "=== {name}\n{}\n=== {name}: {why}",
-                String::from_utf8_lossy(&said)
-            );
+            let said = String::from_utf8_lossy(&said);
+            println!("=== {name}\n{said}\n=== {name}: {why}");
         }
         let seconds = begin.elapsed().as_secs_f64();
         let mut steps = self.done();
@@ -125,15 +123,8 @@ impl Report {
             seconds,
             tally,
         });
-        let (total, bad) = (total(&steps), failed(&steps).len());
-        println!(
-            "{} {result}: {name}, {seconds:.1} s; so far {} steps ended, {bad} failed; {} tests \
-             passed, {} failed",
-            self.mark(number),
-            steps.len(),
-            total.passed,
-            total.failed
-        );
+        let (mark, so_far) = (self.mark(number), summary(&steps));
+        println!("{mark} {result}: {name}, {seconds:.1} s; so far: {so_far}");
     }
 
     /// Which step it is, and the time since the first began.
@@ -154,18 +145,15 @@ impl Report {
             let Tally { passed, failed } = step.tally;
             let tests = format!("{passed:>8}{failed:>8}");
             let tests = if passed + failed > 0 { &tests } else { "" };
-            println!(
-                "{:<34}{:>8}{:>9.1}{tests}",
-                step.name, step.result, step.seconds
-            );
+            let (name, result, seconds) = (step.name, step.result, step.seconds);
+            println!("{name:<34}{result:>8}{seconds:>9.1}{tests}");
         }
         for step in steps.iter().filter(|step| !step.why.is_empty()) {
             println!("{}: {}: {}", step.name, step.result, step.why);
         }
-        let (total, bad) = (total(&steps), failed(&steps));
-        println!("{} steps, {} failed", steps.len(), bad.len());
-        println!("{} passed, {} failed", total.passed, total.failed);
-        ensure!(bad.is_empty(), "failed: {}", bad.join("; "));
+        println!("{}", summary(&steps));
+        let failed = failed(&steps);
+        ensure!(failed.is_empty(), "failed: {}", failed.join("; "));
         Ok(())
     }
 }
@@ -175,11 +163,11 @@ fn failed(steps: &[Done]) -> Vec<&'static str> {
     failed.map(|step| step.name).collect()
 }
 
-fn total(steps: &[Done]) -> Tally {
-    Tally {
-        passed: steps.iter().map(|step| step.tally.passed).sum(),
-        failed: steps.iter().map(|step| step.tally.failed).sum(),
-    }
+fn summary(steps: &[Done]) -> String {
+    let passed: u64 = steps.iter().map(|step| step.tally.passed).sum();
+    let failed_tests: u64 = steps.iter().map(|step| step.tally.failed).sum();
+    let (all, failed) = (steps.len(), failed(steps).len());
+    format!("{all} steps, {failed} failed; tests: {passed} passed, {failed_tests} failed")
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use clap::Args;
 use crate::artifacts::{self, Board, Programs};
 use crate::report::{Report, Tally, run_tests};
 use crate::toolchain::{self, cargo};
-use crate::{bench, fuzz, packages, process, python, width};
+use crate::{bench, fuzz, packages, process, python};
 
 /// Options of `cargo xtask test`.
 #[derive(Args)]
@@ -85,10 +85,7 @@ impl Test {
     pub fn run(&self) -> Result<()> {
         let wanted = |steps: &'static [Step]| steps.iter().filter(|step| self.wants(step));
         let all = wanted(&FIRST).chain(wanted(&BESIDE)).count();
-        ensure!(
-            all > 0,
-            "no step has such a name; some are there only with `--all`"
-        );
+        ensure!(all > 0, "no step is called so; some need `--all`");
         if toolchain::has("clippy") {
             artifacts::lint_as_built();
         }
@@ -124,13 +121,10 @@ impl Test {
 
 impl Shared {
     fn build(&self) -> Result<()> {
-        let (programs, result) = match Programs::build() {
-            Ok(programs) => (Some(programs), Ok(())),
-            Err(error) => (None, Err(error)),
-        };
-        // Nobody else sets them.
-        let _ = self.programs.set(programs);
-        result
+        let built = Programs::build();
+        let problem = built.as_ref().err().map(|error| anyhow!("{error:#}"));
+        self.programs.get_or_init(|| built.ok());
+        problem.map_or(Ok(()), Err)
     }
 
     /// What tests with these programs, once they are built.
@@ -157,7 +151,7 @@ fn format() -> Result<()> {
     for folder in WORKSPACES {
         process::run(&mut cargo("fmt --all --check", folder))?;
     }
-    width::check()
+    Ok(())
 }
 
 /// Of what [`artifacts::lint_as_built`] had linted, and of what is only checked.
@@ -194,7 +188,10 @@ fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
     command.env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image()?);
     if shared.all {
         // Only slow tests run these.
-        command.env("HIVTAC_CALIBRATE", artifacts::calibrate()?);
+        command.env(
+            "HIVTAC_CALIBRATE",
+            artifacts::host_program("hivtac-calibrate")?,
+        );
         command.env("HIVTAC_CHROMIUM", packages::chromium()?);
     }
     shared.run(command, tally)

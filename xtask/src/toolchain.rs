@@ -52,20 +52,10 @@ pub fn lint(command: &mut Command) {
 }
 
 /// What the compiler says.
-fn rustc(words: &str) -> Result<String> {
+pub fn rustc(words: &str) -> Result<String> {
     let program = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let said = process::output(Command::new(program).args(words.split(' ')))?;
     Ok(said.trim().to_owned())
-}
-
-/// What the compiler calls itself: `rustc 1.95.0 (59807616e 2026-04-14)`.
-pub fn compiler() -> Result<String> {
-    rustc("-V")
-}
-
-/// What the compiler calls this computer: `x86_64-unknown-linux-gnu`.
-pub fn host() -> Result<String> {
-    rustc("--print host-tuple")
 }
 
 fn has_target() -> Result<bool> {

@@ -13,15 +13,12 @@ const PACKAGE: &str = "hivtac-board";
 /// Builds the image, flashes it, and prints what the board says.
 pub fn run() -> Result<()> {
     let image = artifacts::build(&mut command()?, PACKAGE)?;
-    process::find_program("probe-rs").context(
-        "the image is built; to run it, probe-rs is missing: `cargo install probe-rs-tools \
-         --locked`",
-    )?;
-    let list = process::output(&mut process::command("probe-rs list"))?;
+    let list = process::output(&mut process::command("probe-rs list"));
+    let list = list.context("the image is built; to run it: `cargo install probe-rs-tools`")?;
+    let is_there = !list.contains("No debug probes");
     ensure!(
-        !list.contains("No debug probes"),
-        "the image is built; to run it, connect an STM32H743 board by a debug probe: `probe-rs \
-         list` sees none"
+        is_there,
+        "the image is built; to run it, connect an STM32H743 by a debug probe"
     );
     let mut command = process::command("probe-rs run --chip STM32H743VITx");
     let (mut rows, mut done) = (String::new(), false);
@@ -46,9 +43,8 @@ fn command() -> Result<Command> {
     let data = toolchain::work_folder("bench")?;
     measure::cases(&data)?;
     let mut command = toolchain::build_for_target("");
-    command
-        .args(["--package", PACKAGE])
-        .env("HIVTAC_BOARD_DATA", data);
+    command.env("HIVTAC_BOARD_DATA", data);
+    command.args(["--package", PACKAGE]);
     Ok(command)
 }
 

@@ -1,7 +1,6 @@
 //! The cases that `benchmark-cases` (in `tests`) writes, each in QEMU: what its stages cost.
 
 use std::collections::BTreeMap;
-use std::ops::AddAssign;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -43,7 +42,7 @@ pub enum Work {
 
 /// Writes all scripts into a folder.
 pub fn cases(folder: &Path) -> Result<Vec<Case>> {
-    let mut command = std::process::Command::new(artifacts::benchmark_cases()?);
+    let mut command = std::process::Command::new(artifacts::host_program("benchmark-cases")?);
     let lines = process::output(command.current_dir(toolchain::at("")).arg(folder))?;
     let cases: Result<_, _> = lines.lines().map(serde_json::from_str).collect();
     cases.context("what benchmark-cases says")
@@ -57,31 +56,24 @@ pub struct Cost {
     pub cycles: f64,
 }
 
-impl AddAssign for Cost {
-    fn add_assign(&mut self, other: Cost) {
-        self.instructions += other.instructions;
-        self.cycles += other.cycles;
+/// The costs of stages.
+pub type Costs = BTreeMap<&'static str, Cost>;
+
+/// Of some stages together, or of all when none is named.
+pub fn sum(costs: &Costs, stages: &[&str]) -> Cost {
+    let mut sum = Cost::default();
+    for (stage, cost) in costs {
+        if stages.is_empty() || stages.contains(stage) {
+            sum.add(*cost);
+        }
     }
+    sum
 }
 
-/// The costs of stages.
-#[derive(Default)]
-pub struct Costs(BTreeMap<&'static str, Cost>);
-
-impl Costs {
-    pub fn get(&self, stage: &str) -> Option<Cost> {
-        self.0.get(stage).copied()
-    }
-
-    /// Of some stages together, or of all when none is named.
-    pub fn sum(&self, stages: &[&str]) -> Cost {
-        let mut sum = Cost::default();
-        for (stage, cost) in &self.0 {
-            if stages.is_empty() || stages.contains(stage) {
-                sum += *cost;
-            }
-        }
-        sum
+impl Cost {
+    fn add(&mut self, other: Cost) {
+        self.instructions += other.instructions;
+        self.cycles += other.cycles;
     }
 }
 
@@ -90,9 +82,9 @@ pub struct Measured {
     pub case: Case,
     pub stages: Costs,
     /// What happens once the last band of rows is there.
-    pub last_band: Costs,
+    pub last_band: Cost,
     /// What runs more often than a network has neurons: its multiplications.
-    pub inner_loop: Costs,
+    pub inner_loop: Cost,
 }
 
 /// What the plugin (`xtask/instruction-counter`) recorded of one run.
@@ -137,8 +129,8 @@ impl Bench {
         let mut measured = Measured {
             case,
             stages: Costs::default(),
-            last_band: Costs::default(),
-            inner_loop: Costs::default(),
+            last_band: Cost::default(),
+            inner_loop: Cost::default(),
         };
         let neurons = match &measured.case.work {
             Work::Network(widths) => widths[1..].iter().sum(),
@@ -160,18 +152,16 @@ impl Bench {
                 let Some(stage) = self.stages.stage(*address)? else {
                     continue;
                 };
-                let multiplies = stage == "network" && executions[address] > neurons;
-                for (costs, counts) in [
-                    (&mut measured.stages, true),
-                    (&mut measured.last_band, is_last_band),
-                    (&mut measured.inner_loop, multiplies),
-                ] {
-                    if counts {
-                        *costs.0.entry(stage).or_default() += Cost {
-                            instructions,
-                            cycles,
-                        };
-                    }
+                let cost = Cost {
+                    instructions,
+                    cycles,
+                };
+                measured.stages.entry(stage).or_default().add(cost);
+                if is_last_band {
+                    measured.last_band.add(cost);
+                }
+                if stage == "network" && executions[address] > neurons {
+                    measured.inner_loop.add(cost);
                 }
             }
         }

@@ -88,9 +88,8 @@ impl Baseline {
             let label = format!("{}, {} {}", item.item, item.frame, item.format);
             instructions.insert(label, item.instructions);
         }
-        let compiler = toolchain::compiler()?;
         Ok(Baseline {
-            compiler,
+            compiler: toolchain::rustc("-V")?,
             instructions,
         })
     }

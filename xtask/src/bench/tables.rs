@@ -5,7 +5,7 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::measure::{Cost, Measured, Work};
+use super::measure::{Cost, Measured, Work, sum};
 use super::stages::ORDER;
 use crate::size::grouped;
 
@@ -73,17 +73,17 @@ impl Item {
 pub fn items(measured: &Measured) -> Vec<Item> {
     let stages = &measured.stages;
     let one = |name: String, cost| Item::new(measured, name, cost, 1);
-    let whole = |name: String| one(name, stages.sum(&[]));
+    let whole = |name: String| one(name, sum(stages, &[]));
     match &measured.case.work {
         Work::Frame(special) => {
             let comma = if special.is_empty() { "" } else { ", " };
             let item = |part, cost| one(format!("{part}{comma}{special}"), cost);
-            let blobs = stages.sum(&["dilation", "runs, labels, moments"]);
+            let blobs = sum(stages, &["dilation", "runs, labels, moments"]);
             vec![
-                item("threshold", stages.sum(&["threshold"])),
+                item("threshold", sum(stages, &["threshold"])),
                 item("blobs", blobs),
-                item("frame full", stages.sum(&[])),
-                item("latency", measured.last_band.sum(&[])),
+                item("frame full", sum(stages, &[])),
+                item("latency", measured.last_band),
             ]
         }
         Work::Table => vec![whole("table".to_owned())],
@@ -95,8 +95,8 @@ pub fn items(measured: &Measured) -> Vec<Item> {
             // The loops of narrow layers say little about the loop.
             if widths.iter().any(|&width| width >= 128) {
                 let count = widths.windows(2).map(|pair| pair[0] * pair[1]).sum();
-                let cost = measured.inner_loop.sum(&[]);
-                items.push(Item::new(measured, "mac".to_owned(), cost, count));
+                let name = "mac".to_owned();
+                items.push(Item::new(measured, name, measured.inner_loop, count));
             }
             items
         }
@@ -132,10 +132,10 @@ fn stages(measured: &Measured) -> String {
     let stages = &measured.stages;
     let known = ORDER
         .iter()
-        .filter_map(|stage| Some((*stage, stages.get(stage)?)));
+        .filter_map(|stage| Some((*stage, *stages.get(stage)?)));
     let sums = [
-        ("from the moments to the force", stages.sum(&FROM_MOMENTS)),
-        ("together", stages.sum(&[])),
+        ("from the moments to the force", sum(stages, &FROM_MOMENTS)),
+        ("together", sum(stages, &[])),
     ];
     let mut text = "| stage | instructions | modelled cycles | floor |\n".to_owned();
     text += "|---|---:|---:|---:|\n";

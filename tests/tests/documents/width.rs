@@ -1,33 +1,25 @@
-//! Lines of the committed text that are wider than [`WIDEST`].
+//! Lines of text are at most [`WIDEST`] columns wide.
 
 use std::collections::BTreeSet;
+use std::fs;
 
-use anyhow::{Result, ensure};
+use hivtac_tests::workspaces::{files, root};
 
-use crate::{process, toolchain};
-
-/// Columns of the widest line, in characters.
+/// In characters.
 const WIDEST: usize = 100;
 
 /// Endings of the files that are read; data, lock files and pictures are not.
-const TEXT: &str = ".rs .md .toml .py .sh .yml .s .x /run";
+const TEXT: [&str; 7] = [".rs", ".md", ".toml", ".py", ".sh", ".s", ".x"];
 
-/// Reads every text file that git knows and that is there; names each line that is too wide.
-pub fn check() -> Result<()> {
-    let mut git = process::command("git ls-files -z");
-    let names = process::output(git.current_dir(toolchain::at("")))?;
-    let mut count = 0;
-    for name in names.split('\0') {
-        let is_text = TEXT.split(' ').any(|ending| name.ends_with(ending));
-        if is_text && toolchain::at(name).is_file() {
-            for line in too_wide(name, &process::read(&toolchain::at(name))?) {
-                process::say(&format!("{name}:{line}: more than {WIDEST} columns"));
-                count += 1;
-            }
-        }
+#[test]
+fn no_line_is_too_wide() {
+    let mut wide = Vec::new();
+    for name in TEXT.iter().flat_map(|ending| files(ending)) {
+        let text = fs::read_to_string(root().join(&name)).unwrap();
+        let lines = too_wide(&name, &text).into_iter();
+        wide.extend(lines.map(|line| format!("{name}:{line}")));
     }
-    ensure!(count == 0, "{count} lines have more than {WIDEST} columns");
-    Ok(())
+    assert!(wide.is_empty(), "more than {WIDEST} columns: {wide:#?}");
 }
 
 /// The lines of a file that are too wide, from 1. Rows of tables, addresses, fenced blocks and what
@@ -69,23 +61,18 @@ fn fenced_or_written(text: &str) -> BTreeSet<usize> {
     found
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn lines_are_wide_from_a_hundred_and_one_characters_on_where_they_can_be_broken() {
-        let wide = "é ".repeat(WIDEST / 2) + "é";
-        let address = format!("see https://example.org/{wide}", wide = "a".repeat(WIDEST));
-        let text = format!("{}\n{wide}\n| {wide} |\n{address}\n", "é".repeat(WIDEST));
-        assert_eq!(too_wide("a.md", &text), [2]);
-        assert_eq!(
-            too_wide("a.rs", &format!("// {wide}\n/// | {wide} |\nr\"{wide}\"\n")),
-            [1]
-        );
-        let fenced = format!("```console\n{wide}\n```\n{wide}\n");
-        assert_eq!(too_wide("a.md", &fenced), [4]);
-        let written = format!("<!-- a: begin, by x -->\n{wide}\n<!-- a: end -->\n{wide}\n");
-        assert_eq!(too_wide("a.md", &written), [4]);
-    }
+#[test]
+fn lines_are_wide_from_a_hundred_and_one_characters_on_where_they_can_be_broken() {
+    let wide = "é ".repeat(WIDEST / 2) + "é";
+    let address = format!("see https://example.org/{wide}", wide = "a".repeat(WIDEST));
+    let text = format!("{}\n{wide}\n| {wide} |\n{address}\n", "é".repeat(WIDEST));
+    assert_eq!(too_wide("a.md", &text), [2]);
+    assert_eq!(
+        too_wide("a.rs", &format!("// {wide}\n/// | {wide} |\nr\"{wide}\"\n")),
+        [1]
+    );
+    let fenced = format!("```console\n{wide}\n```\n{wide}\n");
+    assert_eq!(too_wide("a.md", &fenced), [4]);
+    let written = format!("<!-- a: begin, by x -->\n{wide}\n<!-- a: end -->\n{wide}\n");
+    assert_eq!(too_wide("a.md", &written), [4]);
 }
