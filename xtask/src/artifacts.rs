@@ -13,8 +13,8 @@ use crate::toolchain::{self, build_for_target, cargo, work_folder};
 
 /// The profile of programs that run here, which is quick to build.
 pub const TOOLS: &str = "tools";
-/// The rig's tests that run firmware, and those that cross rooms: cargo builds and runs them only by
-/// their names.
+/// The rig's tests that run firmware, and those that cross rooms: cargo builds and runs them only
+/// by their names.
 pub const RIG_TESTS: [&str; 2] = ["--test", "rig"];
 /// See [`RIG_TESTS`].
 pub const ROOMS_TESTS: [&str; 2] = ["--test", "rooms"];
@@ -92,7 +92,8 @@ pub fn host_tool() -> Result<PathBuf> {
     kept(host_command("hivtac"), "tool")
 }
 
-/// The same with all that `hivtac serve` can, which the tool of users has only when they ask for it.
+/// The same with all that `hivtac serve` can, which the tool of users has only when they ask for
+/// it.
 pub fn serving_tool() -> Result<PathBuf> {
     kept(serving_command(), "serving-tool")
 }

@@ -30,8 +30,8 @@ pub fn obstacle() -> Option<&'static str> {
     (!has_compiler).then_some("there is no C++ compiler, which libFuzzer needs")
 }
 
-/// Builds and runs every attack, as many at a time as there are cores. When one finds something, its
-/// input is saved, and what it met is shown.
+/// Builds and runs every attack, as many at a time as there are cores. When one finds something,
+/// its input is saved, and what it met is shown.
 pub fn run() -> Result<()> {
     let programs = build()?;
     let attacks = targets()?.into_par_iter();

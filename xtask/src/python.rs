@@ -9,16 +9,16 @@ use crate::artifacts::{self, Board};
 use crate::report::{Tally, run_tests};
 use crate::{process, toolchain};
 
-/// What building and testing Python's `hivtac` need: a folder below `target/`, what is imported, and
-/// the packages as pip knows them.
+/// What building and testing Python's `hivtac` need: a folder below `target/`, what is imported,
+/// and the packages as pip knows them.
 const PACKAGE: [&str; 3] = [
     "python",
     "maturin, mypy, numpy",
     "maturin>=1.9,<2 mypy numpy",
 ];
 
-/// Who receives what `hivtac serve` sends: Cyclone DDS, which ROS 2 itself uses, a WebSocket client,
-/// and a reader of ROS 2's messages.
+/// Who receives what `hivtac serve` sends: Cyclone DDS, which ROS 2 itself uses, a WebSocket
+/// client, and a reader of ROS 2's messages.
 const SERVE: [&str; 3] = [
     "python-serve",
     "cyclonedds, mcap_ros2, websockets",

@@ -197,7 +197,14 @@ mod tests {
             |tally| run_tests(&mut Command::new("true"), tally),
         );
         let mut ran = false;
-        report.step("xtask two", || None, |_| Ok(ran = true));
+        report.step(
+            "xtask two",
+            || None,
+            |_| {
+                ran = true;
+                Ok(())
+            },
+        );
         report.step("xtask three", || Some("it is night"), |_| bail!("it ran"));
         let error = report.finish().unwrap_err().to_string();
         assert!(ran && error == "failed: xtask one", "{error}");

@@ -201,8 +201,8 @@ fn rig_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
     shared.run(shared.tests(artifacts::RIG_TESTS)?, tally)
 }
 
-/// Those in which it matters how fast the core is, at half of the speed that the rig assumes, and on
-/// a busy bus.
+/// Those in which it matters how fast the core is, at half of the speed that the rig assumes, and
+/// on a busy bus.
 fn rig_tests_at_half_speed(shared: &Shared, tally: &mut Tally) -> Result<()> {
     let mut command = shared.tests(artifacts::RIG_TESTS)?;
     command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");

@@ -23,8 +23,8 @@ fn no_line_is_too_wide() {
 }
 
 /// The lines of a file that are too wide, from 1. Rows of tables, addresses, fenced blocks and what
-/// programs wrote into a document may be: breaking these is impossible or makes them worse. Of Rust,
-/// comments are read: what rustfmt leaves of the rest it cannot break.
+/// programs wrote into a document may be: breaking these is impossible or makes them worse. Of
+/// Rust, comments are read: what rustfmt leaves of the rest it cannot break.
 fn too_wide(name: &str, text: &str) -> Vec<usize> {
     let may_be = match name.ends_with(".md") {
         true => fenced_or_written(text),

@@ -48,8 +48,8 @@ pub fn cases(folder: &Path) -> Result<Vec<Case>> {
     cases.context("what benchmark-cases says")
 }
 
-/// Executed instructions, exactly, and what LLVM's model of the core makes of them in memory without
-/// wait states: not a number without LLVM.
+/// Executed instructions, exactly, and what LLVM's model of the core makes of them in memory
+/// without wait states: not a number without LLVM.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     pub instructions: u64,
@@ -136,8 +136,8 @@ impl Bench {
             Work::Network(widths) => widths[1..].iter().sum(),
             _ => u64::MAX,
         };
-        // An instruction may lie in several blocks: the first round of a loop is one with what comes
-        // before it.
+        // An instruction may lie in several blocks: the first round of a loop is one with what
+        // comes before it.
         let mut executions = BTreeMap::<u64, u64>::new();
         for (_, _, block, count) in &record.runs {
             for address in &record.blocks[*block] {
