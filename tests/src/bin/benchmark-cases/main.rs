@@ -1,13 +1,8 @@
-//! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one
-//! file each, and prints what they are, one JSON object a line:
+//! `benchmark-cases FOLDER`: writes the scripts that `cargo xtask bench` runs, one file each, and
+//! prints what they are, one JSON object a line:
 //! `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
 //! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
 //! board can hold of them it writes as `board.rs`, too, for `tests/board`.
-//! `benchmark-cases FOLDER tradeoff` writes instead what the trade between speed and accuracy is
-//! made of (`trade`), and each line says the `"part"`, too. With times it writes the frames of the
-//! demo's scene at these times instead, for the figure over time.
-
-mod trade;
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -47,20 +42,9 @@ fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
     sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
-    let folder = folder.context("usage: benchmark-cases FOLDER [tradeoff | MICROSECONDS …]")?;
-    if env::args().nth(2).as_deref() == Some("tradeoff") {
-        return trade::write_cases(&folder);
-    }
-    let times: Vec<u64> = env::args()
-        .skip(2)
-        .map(|word| word.parse().with_context(|| format!("the time `{word}`")))
-        .collect::<Result<_>>()?;
+    let folder = folder.context("usage: benchmark-cases FOLDER")?;
     let mut board = Board::default();
-    let cases = if times.is_empty() {
-        cases()?
-    } else {
-        demo(&times)?
-    };
+    let cases = cases()?;
     for (number, case) in cases.iter().enumerate() {
         println!("{}", case.write(&folder, number)?);
         board.add(&folder, number, case)?;
@@ -190,23 +174,6 @@ fn stepping(steps: u8) -> Result<Case> {
         size,
         format,
     })
-}
-
-/// Frames of the demo's scene, of the firmware's size.
-fn demo(times: &[u64]) -> Result<Vec<Case>> {
-    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
-    let model = model(format, size, BinaryMask)?;
-    let scene = scene("demo", format, size)?;
-    let case = |(number, &time): (u64, &u64)| Case {
-        work: Work::Frame {
-            special: "demo",
-            pixels: frame(&scene, number, time as f64 * 1e-6),
-        },
-        model: model.clone(),
-        size,
-        format,
-    };
-    Ok((0..).zip(times).map(case).collect())
 }
 
 /// Rust source that includes what a board can hold, and the files that it includes.
