@@ -1,5 +1,6 @@
 //! `cargo xtask test`: every check and every test of the project.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Command;
 use std::sync::OnceLock;
 use std::thread;
@@ -101,9 +102,14 @@ impl Test {
             }
         };
         let beside = thread::scope(|scope| {
-            let beside = scope.spawn(|| run(&BESIDE));
+            let beside = scope.spawn(|| {
+                let ended = catch_unwind(AssertUnwindSafe(|| run(&BESIDE)));
+                // Who still waits for them waits no longer.
+                shared.programs.get_or_init(|| None);
+                ended
+            });
             run(&FIRST);
-            beside.join()
+            beside.join().flatten()
         });
         beside.map_err(|_| anyhow!("the steps beside the others panicked"))?;
         report.finish()
