@@ -23,47 +23,40 @@ pub struct Test {
     all: bool,
 }
 
-struct Step {
-    name: &'static str,
-    work: fn(&Shared, &mut Tally) -> Result<()>,
-    /// Only with `--all`; then why it cannot be run here.
-    slow: Option<fn() -> Option<&'static str>>,
-}
-
-const fn step(name: &'static str, work: fn(&Shared, &mut Tally) -> Result<()>) -> Step {
-    let slow = None;
-    Step { name, work, slow }
-}
-
-impl Step {
-    const fn slow(mut self, obstacle: fn() -> Option<&'static str>) -> Step {
-        self.slow = Some(obstacle);
-        self
-    }
-}
+/// Its name, what it does, and for one that runs only with `--all`, why it cannot run here.
+type Step = (&'static str, Work, Option<fn() -> Option<&'static str>>);
+type Work = fn(&Shared, &mut Tally) -> Result<()>;
 
 /// What runs on this computer.
 static FIRST: [Step; 4] = [
-    step("format", |_, _| format()),
-    step("lints: host", |_, _| host_lints()),
-    step("tests: host", host_tests),
-    step("tests: across rooms", cross_room_tests),
+    ("format", |_, _| format(), None),
+    ("lints: host", |_, _| host_lints(), None),
+    ("tests: host", host_tests, None),
+    ("tests: across rooms", cross_room_tests, None),
 ];
 
 /// About half of the work: what is for the microcontroller, attacks and the rig's tests, and around
 /// them what the others need nothing of. What is for the microcontroller is first: it is built in a
 /// folder of its own while the lints hold the common one.
 static BESIDE: [Step; 10] = [
-    step("lints: microcontroller", |_, _| target_lints()),
-    step(BUILD, |shared, _| shared.build()),
-    step("tests: rig", rig_tests),
-    step("tests: rig at half speed", rig_tests_at_half_speed),
-    step("attacks", |_, _| fuzz::run()).slow(fuzz::obstacle),
-    step("benchmark", |_, _| bench::Bench::default().run()),
-    step("build: board benchmark", |_, _| bench::board::lint()),
-    step("licences", |_, _| licences()).slow(no_cargo_deny),
-    step("tests: python", |_, tally| python::test_package(tally)).slow(python::no_package),
-    step("tests: serve", |_, tally| python::test_serve(tally)).slow(python::no_serve),
+    ("lints: microcontroller", |_, _| target_lints(), None),
+    (BUILD, |shared, _| shared.build(), None),
+    ("tests: rig", rig_tests, None),
+    ("tests: rig at half speed", rig_tests_at_half_speed, None),
+    ("attacks", |_, _| fuzz::run(), Some(fuzz::obstacle)),
+    ("benchmark", |_, _| bench::Bench::default().run(), None),
+    ("build: board benchmark", |_, _| bench::board::lint(), None),
+    ("licences", |_, _| licences(), Some(no_cargo_deny)),
+    (
+        "tests: python",
+        |_, tally| python::test_package(tally),
+        Some(python::no_package),
+    ),
+    (
+        "tests: serve",
+        |_, tally| python::test_serve(tally),
+        Some(python::no_serve),
+    ),
 ];
 
 /// It runs for the steps that need it.
@@ -96,9 +89,9 @@ impl Test {
         };
         let report = Report::new(all, toolchain::work_folder("test")?);
         let run = |steps| {
-            for step in wanted(steps) {
-                let obstacle = || step.slow.and_then(|obstacle| obstacle());
-                report.step(step.name, obstacle, |tally| (step.work)(&shared, tally));
+            for &(name, work, slow) in wanted(steps) {
+                let obstacle = || slow.and_then(|obstacle| obstacle());
+                report.step(name, obstacle, |tally| work(&shared, tally));
             }
         };
         let beside = thread::scope(|scope| {
@@ -115,13 +108,13 @@ impl Test {
         report.finish()
     }
 
-    fn wants(&self, step: &Step) -> bool {
+    fn wants(&self, (name, _, slow): &Step) -> bool {
         let named = |name: &str| self.steps.iter().any(|word| name.contains(word.as_str()));
-        let is_named = match step.name {
+        let is_named = match *name {
             BUILD => NEED_BUILD.iter().any(|name| named(name)),
             name => named(name),
         };
-        (self.all || step.slow.is_none()) && (self.steps.is_empty() || is_named)
+        (self.all || slow.is_none()) && (self.steps.is_empty() || is_named)
     }
 }
 
@@ -244,7 +237,7 @@ mod tests {
             let steps = words.iter().map(|&word| word.to_owned()).collect();
             let test = Test { steps, all };
             let steps = FIRST.iter().chain(&BESIDE).filter(|step| test.wants(step));
-            steps.map(|step| step.name).collect()
+            steps.map(|step| step.0).collect()
         };
         assert_eq!(wanted(&[], true).len(), FIRST.len() + BESIDE.len());
         assert!(!wanted(&[], false).contains(&"attacks"));

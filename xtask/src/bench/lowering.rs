@@ -108,22 +108,14 @@ fn several(verb: &str, base: &str, registers: &str) -> Vec<String> {
     let base = base.trim_end_matches('!');
     let registers = registers.trim_matches(['{', '}']).split(", ");
     let line = |(index, register): (usize, &str)| {
-        let prefix = match register {
-            "pc" => return vec![format!("ldr r12, [{base}]"), "b #-8".to_owned()],
-            "sp" => "",
-            float if float.starts_with(['d', 's']) => "v",
-            _ => "",
-        };
-        vec![format!(
-            "{prefix}{verb} {register}, [{base}, #{}]",
-            4 * index
-        )]
+        if register == "pc" {
+            return vec![format!("ldr r12, [{base}]"), "b #-8".to_owned()];
+        }
+        let is_float = register.starts_with(['d', 's']) && register != "sp";
+        let (prefix, offset) = (if is_float { "v" } else { "" }, 4 * index);
+        vec![format!("{prefix}{verb} {register}, [{base}, #{offset}]")]
     };
-    registers
-        .filter(|word| !word.is_empty())
-        .enumerate()
-        .flat_map(line)
-        .collect()
+    registers.enumerate().flat_map(line).collect()
 }
 
 #[cfg(test)]

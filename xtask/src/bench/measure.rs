@@ -97,6 +97,20 @@ pub struct Record {
     pub runs: Vec<(bool, Option<usize>, usize, u64)>,
 }
 
+impl Record {
+    /// How often each instruction ran. It may lie in several blocks: the first round of a loop is
+    /// one with what comes before it.
+    fn executions(&self) -> BTreeMap<u64, u64> {
+        let mut executions = BTreeMap::new();
+        for (_, _, block, count) in &self.runs {
+            for address in &self.blocks[*block] {
+                *executions.entry(*address).or_default() += count;
+            }
+        }
+        executions
+    }
+}
+
 /// The image with all that is needed to measure cases on it.
 pub struct Bench {
     image: PathBuf,
@@ -136,14 +150,7 @@ impl Bench {
             Work::Network(widths) => widths[1..].iter().sum(),
             _ => u64::MAX,
         };
-        // An instruction may lie in several blocks: the first round of a loop is one with what
-        // comes before it.
-        let mut executions = BTreeMap::<u64, u64>::new();
-        for (_, _, block, count) in &record.runs {
-            for address in &record.blocks[*block] {
-                *executions.entry(*address).or_default() += count;
-            }
-        }
+        let executions = record.executions();
         for &(is_last_band, _, block, instructions) in &record.runs {
             let addresses = &record.blocks[block];
             // A block that the compiler made of several stages is shared by their instructions.

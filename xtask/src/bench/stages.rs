@@ -13,19 +13,12 @@ const LISTED: &str = include_str!("../../../sensing/stages.txt");
 /// The folders of the packages that are the sensing.
 const PACKAGES: [&str; 4] = ["terms", "markers", "force", "sensing"];
 
-/// The stages, in the order in which a frame goes through them.
-pub const ORDER: [&str; 10] = [
-    "threshold",
-    "dilation",
-    "runs, labels, moments",
-    "markers",
-    "features",
-    "network",
-    "steps",
-    "angles, force",
-    "pipeline",
-    "library",
-];
+/// The stages, in the order in which a frame goes through them, and at last what is a library's.
+pub fn order() -> impl Iterator<Item = &'static str> {
+    let lines = LISTED.lines().filter(|line| !line.starts_with('#'));
+    let names = lines.filter_map(|line| Some(line.rsplit_once(':')?.0));
+    names.filter(|name| *name != "caller").chain(["library"])
+}
 
 /// The stages of an image's instructions.
 ///
@@ -46,14 +39,13 @@ impl Stages {
         Ok(Stages { loader, known })
     }
 
-    /// The stage of the instruction at an address, one of [`ORDER`], or `None` for the harness.
+    /// The stage of the instruction at an address, one of [`order`], or `None` for the harness.
     pub fn stage(&mut self, address: u64) -> Result<Option<&'static str>> {
         if let Some(known) = self.known.get(&address) {
             return Ok(*known);
         }
-        let files = self
-            .files(address)
-            .map_err(|error| anyhow!("{address:#x}: {error}"))?;
+        let files = self.files(address);
+        let files = files.map_err(|error| anyhow!("{address:#x}: {error}"))?;
         // Assembly has no line table; its names say what it is.
         let named = || stage_of_name(self.loader.find_symbol(address)?);
         let stage = match stage(&files) {
@@ -90,7 +82,7 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         Some(format!("{package}/{name}"))
     })?;
     let has_it = |stage: &&str| modules_of(stage).any(|name| name == module);
-    ORDER.into_iter().find(has_it)
+    order().find(has_it)
 }
 
 /// The modules of a stage: package and name.
@@ -104,15 +96,13 @@ fn modules_of(stage: &str) -> impl Iterator<Item = &'static str> {
 fn stage_of_name(name: &str) -> Option<&'static str> {
     let work = name.strip_prefix("hivtac_")?;
     let stages = [
-        ("threshold", "threshold"),
-        ("weigh", "threshold"),
+        ("threshold weigh", "threshold"),
         ("dilate", "dilation"),
-        ("dot", "network"),
+        ("dot expand activate", "network"),
         ("spline", "steps"),
-        ("expand", "network"),
-        ("activate", "network"),
     ];
-    let found = stages.iter().find(|(part, _)| work.contains(part));
+    let is_it = |parts: &str| parts.split(' ').any(|part| work.contains(part));
+    let found = stages.iter().find(|(parts, _)| is_it(parts));
     found.map(|(_, stage)| *stage)
 }
 
@@ -142,7 +132,7 @@ mod tests {
 
     #[test]
     fn every_module_of_the_sensing_is_listed_once() {
-        let stages = ORDER.into_iter().chain(["caller"]);
+        let stages = order().chain(["caller"]);
         let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
         listed.sort();
         let mut found = Vec::new();

@@ -6,7 +6,7 @@ use std::fmt::Write;
 use serde::Serialize;
 
 use super::measure::{Cost, Measured, Work, sum};
-use super::stages::ORDER;
+use super::stages::order;
 use crate::size::grouped;
 
 /// The core's clock, in MHz.
@@ -61,10 +61,8 @@ impl Item {
             true => String::new(),
             false => format!("{:.2}", cycles / sides.product::<f64>()),
         };
-        let (time, rate) = (
-            cycles / CLOCK_MHZ,
-            decimal((CLOCK_MHZ * 1e6 / cycles).round()),
-        );
+        let time = cycles / CLOCK_MHZ;
+        let rate = decimal((1e6 / time).round());
         format!("{start} {per_pixel} | {time:.1} | {rate} |")
     }
 }
@@ -116,10 +114,8 @@ pub fn all(items: &[Item], measured: &[Measured]) -> String {
         let is_usual = matches!(&measured.case.work, Work::Frame(special) if special.is_empty());
         if is_usual && measured.case.size == [320, 240] {
             let (format, stages) = (&measured.case.format, stages(measured));
-            let _ = write!(
-                text,
-                "\nThe usual frame of 320x240 {format} by stages:\n\n{stages}"
-            );
+            let title = format!("The usual frame of 320x240 {format} by stages");
+            let _ = write!(text, "\n{title}:\n\n{stages}");
         }
     }
     text
@@ -130,9 +126,7 @@ const FROM_MOMENTS: [&str; 5] = ["markers", "features", "network", "angles, forc
 
 fn stages(measured: &Measured) -> String {
     let stages = &measured.stages;
-    let known = ORDER
-        .iter()
-        .filter_map(|stage| Some((*stage, *stages.get(stage)?)));
+    let known = order().filter_map(|stage| Some((stage, *stages.get(stage)?)));
     let sums = [
         ("from the moments to the force", sum(stages, &FROM_MOMENTS)),
         ("together", sum(stages, &[])),
