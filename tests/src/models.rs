@@ -114,29 +114,6 @@ pub fn anywhere(steps: u8) -> Vec<u8> {
     with_steps(file, steps).expect("the committed model takes steps")
 }
 
-/// The file of a model of the trade between speed and accuracy, with layers of these widths, the
-/// last of five outputs: for frames of a geometry, with the rest position that they show.
-pub fn trade_file(
-    (geometry, rest, centroid): (Geometry, Rest, CentroidEstimator),
-    widths: &[u16],
-    weights: Weights,
-) -> Vec<u8> {
-    let mut spec = spec(
-        geometry,
-        rest,
-        widths,
-        weights,
-        OutputKind::ForceAndPlace,
-        1,
-    );
-    spec.conditions.centroid = centroid;
-    // The paper's camera is the only one of its size.
-    if geometry == Geometry::preset(Preset::Paper, geometry.width, geometry.height) {
-        spec.conditions.preset = Preset::Paper;
-    }
-    encoded(&spec)
-}
-
 fn qvga() -> Geometry {
     Geometry::preset(Preset::Ov7725, 320, 240)
 }

@@ -23,7 +23,8 @@ use clap::Parser;
 enum Task {
     /// Run the firmware on the emulated board with a simulated tip, and show the forces.
     Demo(demo::Demo),
-    /// Run every test, and print a table of how they went.
+    /// Run every test, and print a table of how they went. What each step prints is in
+    /// target/xtask/test.
     Test(test::Test),
     /// What a frame and an inference cost on the microcontroller, measured in QEMU.
     Bench(bench::Bench),
