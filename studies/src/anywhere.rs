@@ -6,11 +6,11 @@ use std::path::PathBuf;
 
 use anyhow::{Result, anyhow};
 use clap::Args;
+use hivtac_calibration::data::dataset::reasons as refusals;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::data::dataset::reasons as refusals;
-use hivtac_twin::Options;
 use hivtac_sensor::force::model::Model;
+use hivtac_twin::Options;
 use serde::Serialize;
 
 use crate::page;

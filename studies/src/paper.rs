@@ -3,15 +3,15 @@
 
 use anyhow::{Result, anyhow};
 use clap::Args;
+use hivtac_calibration::data::dataset::{Dataset, Loads, Observation, Recipe, generate};
+use hivtac_calibration::data::loads::norm;
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::evaluation::answer::Chip;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options as Training;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::data::dataset::{Dataset, Loads, Observation, Recipe, generate};
-use hivtac_calibration::data::loads::norm;
-use hivtac_calibration::data::range::Range;
-use hivtac_calibration::evaluation::answer::Chip;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::status::Status;

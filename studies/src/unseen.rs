@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
+use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::forward::{Estimate, Forward, Mounting, Observed, Pose};
 use hivtac_sensor::force::model::Model;
 use rayon::prelude::*;

@@ -10,7 +10,7 @@ use std::vec::Vec;
 use serde_json::Value;
 
 /// Folders of the project's workspaces, relative to its root.
-pub const WORKSPACES: [&str; 3] = ["", "tests/qemu", "xtask/instruction-counter"];
+pub const WORKSPACES: [&str; 2] = ["", "tests/qemu"];
 
 /// Returns the project's root folder.
 pub fn root() -> PathBuf {

@@ -1,19 +1,18 @@
 //! `cargo xtask demo`: the firmware on the emulated board, a simulated tip that presses it, and the
 //! forces.
 
-use std::fs;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, Stdio};
 use std::time::Instant;
 
-use anyhow::{Context, Result, anyhow};
-use clap::Args;
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use clap::{Args, ValueEnum};
 
-use crate::artifacts::Board;
-use crate::rig::Rig;
-use crate::summary::{self, Summary};
-use crate::toolchain::Toolchain;
-use crate::{artifacts, process, workspace};
+use crate::artifacts::{self, Board};
+use crate::{process, toolchain};
 
 /// Options of `cargo xtask demo`.
 #[derive(Args)]
@@ -24,174 +23,154 @@ pub struct Demo {
     /// The board and its camera: an OV7725 on the first, an MT9V034 on the second.
     #[arg(long, value_enum, default_value_t)]
     board: Board,
-    /// Print one JSON object instead: frames, rate_hz, latency_ms, direction_deg, magnitude_mn,
-    /// place_um.
-    #[arg(long)]
-    json: bool,
-}
-
-/// What the demo runs, and where it writes.
-struct Stage {
-    board: Board,
-    firmware: PathBuf,
-    rig: PathBuf,
-    tool: PathBuf,
-    truth: PathBuf,
-    arrivals: PathBuf,
-    log: PathBuf,
 }
 
 impl Demo {
-    /// Builds what is needed, runs the rig, and shows what the host tool says.
-    ///
-    /// # Errors
-    /// When something cannot be built or fails; names the rig's log when it was running.
-    pub fn run(&self, toolchain: &Toolchain) -> Result<()> {
+    /// Builds what is needed, runs the rig, and shows what the host tool says; names the rig's log
+    /// when something fails.
+    pub fn run(&self) -> Result<()> {
         let start = Instant::now();
-        let stage = Stage::build(toolchain, self.board)?;
-        let built = start.elapsed();
-        let outcome = match self.json {
-            true => self.summarize(&stage),
-            false => self.show(&stage),
-        };
-        if outcome.is_err() {
-            stage.show_log();
+        let programs = self.build()?;
+        let built = start.elapsed().as_secs_f64();
+        let folder = toolchain::work_folder("demo")?;
+        let files = ["truth.jsonl", "arrivals.jsonl", "rig.log"];
+        let logs = files.map(|name| folder.join(name));
+        let [truth, _, log] = &logs;
+        if let Err(error) = self.show(&programs, &logs) {
+            let text = std::fs::read_to_string(log).unwrap_or_default();
+            let lines: Vec<&str> = text.lines().collect();
+            let last = lines[lines.len().saturating_sub(20)..].join("\n");
+            eprintln!("\nThe last lines of the rig's log:\n{last}");
+            return Err(error.context(format!("the rig's log is {}", log.display())));
         }
-        outcome.with_context(|| format!("the rig's log is {}", stage.log.display()))?;
-        let shown = start.elapsed() - built;
-        let (built, shown) = (built.as_secs_f64(), shown.as_secs_f64());
+        let shown = start.elapsed().as_secs_f64() - built;
         eprintln!("\nbuilt in {built:.1} s, shown in {shown:.1} s");
-        eprintln!("truth: {}", stage.truth.display());
-        eprintln!("log:   {}", stage.log.display());
+        eprintln!("truth: {}\nlog:   {}", truth.display(), log.display());
         Ok(())
     }
 
-    fn show(&self, stage: &Stage) -> Result<()> {
+    /// Builds the firmware beside the rig, whose emulator takes longest, and the host tool.
+    fn build(&self) -> Result<[PathBuf; 3]> {
         eprintln!(
-            "The board boots, and {} frames pass: some half a minute.",
-            self.frames
+            "Building the firmware, the emulated board and the host tool: some four minutes the \
+             first time on two cores, a second from then on."
         );
-        let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
-        process::run(&mut self.monitor(stage, rig.port()))?;
+        std::thread::scope(|scope| {
+            let firmware = scope.spawn(|| artifacts::firmware(self.board));
+            let (rig, tool) = (
+                artifacts::host_program("hivtac-rig"),
+                artifacts::host_tool(),
+            );
+            let firmware = firmware.join();
+            let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))?;
+            Ok([firmware?, rig?, tool?])
+        })
+    }
+
+    fn show(&self, programs: &[PathBuf; 3], logs: &[PathBuf; 3]) -> Result<()> {
+        let [truth, arrivals, log] = logs;
+        let [firmware, rig, tool] = programs;
+        let (frames, board) = (self.frames.to_string(), self.board.to_possible_value());
+        let board = board.context("a board without a name")?;
+        eprintln!("The board boots, and {frames} frames pass: some half a minute.");
+        let mut command = Command::new(rig);
+        command.args("--scene demo --pty --exit-on-hangup --board".split(' '));
+        command.arg(board.get_name()).arg("--truth").arg(truth);
+        let rig = Rig::start(command.arg("--arrivals").arg(arrivals).arg(firmware), log)?;
+        let mut monitor = Command::new(tool);
+        monitor.args(["monitor", "--port", &rig.port, "--frames", &frames]);
+        // The emulated board boots slower than a real one.
+        process::run(monitor.args(["--timeout", "120", "--truth"]).arg(truth))?;
         rig.finish()?;
-        let (rate_hz, latency_ms) = (stage.rate_hz()?, stage.latency_ms()?);
+        let (rate_hz, latency_ms) = rate_and_latency(&times(truth)?, &times(arrivals)?)?;
         println!(
             "rate: {rate_hz:.1} forces a second; latency: {latency_ms:.2} ms from the middle of \
              the exposure to the last byte on USB"
         );
         Ok(())
     }
+}
 
-    fn summarize(&self, stage: &Stage) -> Result<()> {
-        let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
-        let mut monitor = self.monitor(stage, rig.port());
-        process::show(monitor.arg("--json"));
-        let lines = process::output(&mut monitor)?;
-        rig.finish()?;
-        let [truth, arrivals] = stage.logs()?;
-        let summary = Summary::of(&lines, &truth, &arrivals)?;
-        println!("{}", serde_json::to_string(&summary)?);
+/// A running rig. Killed when this is dropped.
+struct Rig {
+    process: Child,
+    /// The pseudo-terminal that is its serial port.
+    port: String,
+}
+
+impl Rig {
+    /// Starts the rig and waits until its serial port is there. What it says goes to the log.
+    fn start(command: &mut Command, log: &Path) -> Result<Rig> {
+        process::say(&format!("+ {command:?}"));
+        let file = File::create(log).with_context(|| format!("creating {}", log.display()))?;
+        command.stdin(Stdio::null()).stdout(Stdio::piped());
+        let process = command.stderr(file).spawn().context("starting the rig")?;
+        let port = String::new();
+        let mut rig = Rig { process, port };
+        let stdout = rig.process.stdout.take().context("the rig's output")?;
+        let mut line = String::new();
+        BufReader::new(stdout).read_line(&mut line)?;
+        // `ready … pty=PATH`
+        let path = line.trim_end().split_once("pty=").map(|(_, path)| path);
+        let path = path.with_context(|| format!("the rig did not get ready: `{line}`"))?;
+        rig.port = path.to_owned();
+        Ok(rig)
+    }
+
+    /// Waits for the rig to end by itself, as it does when its client has left.
+    fn finish(mut self) -> Result<()> {
+        let status = self.process.wait()?;
+        ensure!(status.success(), "the rig failed ({status})");
         Ok(())
     }
+}
 
-    fn monitor(&self, stage: &Stage, port: &str) -> Command {
-        let mut command = stage.monitor_command(port, self.frames);
-        command.arg("--truth").arg(&stage.truth);
-        command
+impl Drop for Rig {
+    fn drop(&mut self) {
+        // Fails only when it has ended already.
+        let _ = self.process.kill();
+        let _ = self.process.wait();
     }
 }
 
-/// The host tool's JSON lines for the first frames of the demo.
-///
-/// # Errors
-/// As the demo.
-pub fn json_lines(toolchain: &Toolchain, frames: u64) -> Result<String> {
-    let stage = Stage::build(toolchain, Board::default())?;
-    let rig = Rig::start(&mut stage.rig_command(), &stage.log)?;
-    let mut monitor = stage.monitor_command(rig.port(), frames);
-    process::show(monitor.arg("--json"));
-    let lines = process::output(&mut monitor);
-    let lines = lines.with_context(|| format!("the rig's log is {}", stage.log.display()))?;
-    rig.finish()?;
-    Ok(lines)
+/// When, by frame.
+type Times = BTreeMap<u64, f64>;
+
+/// As a log of the rig says it.
+fn times(log: &Path) -> Result<Times> {
+    let mut times = Times::new();
+    for line in process::read(log)?.lines() {
+        let line: serde_json::Value = serde_json::from_str(line)?;
+        let time = line["frame"].as_u64().zip(line["time_s"].as_f64());
+        let (frame, time_s) = time.with_context(|| format!("reading {line}"))?;
+        times.insert(frame, time_s);
+    }
+    Ok(times)
 }
 
-impl Stage {
-    /// Builds the firmware beside the rig, whose emulator takes longest, and the host tool.
-    fn build(toolchain: &Toolchain, board: Board) -> Result<Stage> {
-        eprintln!(
-            "Building the firmware, the emulated board and the host tool: some four minutes the \
-             first time on two cores, a second from then on."
-        );
-        let folder = workspace::work_folder("demo")?;
-        let (firmware, tools) = std::thread::scope(|scope| {
-            let firmware = scope.spawn(|| artifacts::firmware_for(toolchain, board, ""));
-            (firmware.join(), artifacts::rig_and_host_tool())
-        });
-        let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))??;
-        let [rig, tool] = tools?;
-        Ok(Stage {
-            board,
-            firmware,
-            rig,
-            tool,
-            truth: folder.join("truth.jsonl"),
-            arrivals: folder.join("arrivals.jsonl"),
-            log: folder.join("rig.log"),
-        })
-    }
-
-    fn rig_command(&self) -> Command {
-        let mut command = Command::new(&self.rig);
-        command
-            .args(["--board", self.board.name(), "--scene", "demo"])
-            .args(["--pty", "--exit-on-hangup", "--truth"])
-            .arg(&self.truth)
-            .arg("--arrivals")
-            .arg(&self.arrivals)
-            .arg(&self.firmware);
-        command
-    }
-
-    fn monitor_command(&self, port: &str, frames: u64) -> Command {
-        let mut command = Command::new(&self.tool);
-        command
-            .args(["monitor", "--port", port, "--frames", &frames.to_string()])
-            // The emulated board boots slower than a real one.
-            .args(["--timeout", "120"]);
-        command
-    }
-
-    /// What the rig wrote of truth and arrivals.
-    fn logs(&self) -> Result<[String; 2]> {
-        let read = |path: &Path| {
-            fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))
-        };
-        Ok([read(&self.truth)?, read(&self.arrivals)?])
-    }
-
-    /// Samples a second.
-    fn rate_hz(&self) -> Result<f64> {
-        let [truth, arrivals] = self.logs()?;
-        summary::rate_hz(&truth, &arrivals)
-    }
-
-    /// Mean latency of all samples, ms.
-    fn latency_ms(&self) -> Result<f64> {
-        let [truth, arrivals] = self.logs()?;
-        summary::latency_ms(&summary::parsed(&arrivals)?, &truth, &arrivals)
-    }
-
-    fn show_log(&self) {
-        eprintln!("\nThe last lines of the rig's log:");
-        for line in last_lines(&self.log, 20) {
-            eprintln!("  {line}");
-        }
-    }
+/// Frames a second that samples arrived of, by the middles of their exposures, and the mean time
+/// from there to the last byte of a sample on USB, ms.
+fn rate_and_latency(exposed: &Times, arrived: &Times) -> Result<(f64, f64)> {
+    let both = |(frame, there): (&u64, &f64)| Some((*exposed.get(frame)?, *there));
+    let both: Vec<(f64, f64)> = arrived.iter().filter_map(both).collect();
+    let [(first, _), .., (last, _)] = both[..] else {
+        bail!("fewer than two samples arrived");
+    };
+    let latency_s: f64 = both.iter().map(|(exposed, there)| there - exposed).sum();
+    let count = both.len() as f64;
+    Ok(((count - 1.0) / (last - first), 1e3 * latency_s / count))
 }
 
-fn last_lines(file: &Path, count: usize) -> Vec<String> {
-    let text = fs::read_to_string(file).unwrap_or_default();
-    let lines: Vec<_> = text.lines().map(str::to_owned).collect();
-    lines[lines.len().saturating_sub(count)..].to_vec()
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rate_and_latency_are_those_of_frames_that_both_logs_tell_of() {
+        let exposed = Times::from([(7, 0.1), (8, 0.106), (9, 0.112)]);
+        let arrived = Times::from([(7, 0.105), (8, 0.113)]);
+        let (rate_hz, latency_ms) = rate_and_latency(&exposed, &arrived).unwrap();
+        assert!((rate_hz - 1.0 / 0.006).abs() < 1e-6 && (latency_ms - 6.0).abs() < 1e-9);
+        assert!(rate_and_latency(&exposed, &Times::new()).is_err());
+    }
 }

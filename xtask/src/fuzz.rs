@@ -2,30 +2,25 @@
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Mutex;
-use std::thread;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
+use rayon::prelude::*;
 
 use crate::toolchain::{self, cargo};
-use crate::{artifacts, process, workspace};
+use crate::{artifacts, process};
 
-/// Seconds of each attack.
-const SECONDS: u32 = 10;
-/// What one input may take: seconds, and MiB of memory. A recording and its gauge may differ by
-/// half a day, all of which is searched: that takes seconds, and more beside other tests.
-const LIMITS: [&str; 2] = ["-timeout=100", "-rss_limit_mb=2048"];
+/// Limits of each attack: seconds in all, and seconds and MiB of memory of one input. A recording
+/// and its gauge may differ by half a day, all of which is searched: that takes seconds, and more
+/// beside other tests.
+const LIMITS: [&str; 3] = ["-max_total_time=10", "-timeout=100", "-rss_limit_mb=2048"];
 /// What has the compiler tell libFuzzer which parts of a program an input reaches, and what it
 /// compares: as cargo-fuzz does it without a sanitizer, which only a nightly compiler has; no
 /// attacked code is `unsafe`.
-const COVERAGE: [&str; 6] = [
-    "--cfg=fuzzing",
-    "-Cpasses=sancov-module",
-    "-Cllvm-args=-sanitizer-coverage-level=4",
-    "-Cllvm-args=-sanitizer-coverage-inline-8bit-counters",
-    "-Cllvm-args=-sanitizer-coverage-pc-table",
-    "-Cllvm-args=-sanitizer-coverage-trace-compares",
-];
+const COVERAGE: &str = "--cfg=fuzzing -Cpasses=sancov-module \
+    -Cllvm-args=-sanitizer-coverage-level=4 \
+    -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
+    -Cllvm-args=-sanitizer-coverage-pc-table \
+    -Cllvm-args=-sanitizer-coverage-trace-compares";
 /// What libFuzzer writes before the number of inputs that it tried.
 const TRIED: &str = "stat::number_of_executed_units:";
 
@@ -35,28 +30,12 @@ pub fn obstacle() -> Option<&'static str> {
     (!has_compiler).then_some("there is no C++ compiler, which libFuzzer needs")
 }
 
-/// Builds and runs every attack, as many at a time as there are cores.
-///
-/// # Errors
-/// When one finds something: its input was saved, and what it met was shown.
+/// Builds and runs every attack, as many at a time as there are cores. When one finds something,
+/// its input is saved, and what it met is shown.
 pub fn run() -> Result<()> {
     let programs = build()?;
-    let targets = targets()?;
-    let waiting = Mutex::new(targets.iter());
-    let next = || waiting.lock().ok()?.next();
-    let run_all = || -> Vec<Result<String>> {
-        std::iter::from_fn(next)
-            .map(|target| attack(&programs, target))
-            .collect()
-    };
-    let cores = thread::available_parallelism().map_or(1, usize::from);
-    let ended: Vec<Result<String>> = thread::scope(|scope| {
-        let runs: Vec<_> = (0..cores).map(|_| scope.spawn(run_all)).collect();
-        let panicked = |_| vec![Err(anyhow!("an attack's thread panicked"))];
-        runs.into_iter()
-            .flat_map(|run| run.join().unwrap_or_else(panicked))
-            .collect()
-    });
+    let attacks = targets()?.into_par_iter();
+    let ended: Vec<_> = attacks.map(|target| attack(&programs, &target)).collect();
     let mut failed = 0;
     for end in ended {
         process::say(&end.unwrap_or_else(|error| {
@@ -71,63 +50,48 @@ pub fn run() -> Result<()> {
 /// Gives the folder of the programs. They are for a named target, so that what is built to run
 /// while building is not attacked, and is that of the other tests.
 fn build() -> Result<PathBuf> {
-    let host = toolchain::host()?;
-    let mut command = cargo("build", workspace::root());
-    command.args(["--profile", artifacts::TOOLS, "--target", &host]);
-    command.args(["--package", "hivtac-fuzz", "--bins"]);
-    command.env("RUSTFLAGS", COVERAGE.join(" "));
-    let program = artifacts::build(&mut command, "model")?;
-    Ok(program.parent().context("it lies in a folder")?.to_owned())
+    let mut command = cargo("build --package hivtac-fuzz --bins --profile", "");
+    command.args([
+        artifacts::TOOLS,
+        "--target",
+        &toolchain::rustc("--print host-tuple")?,
+    ]);
+    let program = artifacts::build(command.env("RUSTFLAGS", COVERAGE), "model")?;
+    Ok(program.with_file_name(""))
 }
 
 /// Names of the targets.
 fn targets() -> Result<Vec<String>> {
-    let folder = workspace::folder("tests/fuzz/targets");
-    let entries = folder.read_dir().context("reading tests/fuzz/targets")?;
-    let mut names = Vec::new();
-    for entry in entries {
-        let path = entry.context("reading tests/fuzz/targets")?.path();
-        names.extend(path.file_stem().map(|stem| stem.display().to_string()));
-    }
+    let folder = toolchain::at("tests/fuzz/targets").read_dir();
+    let paths = folder.context("reading tests/fuzz/targets")?.flatten();
+    let name = |path: PathBuf| Some(path.file_stem()?.display().to_string());
+    let mut names: Vec<_> = paths.filter_map(|entry| name(entry.path())).collect();
     names.sort();
     Ok(names)
 }
 
-/// Runs one; gives how many inputs the target withstood.
+/// Runs one; gives how many inputs the target withstood. New inputs that reach further go to
+/// `found`, not into the corpus, and so does what fails.
 fn attack(programs: &Path, target: &str) -> Result<String> {
-    let found = workspace::work_folder(&format!("fuzz/found/{target}"))?;
-    let output = command(programs, target, &found)
-        .output()
-        .with_context(|| format!("attacking {target}"))?;
-    let said = String::from_utf8_lossy(&output.stderr);
-    ensure!(
-        output.status.success(),
-        "{said}\n{target} found something: see above, and {}",
-        found.display()
-    );
-    let tried = said.split_once(TRIED).map(|(_, rest)| rest);
-    let tried = tried.and_then(|rest| rest.lines().next()).unwrap_or("?");
-    Ok(format!("{target}: {} inputs withstood", tried.trim()))
-}
-
-/// New inputs that reach further go to `found`, not into the corpus, and so does what fails.
-fn command(programs: &Path, target: &str, found: &Path) -> Command {
+    let found = toolchain::work_folder(&format!("fuzz/found/{target}"))?;
     let mut command = Command::new(programs.join(target));
-    command.arg(found);
-    command.arg(workspace::folder("tests/fuzz/corpus").join(target));
+    command
+        .arg(&found)
+        .arg(toolchain::at("tests/fuzz/corpus").join(target));
     command.arg("-print_final_stats=1").args(LIMITS);
     command.arg(format!("-artifact_prefix={}/", found.display()));
-    command.arg(format!("-max_total_time={SECONDS}"));
-    command
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_target_is_found() {
-        let targets = targets().unwrap();
-        assert!(targets.contains(&"model".to_owned()), "{targets:?}");
-    }
+    let output = command
+        .output()
+        .with_context(|| format!("attacking {target}"))?;
+    let (said, found) = (String::from_utf8_lossy(&output.stderr), found.display());
+    let is_well = output.status.success();
+    ensure!(
+        is_well,
+        "{said}\n{target} found something: see above, and {found}"
+    );
+    let tried = said.lines().find_map(|line| line.strip_prefix(TRIED));
+    Ok(format!(
+        "{target}: {} inputs withstood",
+        tried.unwrap_or("?").trim()
+    ))
 }

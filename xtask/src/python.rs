@@ -1,67 +1,112 @@
-//! Python's `hivtac`: built by pip into an environment of its own, and tested on the rig.
+//! Tests that are written in Python, in environments of their own with packages of PyPI.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::Result;
 
-use crate::pypi::{self, Environment, pip};
-use crate::report::Tally;
-use crate::{artifacts, process, workspace};
+use crate::artifacts::{self, Board};
+use crate::report::{Tally, run_tests};
+use crate::{process, toolchain};
 
-/// What building and testing need.
-const ENVIRONMENT: Environment = Environment {
-    folder: "host-tool/python",
-    modules: "maturin, mypy, numpy",
-    packages: &["maturin>=1.9,<2", "mypy", "numpy"],
-    oldest: (3, 9),
-    missing: "pip cannot install maturin, mypy and numpy: is PyPI within reach?",
-    too_old: "there is no python3 of version 3.9 or newer",
-};
+/// What building and testing Python's `hivtac` need: a folder below `target/`, what is imported,
+/// and the packages as pip knows them.
+const PACKAGE: [&str; 3] = [
+    "python",
+    "maturin, mypy, numpy",
+    "maturin>=1.9,<2 mypy numpy",
+];
 
-/// Why it cannot be tested here; nothing when it can.
-pub fn obstacle() -> Option<&'static str> {
-    ENVIRONMENT.obstacle()
+/// Who receives what `hivtac serve` sends: Cyclone DDS, which ROS 2 itself uses, a WebSocket
+/// client, and a reader of ROS 2's messages.
+const SERVE: [&str; 3] = [
+    "python-serve",
+    "cyclonedds, mcap_ros2, websockets",
+    "cyclonedds mcap-ros2-support websockets",
+];
+
+/// Makes the package's environment when it is not there; says what keeps it from that.
+pub fn no_package() -> Option<&'static str> {
+    obstacle(
+        PACKAGE,
+        "pip cannot install maturin, mypy and numpy for Python 3.9 or newer: is there python3 \
+         with venv (package python3-venv), and PyPI within reach?",
+    )
 }
 
-/// Installs the package as a user does, but in the profile of the other tests' programs, and runs
-/// its tests on the firmware in the rig; its annotations are checked, too.
-///
-/// # Errors
-/// When it cannot be built, an annotation is wrong, or a test fails.
-pub fn test(firmware: &Path, tally: &mut Tally) -> Result<()> {
-    let python = ENVIRONMENT.python()?;
+/// The same of `hivtac serve`.
+pub fn no_serve() -> Option<&'static str> {
+    obstacle(
+        SERVE,
+        "pip cannot install cyclonedds, mcap-ros2-support and websockets for Python 3.10 or \
+         newer: is there python3 with venv (package python3-venv), and PyPI within reach, and \
+         does it have cyclonedds for this Python and computer?",
+    )
+}
+
+fn obstacle(environment: [&str; 3], missing: &'static str) -> Option<&'static str> {
+    python(environment).err().map(|error| {
+        process::say(&format!("{error:#}"));
+        missing
+    })
+}
+
+/// An environment's Python, with the packages.
+fn python([folder, modules, packages]: [&str; 3]) -> Result<PathBuf> {
+    let folder = toolchain::at("target").join(folder);
+    let python = folder.join("bin/python");
+    let import = format!("import {modules}");
+    if !process::succeeds(Command::new(&python).args(["-c", &import])) {
+        process::run(process::command("python3 -m venv --clear").arg(&folder))?;
+        process::run(pip(&python).args(packages.split(' ')))?;
+    }
+    Ok(python)
+}
+
+/// `pip install`, without a word.
+fn pip(python: &Path) -> Command {
+    let mut command = Command::new(python);
+    command.args("-m pip install --quiet --disable-pip-version-check".split(' '));
+    command
+}
+
+/// Installs Python's `hivtac` as a user does, but in the profile of the other tests' programs, and
+/// runs its tests on the firmware in the rig; its annotations are checked, too.
+pub fn test_package(tally: &mut Tally) -> Result<()> {
+    let python = python(PACKAGE)?;
     let mut install = pip(&python);
+    install.args("--no-build-isolation --force-reinstall --no-deps ./host-tool/python".split(' '));
     // Where maturin is found by its build backend.
     let path = std::env::var("PATH").unwrap_or_default();
-    install.env(
-        "PATH",
-        format!("{}:{path}", ENVIRONMENT.folder().join("bin").display()),
-    );
-    install.args([
-        "--no-build-isolation",
-        "--force-reinstall",
-        "--no-deps",
-        "./host-tool/python",
-    ]);
+    let programs = python.with_file_name("");
+    install.env("PATH", format!("{}:{path}", programs.display()));
     install.env("MATURIN_PEP517_ARGS", "--profile tools");
-    process::run(install.current_dir(workspace::root()))?;
+    process::run(install.current_dir(toolchain::at("")))?;
     let mut types = Command::new(&python);
-    types.args([
-        "-m",
-        "mypy",
-        "--strict",
-        "--cache-dir",
-        "target/mypy",
-        "host-tool/python/hivtac",
-    ]);
-    process::run(types.current_dir(workspace::root()))?;
-    let mut command = Command::new(&python);
+    types.args("-m mypy --strict --cache-dir target/mypy host-tool/python/hivtac".split(' '));
+    process::run(types.current_dir(toolchain::at("")))?;
+    test(
+        &python,
+        "host-tool/python/tests/test_hivtac.py",
+        &artifacts::host_tool()?,
+        tally,
+    )
+}
+
+/// Serves the firmware in the rig, and looks at what arrives.
+pub fn test_serve(tally: &mut Tally) -> Result<()> {
+    let (python, tool) = (python(SERVE)?, artifacts::serving_tool()?);
+    test(&python, "tests/python/test_serve.py", &tool, tally)
+}
+
+fn test(python: &Path, file: &str, tool: &Path, tally: &mut Tally) -> Result<()> {
+    let mut command = Command::new(python);
     command
-        .args(["-W", "error", "host-tool/python/tests/test_hivtac.py"])
-        .current_dir(workspace::root())
-        .env("HIVTAC_ELF", firmware)
-        .env("HIVTAC_TOOL", artifacts::host_tool()?)
-        .env("HIVTAC_RIG", artifacts::rig()?);
-    pypi::run_tests(&mut command, tally)
+        .args(["-W", "error", file])
+        .current_dir(toolchain::at(""));
+    command.env("HIVTAC_ELF", artifacts::firmware(Board::Weact)?);
+    command
+        .env("HIVTAC_TOOL", tool)
+        .env("HIVTAC_RIG", artifacts::host_program("hivtac-rig")?);
+    run_tests(&mut command, tally)
 }

@@ -1,230 +1,212 @@
-//! Steps that are run one after the other, whatever becomes of each, and the table of how they
-//! went.
+//! How the steps of `cargo xtask test` go: a line when each begins and ends, and a table of all.
 
+use std::fs::File;
+use std::path::PathBuf;
 use std::process::Command;
-use std::time::{Duration, Instant};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result, ensure};
 
 use crate::process;
 
 /// Tests that passed and failed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Tests that passed.
-    pub passed: u64,
-    /// Tests that failed.
-    pub failed: u64,
+    passed: u64,
+    failed: u64,
 }
 
 impl Tally {
-    /// Adds what a line of a test runner says, if it is its summary:
-    /// `test result: ok. 6 passed; 0 failed; …`.
-    pub fn add_line(&mut self, line: &str) {
-        let Some((_, summary)) = line.split_once("test result: ") else {
-            return;
-        };
-        let before = |word: &str| -> u64 {
-            let number = summary.split_once(word).map(|(text, _)| text.trim_end());
-            let digits = number.and_then(|text| text.rsplit([' ', '.']).next());
-            digits.and_then(|digits| digits.parse().ok()).unwrap_or(0)
-        };
-        self.passed += before(" passed");
-        self.failed += before(" failed");
+    /// Adds what a line of a test runner says; gives whether it sums up others: Rust's
+    /// `test result: ok. 6 passed; 0 failed; …`, or of Python's unittest `NAME ... ok`, one test a
+    /// line, and at last `Ran 6 tests in 1.2s`.
+    fn add_line(&mut self, line: &str) -> bool {
+        if let Some((_, summary)) = line.split_once("test result: ") {
+            let before = |word: &str| -> u64 {
+                let words = summary
+                    .split_once(word)
+                    .and_then(|(text, _)| text.rsplit(' ').next());
+                words.and_then(|number| number.parse().ok()).unwrap_or(0)
+            };
+            self.passed += before(" passed");
+            self.failed += before(" failed");
+            return true;
+        }
+        match line.trim_end().rsplit_once(" ... ") {
+            Some((name, _)) if name.starts_with("test ") => {}
+            Some((_, "ok")) => self.passed += 1,
+            Some((_, "FAIL" | "ERROR")) => self.failed += 1,
+            _ => return line.starts_with("Ran "),
+        }
+        false
     }
 }
 
-struct Step {
+/// Runs a test runner, whose output goes to the step's log; prints the lines that sum up, at once,
+/// and adds them to the tally. It fails, too, when it ran no test at all.
+pub fn run_tests(command: &mut Command, tally: &mut Tally) -> Result<()> {
+    process::for_each_line(command, |line| {
+        process::say(line);
+        if tally.add_line(line) {
+            println!("{line}");
+        }
+    })?;
+    ensure!(tally.passed > 0, "`{command:?}` ran no test");
+    Ok(())
+}
+
+struct Done {
     name: &'static str,
-    /// Why it was left out.
-    obstacle: Option<&'static str>,
-    problem: Option<String>,
-    duration: Duration,
+    result: &'static str,
+    /// Why it failed or was not run.
+    why: String,
+    seconds: f64,
     tally: Tally,
 }
 
-/// How the steps so far went.
-#[derive(Default)]
+/// The steps so far, of all threads.
 pub struct Report {
-    steps: Vec<Step>,
+    start: Instant,
+    /// How many steps there are.
+    all: usize,
+    /// Where each step's output goes, in a file of its name.
+    logs: PathBuf,
+    begun: AtomicUsize,
+    done: Mutex<Vec<Done>>,
 }
 
 impl Report {
-    /// Runs a step and keeps what became of it. Gives its result when it went well.
-    pub fn step<T>(
-        &mut self,
-        name: &'static str,
-        work: impl FnOnce(&mut Tally) -> Result<T>,
-    ) -> Option<T> {
-        process::say(&format!("\n=== {name}"));
-        let (start, mut tally) = (Instant::now(), Tally::default());
-        let result = work(&mut tally);
-        let problem = result.as_ref().err().map(|error| format!("{error:#}"));
-        if let Some(problem) = &problem {
-            process::say(&format!("=== {name} failed: {problem}"));
+    /// Before the first of `all` steps.
+    pub fn new(all: usize, logs: PathBuf) -> Report {
+        Report {
+            start: Instant::now(),
+            all,
+            logs,
+            begun: AtomicUsize::new(0),
+            done: Mutex::default(),
         }
-        self.steps.push(Step {
-            name,
-            obstacle: None,
-            problem,
-            duration: start.elapsed(),
-            tally,
-        });
-        result.ok()
     }
 
-    /// Runs a step that nothing depends on, unless something keeps it from running here.
-    pub fn optional(
-        &mut self,
+    /// Runs a step on this thread and keeps what became of it, unless something keeps it from
+    /// running here. Its output goes to its log, which is shown when it fails.
+    pub fn step(
+        &self,
         name: &'static str,
-        obstacle: Option<&'static str>,
+        obstacle: impl FnOnce() -> Option<&'static str>,
         work: impl FnOnce(&mut Tally) -> Result<()>,
     ) {
-        match obstacle {
-            None => drop(self.step(name, work)),
-            Some(obstacle) => self.leave_out(name, obstacle),
+        let number = 1 + self.begun.fetch_add(1, Ordering::Relaxed);
+        println!("{} begins: {name}", self.mark(number));
+        let (begin, mut tally) = (Instant::now(), Tally::default());
+        let log = self.logs.join(name.replace([':', ' '], "-") + ".txt");
+        let work = || match obstacle() {
+            Some(why) => Ok(("not run", why.to_owned())),
+            None => work(&mut tally).map(|()| ("ok", String::new())),
+        };
+        let file = File::create(&log).with_context(|| log.display().to_string());
+        let done = file.and_then(|file| process::logged(file, work));
+        let (result, why) = done.unwrap_or_else(|error| ("FAILED", format!("{error:#}")));
+        if result == "FAILED" {
+            let said = std::fs::read(&log).unwrap_or_default();
+            // At once, so that no line of another thread is in between.
+            let said = String::from_utf8_lossy(&said);
+            println!("=== {name}\n{said}\n=== {name}: {why}");
         }
-    }
-
-    /// Takes over the steps of another.
-    pub fn append(&mut self, other: Report) {
-        self.steps.extend(other.steps);
-    }
-
-    /// Notes that a step is left out, and why.
-    fn leave_out(&mut self, name: &'static str, obstacle: &'static str) {
-        process::say(&format!("\n=== {name} is left out: {obstacle}"));
-        self.steps.push(Step {
+        let seconds = begin.elapsed().as_secs_f64();
+        let mut steps = self.done();
+        steps.push(Done {
             name,
-            obstacle: Some(obstacle),
-            problem: None,
-            duration: Duration::ZERO,
-            tally: Tally::default(),
+            result,
+            why,
+            seconds,
+            tally,
         });
+        let (mark, so_far) = (self.mark(number), summary(&steps));
+        println!("{mark} {result}: {name}, {seconds:.1} s; so far: {so_far}");
     }
 
-    /// Prints the table.
-    ///
-    /// # Errors
-    /// When a step failed: names all that did.
+    /// Which step it is, and the time since the first began.
+    fn mark(&self, number: usize) -> String {
+        let (all, seconds) = (self.all, self.start.elapsed().as_secs());
+        format!("[{number}/{all} {}:{:02}]", seconds / 60, seconds % 60)
+    }
+
+    fn done(&self) -> MutexGuard<'_, Vec<Done>> {
+        self.done.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Prints the table; an error names the steps that failed.
     pub fn finish(&self) -> Result<()> {
-        println!(
-            "\n{:<34}{:>8}{:>9}{:>8}{:>9}",
-            "step", "result", "seconds", "passed", "failed"
-        );
-        self.steps.iter().for_each(Step::print);
-        let total = self.total();
-        let failed: Vec<_> = self.failed().map(|step| step.name).collect();
-        for (step, obstacle) in self.left_out() {
-            println!("{step} was not run: {obstacle}");
+        let steps = self.done();
+        println!("\nstep                                result  seconds  passed  failed");
+        for step in &*steps {
+            let Tally { passed, failed } = step.tally;
+            let tests = format!("{passed:>8}{failed:>8}");
+            let tests = if passed + failed > 0 { &tests } else { "" };
+            let (name, result, seconds) = (step.name, step.result, step.seconds);
+            println!("{name:<34}{result:>8}{seconds:>9.1}{tests}");
         }
-        for step in self.failed() {
-            println!("{}: {}", step.name, step.problem.as_deref().unwrap_or(""));
+        for step in steps.iter().filter(|step| !step.why.is_empty()) {
+            println!("{}: {}: {}", step.name, step.result, step.why);
         }
-        println!("{} steps, {} failed", self.steps.len(), failed.len());
-        println!("{} passed, {} failed", total.passed, total.failed);
-        if !failed.is_empty() {
-            bail!("failed: {}", failed.join("; "));
-        }
+        println!("{}", summary(&steps));
+        let failed = failed(&steps);
+        ensure!(failed.is_empty(), "failed: {}", failed.join("; "));
         Ok(())
     }
-
-    fn failed(&self) -> impl Iterator<Item = &Step> {
-        self.steps.iter().filter(|step| step.problem.is_some())
-    }
-
-    fn left_out(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        let steps = self.steps.iter();
-        steps.filter_map(|step| Some((step.name, step.obstacle?)))
-    }
-
-    fn total(&self) -> Tally {
-        self.steps.iter().fold(Tally::default(), |sum, step| Tally {
-            passed: sum.passed + step.tally.passed,
-            failed: sum.failed + step.tally.failed,
-        })
-    }
 }
 
-impl Step {
-    fn print(&self) {
-        let result = match (&self.problem, self.obstacle) {
-            (Some(_), _) => "FAILED",
-            (None, Some(_)) => "not run",
-            (None, None) => "ok",
-        };
-        let seconds = self.duration.as_secs_f64();
-        let Tally { passed, failed } = self.tally;
-        if (passed, failed) == (0, 0) {
-            println!("{:<34}{result:>8}{seconds:>9.1}", self.name);
-        } else {
-            println!(
-                "{:<34}{result:>8}{seconds:>9.1}{passed:>8}{failed:>9}",
-                self.name
-            );
-        }
-    }
+fn failed(steps: &[Done]) -> Vec<&'static str> {
+    let failed = steps.iter().filter(|step| step.result == "FAILED");
+    failed.map(|step| step.name).collect()
 }
 
-/// Runs a test runner, shows all it prints, and adds up its summaries.
-///
-/// # Errors
-/// When it fails, or when it ran no test at all.
-pub fn run_tests(command: &mut Command, tally: &mut Tally) -> Result<()> {
-    process::for_each_line(command, |line| {
-        process::print_through(line);
-        tally.add_line(line);
-    })?;
-    if tally.passed == 0 {
-        bail!("`{}` ran no test", process::display(command));
-    }
-    Ok(())
+fn summary(steps: &[Done]) -> String {
+    let passed: u64 = steps.iter().map(|step| step.tally.passed).sum();
+    let failed_tests: u64 = steps.iter().map(|step| step.tally.failed).sum();
+    let (all, failed) = (steps.len(), failed(steps).len());
+    format!("{all} steps, {failed} failed; tests: {passed} passed, {failed_tests} failed")
 }
 
 #[cfg(test)]
 mod tests {
+    use anyhow::bail;
+
     use super::*;
 
     #[test]
-    fn summaries_of_test_runners_add_up() {
+    fn what_test_runners_say_adds_up() {
         let mut tally = Tally::default();
-        tally
-            .add_line("test result: ok. 6 passed; 0 failed; 1 ignored; 0 measured; 0 filtered out");
-        tally.add_line("test result: FAILED. 5 passed; 12 failed; 0 ignored\n");
-        tally.add_line("test works ... ok");
-        assert_eq!(
-            tally,
-            Tally {
-                passed: 11,
-                failed: 12
-            }
-        );
+        assert!(tally.add_line("test result: ok. 6 passed; 0 failed; 1 ignored; 0 measured"));
+        assert!(tally.add_line("test result: FAILED. 5 passed; 12 failed; 0 ignored"));
+        assert!(!tally.add_line("test works ... ok"));
+        assert!(!tally.add_line("test_a (t.T.test_a) ... ok"));
+        assert!(!tally.add_line("test_b (t.T.test_b) ... ERROR"));
+        assert!(tally.add_line("Ran 2 tests in 0.1s"));
+        assert_eq!((tally.passed, tally.failed), (12, 13));
     }
 
     #[test]
-    fn a_failing_step_does_not_keep_others_from_running() {
-        let mut report = Report::default();
-        assert_eq!(
-            report.step("one", |_| -> Result<u8> { bail!("broken") }),
-            None
+    fn a_failing_step_keeps_no_other_from_running_and_one_left_out_fails_nothing() {
+        let report = Report::new(3, std::env::temp_dir());
+        report.step(
+            "xtask one",
+            || None,
+            |tally| run_tests(&mut Command::new("true"), tally),
         );
-        assert_eq!(report.step("two", |_| Ok(2)), Some(2));
+        let mut ran = false;
+        report.step(
+            "xtask two",
+            || None,
+            |_| {
+                ran = true;
+                Ok(())
+            },
+        );
+        report.step("xtask three", || Some("it is night"), |_| bail!("it ran"));
         let error = report.finish().unwrap_err().to_string();
-        assert!(error.contains("one") && !error.contains("two"), "{error}");
-    }
-
-    #[test]
-    fn a_step_that_was_left_out_is_told_and_fails_nothing() {
-        let mut report = Report::default();
-        report.optional("one", Some("it is night"), |_| bail!("it ran"));
-        let told: Vec<_> = report.left_out().collect();
-        assert_eq!(told, [("one", "it is night")]);
-        assert!(report.finish().is_ok());
-    }
-
-    #[test]
-    fn a_runner_without_tests_fails() {
-        let mut tally = Tally::default();
-        assert!(run_tests(&mut Command::new("true"), &mut tally).is_err());
+        assert!(ran && error == "failed: xtask one", "{error}");
     }
 }

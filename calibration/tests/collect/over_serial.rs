@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::Write;
+use std::path::Path;
 use std::process::Command;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -43,6 +44,20 @@ fn play(mut gauge: File, begun: Instant, end: Arc<AtomicBool>) {
     }
 }
 
+/// Frames in which the hand presses and lets go often enough for clocks to be aligned.
+const FRAMES: usize = 400;
+
+/// Waits until a recording holds so many samples.
+fn wait_for_samples(here: &Path, count: usize) {
+    let file = here.join("unit/samples.csv");
+    let lines = || std::fs::read_to_string(&file).map_or(0, |text| text.lines().count());
+    let end = Instant::now() + Duration::from_secs(60);
+    while lines() < count {
+        assert!(Instant::now() < end, "{} lines in a minute", lines());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
 #[test]
 fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
     let directory = tempfile::tempdir().unwrap();
@@ -76,7 +91,7 @@ fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
     let mut child = start(here, &arguments);
     let mut input = child.stdin.take().unwrap();
     input.write_all(b"\n0 0\n").unwrap();
-    std::thread::sleep(Duration::from_secs(9));
+    wait_for_samples(here, FRAMES);
     let status = Command::new("kill")
         .args(["-s", "INT", &child.id().to_string()])
         .status();

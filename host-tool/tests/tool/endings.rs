@@ -4,22 +4,32 @@ use crate::fake::*;
 use crate::run::*;
 use hivtac_wire::message::{DeviceMessage, HostMessage, LogLevel, LogLine};
 use std::io::{BufRead, BufReader, Read};
+use std::process::ChildStdout;
 use std::time::{Duration, Instant};
 
 #[test]
 fn a_pulled_cable_is_an_error_after_the_summary() {
-    let script = || -> Script {
-        Box::new(|device| {
+    for is_tcp in [true, false] {
+        let (pull, pulled) = std::sync::mpsc::channel();
+        let script: Script = Box::new(move |device| {
             device.until_start();
             device.send(sample(5, 5));
-            // Time for the tool to read: a hangup may discard what waits in the terminal.
-            std::thread::sleep(std::time::Duration::from_millis(300));
-        })
-    };
-    for device in [FakeDevice::on_tcp([script()]), FakeDevice::on_pty(script())] {
-        let run = run(&["monitor", "--port", &device.port, "--json"]);
+            // A hangup may discard what waits in the terminal.
+            pulled.recv().unwrap();
+        });
+        let device = match is_tcp {
+            true => FakeDevice::on_tcp([script]),
+            false => FakeDevice::on_pty(script),
+        };
+        let mut run = start(&["monitor", "--port", &device.port, "--json"]);
+        let shown = run.child().stdout.take().unwrap();
+        let mut shown = BufReader::new(shown).lines();
+        let first = shown.next().expect("it shows the sample").unwrap();
+        assert_eq!(sequence_numbers(&first), [5]);
+        pull.send(()).unwrap();
+        let run = run.finish();
         assert_eq!(run.code, Some(5), "{run:?}");
-        assert_eq!(sequence_numbers(&run.stdout), [5]);
+        assert!(shown.next().is_none());
         let lines: Vec<_> = run.stderr.lines().collect();
         assert_eq!(lines[0], "1 frames shown, 1 received, 0 lost");
         let last = lines.last().unwrap();
@@ -244,13 +254,28 @@ fn endless() -> FakeDevice {
 /// does in a tenth of a second.
 const SOON: Duration = Duration::from_secs(10);
 
+/// Waits until a pipe that nobody reads takes nothing more.
+fn until_full(pipe: &ChildStdout) {
+    let end = Instant::now() + SOON;
+    let mut before = 0;
+    loop {
+        let held = rustix::io::ioctl_fionread(pipe).unwrap();
+        if held > 0 && held == before {
+            return;
+        }
+        assert!(Instant::now() < end, "it goes on at {held} bytes");
+        before = held;
+        std::thread::sleep(Duration::from_millis(100));
+    }
+}
+
 /// Nobody reads either pipe; the first is full after some hundred lines.
 #[test]
 fn ctrl_c_ends_it_though_its_reader_stalls() {
     for format in [&["--json"][..], &[]] {
         let device = endless();
         let mut run = start(&[&["monitor", "--port", &device.port], format].concat());
-        std::thread::sleep(Duration::from_millis(700));
+        until_full(run.child().stdout.as_ref().unwrap());
         signal(run.child().id(), "INT");
         let asked = Instant::now();
         let status = run.child().wait().unwrap();

@@ -24,7 +24,7 @@ use rustix::pty::OpenptFlags;
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{Read, Write};
-use std::net::TcpListener;
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::mpsc;
 
 pub trait Stream: Read + Write + Send {}
@@ -51,6 +51,8 @@ pub struct Conversation {
     pub snapshots: VecDeque<Vec<DeviceMessage>>,
     /// True when the host takes nothing any more.
     pub host_is_gone: bool,
+    /// Its connection, where that is TCP.
+    tcp: Option<TcpStream>,
 }
 
 /// What a device does on one connection.
@@ -102,6 +104,12 @@ impl Conversation {
         while let Some(message) = self.next() {
             self.answer(message);
         }
+    }
+
+    /// Is gone, on TCP, once the host has read what was sent: closing at once may discard that.
+    pub fn end_after_what_was_sent(&mut self) {
+        self.tcp.take().unwrap().shutdown(Shutdown::Write).unwrap();
+        while self.next().is_some() {}
     }
 
     /// Answers one message like a good device; false when the host is gone.
@@ -329,6 +337,7 @@ fn conversation(stream: Box<dyn Stream>, commands: &mpsc::Sender<Request>) -> Co
         flash: Outcome::Done,
         snapshots: VecDeque::new(),
         host_is_gone: false,
+        tcp: None,
     }
 }
 
@@ -340,7 +349,12 @@ impl FakeDevice {
         std::thread::spawn(move || {
             for script in scripts {
                 let (stream, _) = listener.accept().unwrap();
-                script(&mut conversation(Box::new(stream), &sender));
+                let tcp = Some(stream.try_clone().unwrap());
+                let conversation = conversation(Box::new(stream), &sender);
+                script(&mut Conversation {
+                    tcp,
+                    ..conversation
+                });
             }
         });
         FakeDevice { port, commands }

@@ -9,6 +9,11 @@ use std::time::Duration;
 
 /// A device that sends these numbers as samples, one every 5 ms, and its counters; then waits.
 fn paced(numbers: Vec<u32>) -> Script {
+    paced_and_told(numbers, |_| ())
+}
+
+/// The same, and tells of each that was sent.
+fn paced_and_told(numbers: Vec<u32>, tell: impl Fn(u32) + Send + 'static) -> Script {
     Box::new(move |device| {
         while let Some(message) = device.next() {
             if let hivtac_wire::message::HostMessage::Command(command) = &message
@@ -17,6 +22,7 @@ fn paced(numbers: Vec<u32>) -> Script {
                 device.reply(command.id, hivtac_wire::message::Outcome::Done);
                 for number in &numbers {
                     device.send(sample(*number, *number));
+                    tell(*number);
                     std::thread::sleep(Duration::from_millis(5));
                 }
                 device.send(DeviceMessage::Stats(Stats {
@@ -185,7 +191,7 @@ fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
         samples(0..30)
             .into_iter()
             .for_each(|message| device.send(message));
-        std::thread::sleep(Duration::from_millis(200));
+        device.end_after_what_was_sent();
     })]);
     let recorded = run(&["record", &file, "--port", &device.port]);
     assert_eq!(recorded.code, Some(5), "{recorded:?}");
@@ -200,9 +206,14 @@ fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
 fn ctrl_c_ends_a_recording_cleanly() {
     let folder = Folder::new();
     let file = folder.path("a.csv");
-    let device = FakeDevice::on_tcp([paced((0..200).collect())]);
+    let (told, sent) = std::sync::mpsc::channel();
+    // Nobody hears of the last ones.
+    let tell = move |number| {
+        let _ = told.send(number);
+    };
+    let device = FakeDevice::on_tcp([paced_and_told((0..100).collect(), tell)]);
     let mut recording = start(&["record", &file, "--port", &device.port]);
-    std::thread::sleep(Duration::from_millis(600));
+    while sent.recv_timeout(Duration::from_secs(20)).unwrap() < 50 {}
     signal(recording.child().id(), "INT");
     let recorded = recording.finish();
     assert_eq!(recorded.code, Some(130), "{recorded:?}");
@@ -310,7 +321,7 @@ fn one_lost_sensor_of_several_ends_a_recording_with_what_came_of_all() {
         samples(0..5)
             .into_iter()
             .for_each(|message| device.send(message));
-        std::thread::sleep(Duration::from_millis(200));
+        device.end_after_what_was_sent();
     })]);
     let recorded = record_all(&[&thumb, &pulled], &file);
     assert_eq!(recorded.code, Some(5), "{recorded:?}");

@@ -13,8 +13,8 @@ pub use real::RealFilm;
 pub use rows::{Errors, Row};
 pub use unit::{Answer, Tared, TestedUnit};
 
-use hivtac_twin::{FilmError, Load};
 use hivtac_shell::halton;
+use hivtac_twin::{FilmError, Load};
 
 /// Forces, mN.
 pub const FORCES_MN: [u32; 3] = [50, 100, 200];

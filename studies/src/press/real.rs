@@ -4,9 +4,9 @@
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
+use hivtac_shell::{Design, Equilibrium, Film, Law, Material, pressed};
 use hivtac_twin::film::{MARKER_CENTRES_MM, Pressed};
 use hivtac_twin::{Disc, Load, Options};
-use hivtac_shell::{Design, Equilibrium, Film, Law, Material, pressed};
 use rand::Rng;
 
 use super::seeded;

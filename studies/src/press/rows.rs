@@ -3,8 +3,8 @@
 use anyhow::{Context, Result};
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::evaluation::errors::angle_deg;
-use hivtac_twin::Load;
 use hivtac_sensor::force::Force;
+use hivtac_twin::Load;
 use serde::Serialize;
 
 /// Sums of squares of errors, and how many of them are within what was stated.

@@ -1,9 +1,6 @@
 //! One simulated unit: its scene, its tare, its answers.
 
 use anyhow::{Result, anyhow};
-use hivtac_twin::film::Pressed;
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
-use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
@@ -11,6 +8,9 @@ use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::film::Pressed;
+use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
+use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 
 use super::{Drawn, RealFilm};
 

@@ -6,9 +6,9 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::data::dataset::reasons;
+use hivtac_sensor::force::model::Model;
 use hivtac_twin::hard_cases::{HardCase, hard_cases};
 use hivtac_twin::{Frame, Load, Options, Preset, Scene};
-use hivtac_sensor::force::model::Model;
 
 use super::canvas::{BLACK, CHARACTER, Canvas, Colour, WHITE};
 use super::render::mark_truth;

@@ -4,13 +4,13 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
+use hivtac_calibration::data::range::Range;
+use hivtac_calibration::evaluation::check::check;
 use hivtac_calibration::fit::fit;
 use hivtac_calibration::network::{Arithmetic, Meaning};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::Options;
-use hivtac_calibration::data::dataset::{Loads, Recipe, generate};
-use hivtac_calibration::data::range::Range;
-use hivtac_calibration::evaluation::check::check;
 use serde_json::json;
 
 use super::Configuration;

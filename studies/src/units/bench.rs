@@ -2,13 +2,13 @@
 //! them.
 
 use anyhow::{Context, Result};
+use hivtac_calibration::data::rest::Rest;
 use hivtac_calibration::forward::Known;
 use hivtac_calibration::loads::{Rough, SeenLoad};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_calibration::data::rest::Rest;
-use hivtac_twin::Load;
 use hivtac_sensor::force::features::Features;
+use hivtac_twin::Load;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 

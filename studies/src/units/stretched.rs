@@ -5,9 +5,9 @@ use std::path::Path;
 
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_twin::film::DiscMotion;
-use hivtac_twin::Load;
 use hivtac_sensor::force::model::Model;
+use hivtac_twin::Load;
+use hivtac_twin::film::DiscMotion;
 use serde_json::{Value, json};
 
 use super::Bench;

@@ -1,81 +1,51 @@
 //! `cargo xtask bench --board`: the same items from the cycle counter of a real STM32H743.
 
-use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use super::cases;
-use crate::numbers::{decimal, grouped};
-use crate::toolchain::Toolchain;
-use crate::{artifacts, process, workspace};
+use super::measure;
+use super::tables::decimal;
+use crate::{artifacts, process, toolchain};
 
-/// The core's clock, in MHz.
-const CLOCK_MHZ: f64 = 480.0;
-const CHIP: &str = "STM32H743VITx";
 const PACKAGE: &str = "hivtac-board";
 
 /// Builds the image, flashes it, and prints what the board says.
-///
-/// # Errors
-/// When there is no probe-rs or no board, or the board does not end.
-pub fn run(toolchain: &Toolchain) -> Result<()> {
-    let image = build(toolchain)?;
-    find_probe()?;
-    let mut command = Command::new("probe-rs");
-    command.args(["run", "--chip", CHIP]).arg(&image);
-    let (mut rows, mut done) = (Vec::new(), false);
-    process::for_each_line(&mut command, |line| {
+pub fn run() -> Result<()> {
+    let image = artifacts::build(&mut command()?, PACKAGE)?;
+    let list = process::output(&mut process::command("probe-rs list"));
+    let list = list.context("the image is built; to run it: `cargo install probe-rs-tools`")?;
+    let is_there = !list.contains("No debug probes");
+    ensure!(
+        is_there,
+        "the image is built; to run it, connect an STM32H743 by a debug probe"
+    );
+    let mut command = process::command("probe-rs run --chip STM32H743VITx");
+    let (mut rows, mut done) = (String::new(), false);
+    process::for_each_line(command.arg(&image), |line| {
         rows.extend(row(line));
         done |= line.contains("done");
     })?;
     ensure!(done, "the board stopped before it had measured everything");
-    println!(
-        "| item | frame | format | cycles, measured | µs at 480 MHz |\n|---|---|---|---:|---:|\n{}",
-        rows.concat()
-    );
+    println!("| item | frame | format | cycles, measured | µs at 480 MHz |");
+    println!("|---|---|---|---:|---:|\n{rows}");
     Ok(())
 }
 
-/// The image for the board; nothing has to be attached.
-///
-/// # Errors
-/// When it cannot be built.
-pub fn build(toolchain: &Toolchain) -> Result<PathBuf> {
-    artifacts::build(&mut command(toolchain)?, PACKAGE)
-}
-
-/// Builds the image and lints it.
-///
-/// # Errors
-/// When it cannot be built, or clippy complains.
-pub fn lint(toolchain: &Toolchain) -> Result<()> {
-    let mut command = command(toolchain)?;
-    toolchain.lint(&mut command)?;
+/// Builds the image and lints it; nothing has to be attached.
+pub fn lint() -> Result<()> {
+    let mut command = command()?;
+    toolchain::lint_for_target(&mut command)?;
     artifacts::without_warnings(command)
 }
 
-fn command(toolchain: &Toolchain) -> Result<Command> {
-    let data = workspace::work_folder("bench")?;
-    cases::write(&data)?;
-    let mut command = toolchain.build(workspace::root());
-    command.args(["--package", PACKAGE, "--release"]);
+fn command() -> Result<Command> {
+    let data = toolchain::work_folder("bench")?;
+    measure::cases(&data)?;
+    let mut command = toolchain::build_for_target("");
     command.env("HIVTAC_BOARD_DATA", data);
+    command.args(["--package", PACKAGE]);
     Ok(command)
-}
-
-fn find_probe() -> Result<()> {
-    process::find_program("probe-rs").context(
-        "the image is built; to run it, probe-rs is missing: `cargo install probe-rs-tools \
-         --locked`",
-    )?;
-    let list = process::output(Command::new("probe-rs").arg("list"))?;
-    ensure!(
-        !list.contains("No debug probes"),
-        "the image is built; to run it, connect an STM32H743 board by a debug probe: `probe-rs \
-         list` sees none"
-    );
-    Ok(())
 }
 
 /// `frame full|320x240|rgb565|200000`, whatever stands around it.
@@ -84,9 +54,8 @@ fn row(line: &str) -> Option<String> {
     let [item, frame, format, cycles] = words[..] else {
         return None;
     };
-    let cycles: u64 = cycles.split_whitespace().next()?.parse().ok()?;
-    let time = decimal((cycles as f64 / CLOCK_MHZ * 10.0).round() / 10.0);
-    let cycles = grouped(cycles);
+    let cycles: f64 = cycles.split_whitespace().next()?.parse().ok()?;
+    let (cycles, time) = (decimal(cycles), decimal((cycles / 48.0).round() / 10.0));
     Some(format!(
         "| {item} | {frame} | {format} | {cycles} | {time} |\n"
     ))
@@ -94,14 +63,13 @@ fn row(line: &str) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::row;
 
     #[test]
     fn what_the_board_says_becomes_a_row() {
-        assert_eq!(
-            row("frame full, 5 % salt|320x240|rgb565|96000\n").as_deref(),
-            Some("| frame full, 5 % salt | 320x240 | rgb565 | 96,000 | 200 |\n")
-        );
+        let line = "frame full, 5 % salt|320x240|rgb565|96000\n";
+        let expected = "| frame full, 5 % salt | 320x240 | rgb565 | 96,000 | 200 |\n";
+        assert_eq!(row(line).as_deref(), Some(expected));
         assert_eq!(row("Finished in 1.2s"), None);
     }
 }

@@ -1,84 +1,113 @@
-//! One case in QEMU: what each of its stages costs.
+//! The cases that `benchmark-cases` (in `tests`) writes, each in QEMU: what its stages cost.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::iter::Sum;
-use std::ops::{Add, AddAssign};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use anyhow::{Context, Result};
+use serde::Deserialize;
 
-use super::cases::{Case, Work, neurons};
-use super::disassembly;
-use super::mca::{self, Mca};
-use super::memory::Loads;
-use super::record::{Part, Record};
+use super::cycles::Model;
 use super::stages::Stages;
-use crate::process;
+use crate::process::{self, command};
+use crate::{artifacts, toolchain};
 
-/// Executed instructions, and what LLVM's model of the core makes of them.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Cost {
-    /// Exact.
-    pub instructions: u64,
-    /// Modelled, in memory without wait states; `None` without LLVM.
-    pub cycles: Option<f64>,
+/// The emulator, up to how scripts are handed to the image.
+const QEMU: &str = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial none \
+    -d plugin -semihosting-config";
+
+/// One script, as `benchmark-cases` describes it.
+#[derive(Deserialize)]
+pub struct Case {
+    pub work: Work,
+    file: PathBuf,
+    /// Columns and rows of the frame, or of the frames that the model is for.
+    pub size: [u64; 2],
+    /// Pixel format of that frame: `rgb565`, `yuv422` or `mono`.
+    pub format: String,
 }
 
-impl Add for Cost {
-    type Output = Cost;
+/// What a case runs.
+#[derive(Deserialize)]
+pub enum Work {
+    /// One frame, from its first row to the force; what is special about it, empty for the usual
+    /// one.
+    Frame(String),
+    /// One inference of a model with these layer widths.
+    Network(Vec<u64>),
+    /// The network of a model that tells places, and so many steps from its answer.
+    Steps(u64),
+    /// The threshold's table of 64 KiB, made once for each threshold.
+    Table,
+}
 
-    fn add(self, other: Cost) -> Cost {
-        let cycles = match (self.cycles, other.cycles) {
-            (Some(a), Some(b)) => Some(a + b),
-            (one, other) => one.or(other),
-        };
-        Cost {
-            instructions: self.instructions + other.instructions,
-            cycles,
+/// Writes all scripts into a folder.
+pub fn cases(folder: &Path) -> Result<Vec<Case>> {
+    let mut command = std::process::Command::new(artifacts::host_program("benchmark-cases")?);
+    let lines = process::output(command.current_dir(toolchain::at("")).arg(folder))?;
+    let cases: Result<_, _> = lines.lines().map(serde_json::from_str).collect();
+    cases.context("what benchmark-cases says")
+}
+
+/// Executed instructions, exactly, and what LLVM's model of the core makes of them in memory
+/// without wait states: not a number without LLVM.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Cost {
+    pub instructions: u64,
+    pub cycles: f64,
+}
+
+/// The costs of stages.
+pub type Costs = BTreeMap<&'static str, Cost>;
+
+/// Of some stages together, or of all when none is named.
+pub fn sum(costs: &Costs, stages: &[&str]) -> Cost {
+    let mut sum = Cost::default();
+    for (stage, cost) in costs {
+        if stages.is_empty() || stages.contains(stage) {
+            sum.add(*cost);
         }
     }
+    sum
 }
 
-impl AddAssign for Cost {
-    fn add_assign(&mut self, other: Cost) {
-        *self = *self + other;
-    }
-}
-
-impl Sum for Cost {
-    fn sum<I: Iterator<Item = Cost>>(costs: I) -> Cost {
-        costs.fold(Cost::default(), Add::add)
+impl Cost {
+    fn add(&mut self, other: Cost) {
+        self.instructions += other.instructions;
+        self.cycles += other.cycles;
     }
 }
 
 /// What one case took.
 pub struct Measured {
-    /// The case.
     pub case: Case,
-    /// Cost of each stage.
-    pub stages: BTreeMap<&'static str, Cost>,
+    pub stages: Costs,
     /// What happens once the last band of rows is there.
     pub last_band: Cost,
-    /// The loops of the network that multiply.
+    /// What runs more often than a network has neurons: its multiplications.
     pub inner_loop: Cost,
-    /// How often a predictor that always guesses a block's usual successor is wrong.
-    pub mispredictions: u64,
-    /// Where data was loaded from.
-    pub loads: Loads,
 }
 
-impl Measured {
-    /// Everything together.
-    pub fn total(&self) -> Cost {
-        self.stages.values().copied().sum()
-    }
+/// What the plugin (`xtask/instruction-counter`) recorded of one run.
+#[derive(Deserialize)]
+pub struct Record {
+    /// The instructions of each block, by their addresses, in order.
+    pub blocks: Vec<Vec<u64>>,
+    /// Whether the last band of rows was there, the block before, the block, and how often it ran
+    /// after that; the first after a call has none before.
+    pub runs: Vec<(bool, Option<usize>, usize, u64)>,
+}
 
-    /// Some stages together.
-    pub fn of(&self, stages: &[&str]) -> Cost {
-        let costs = stages.iter().filter_map(|stage| self.stages.get(stage));
-        costs.copied().sum()
+impl Record {
+    /// How often each instruction ran. It may lie in several blocks: the first round of a loop is
+    /// one with what comes before it.
+    fn executions(&self) -> BTreeMap<u64, u64> {
+        let mut executions = BTreeMap::new();
+        for (_, _, block, count) in &self.runs {
+            for address in &self.blocks[*block] {
+                *executions.entry(*address).or_default() += count;
+            }
+        }
+        executions
     }
 }
 
@@ -89,172 +118,84 @@ pub struct Bench {
     folder: PathBuf,
     stages: Stages,
     /// `None` without LLVM.
-    mca: Option<Mca>,
+    model: Option<Model>,
 }
 
 impl Bench {
-    /// Measures on `image` with QEMU's `plugin`; writes what it needs into `folder`.
-    ///
-    /// # Errors
-    /// When the image cannot be read, or LLVM does not know the core.
-    pub fn new(image: PathBuf, plugin: PathBuf, folder: PathBuf) -> Result<Bench> {
-        let mca = if mca::is_installed() {
-            let disassembly = disassembly::disassemble(&image)?;
-            Some(Mca::new(disassembly, folder.join("blocks.s"))?)
-        } else {
-            None
-        };
+    /// Measures on `image`; writes what it needs into `folder`.
+    pub fn new(image: PathBuf, folder: PathBuf) -> Result<Bench> {
         Ok(Bench {
+            plugin: artifacts::instruction_counter(plugin_version()?)?,
             stages: Stages::of_image(&image)?,
+            model: Model::new(&image, folder.join("blocks.s"))?,
             image,
-            plugin,
             folder,
-            mca,
         })
-    }
-
-    /// Runs all cases.
-    ///
-    /// # Errors
-    /// When QEMU or LLVM fail.
-    pub fn measure_all(&mut self, cases: Vec<Case>) -> Result<Vec<Measured>> {
-        cases.into_iter().map(|case| self.measure(case)).collect()
     }
 
     /// Runs one case.
-    ///
-    /// # Errors
-    /// When QEMU or LLVM fail.
-    fn measure(&mut self, case: Case) -> Result<Measured> {
-        let record = self.record(&case.file)?;
-        let cycles = match &mut self.mca {
-            Some(mca) => mca.cycles(&record)?.into_iter().map(Some).collect(),
-            None => vec![None; record.blocks().len()],
+    pub fn measure(&mut self, case: Case) -> Result<Measured> {
+        let record = self.record(&case)?;
+        let cycles = match &mut self.model {
+            Some(model) => model.cycles(&record)?,
+            None => vec![f64::NAN; record.blocks.len()],
         };
-        let parts = self.stages(&record, Part::Whole, &cycles)?;
-        let last_band = self.stages(&record, Part::LastBand, &cycles)?;
-        Ok(Measured {
-            inner_loop: self.inner_loop(&case, &record, &cycles)?,
+        let mut measured = Measured {
             case,
-            stages: parts,
-            last_band: last_band.into_values().sum(),
-            mispredictions: record.unusual_exits(),
-            loads: Loads::of(&record),
-        })
-    }
-
-    fn record(&self, script: &Path) -> Result<Record> {
-        let (log, results) = (self.folder.join("record"), self.folder.join("results"));
-        process::run_quietly(&mut qemu(&self.image, &self.plugin, script, &results, &log))?;
-        let text =
-            fs::read_to_string(&log).with_context(|| format!("reading {}", log.display()))?;
-        Record::parse(&text)
-    }
-
-    /// What each stage costs in one part.
-    fn stages(
-        &mut self,
-        record: &Record,
-        part: Part,
-        cycles: &[Option<f64>],
-    ) -> Result<BTreeMap<&'static str, Cost>> {
-        let mut stages = BTreeMap::<_, Cost>::new();
-        let blocks = record.blocks().iter().zip(record.counts(part)).zip(cycles);
-        for ((block, count), cycles) in blocks.filter(|((_, count), _)| *count > 0) {
-            // A block that the compiler made of several stages is shared by their instructions.
-            let share = |cycles: f64| cycles * count as f64 / block.len() as f64;
-            for address in block {
-                if let Some(stage) = self.stages.stage(*address)? {
-                    *stages.entry(stage).or_default() += Cost {
-                        instructions: count,
-                        cycles: cycles.map(share),
-                    };
-                }
-            }
-        }
-        Ok(stages)
-    }
-
-    /// The instructions of the network that run more often than there are neurons: those that
-    /// multiply.
-    fn inner_loop(&mut self, case: &Case, record: &Record, cycles: &[Option<f64>]) -> Result<Cost> {
-        let Work::Network(widths) = &case.work else {
-            return Ok(Cost::default());
+            stages: Costs::default(),
+            last_band: Cost::default(),
+            inner_loop: Cost::default(),
         };
-        let mut sum = Cost::default();
+        let neurons = match &measured.case.work {
+            Work::Network(widths) => widths[1..].iter().sum(),
+            _ => u64::MAX,
+        };
         let executions = record.executions();
-        let blocks = record.blocks().iter().zip(record.counts(Part::Whole));
-        for ((block, count), cycles) in blocks.zip(cycles) {
-            // An instruction may lie in several blocks: the first round of a loop is one with what
-            // comes before it.
-            let share = |cycles: f64| cycles * count as f64 / block.len() as f64;
-            for address in block {
-                let often = executions[address] > neurons(widths);
-                if often && self.stages.stage(*address)? == Some("network") {
-                    sum += Cost {
-                        instructions: count,
-                        cycles: cycles.map(share),
-                    };
+        for &(is_last_band, _, block, instructions) in &record.runs {
+            let addresses = &record.blocks[block];
+            // A block that the compiler made of several stages is shared by their instructions.
+            let cycles = cycles[block] * instructions as f64 / addresses.len() as f64;
+            for address in addresses {
+                let Some(stage) = self.stages.stage(*address)? else {
+                    continue;
+                };
+                let cost = Cost {
+                    instructions,
+                    cycles,
+                };
+                measured.stages.entry(stage).or_default().add(cost);
+                if is_last_band {
+                    measured.last_band.add(cost);
+                }
+                if stage == "network" && executions[address] > neurons {
+                    measured.inner_loop.add(cost);
                 }
             }
         }
-        Ok(sum)
+        Ok(measured)
     }
-}
 
-fn qemu(image: &Path, plugin: &Path, script: &Path, results: &Path, log: &Path) -> Command {
-    let (script, results) = (script.display(), results.display());
-    let mut command = Command::new("qemu-system-arm");
-    command
-        .args(["-M", "mps2-an500", "-display", "none", "-monitor", "none"])
-        .args(["-serial", "none", "-semihosting-config"])
-        .arg(format!(
-            "enable=on,target=native,arg=hivtac-qemu-image,arg={script},arg={results}"
-        ))
-        .arg("-plugin")
-        .arg(plugin)
-        .args(["-d", "plugin", "-D"])
-        .arg(log)
-        .arg("-kernel")
-        .arg(image);
-    command
+    fn record(&self, case: &Case) -> Result<Record> {
+        let (log, results) = (self.folder.join("record"), self.folder.join("results"));
+        let (script, results) = (case.file.display(), results.display());
+        let arguments = format!("arg=hivtac-qemu-image,arg={script},arg={results}");
+        let mut qemu = command(QEMU);
+        qemu.arg(format!("enable=on,target=native,{arguments}"));
+        qemu.arg("-kernel").arg(&self.image);
+        qemu.arg("-plugin").arg(&self.plugin).arg("-D").arg(&log);
+        process::output(&mut qemu)?;
+        let record = serde_json::from_str(&process::read(&log)?);
+        record.with_context(|| format!("what the plugin wrote: {}", log.display()))
+    }
 }
 
 /// The version of the plugin interface that this QEMU accepts: 1 before QEMU 9, 2 from then on.
-///
-/// # Errors
-/// When QEMU does not say its version.
-pub fn plugin_version() -> Result<u32> {
-    let text = process::output(Command::new("qemu-system-arm").arg("--version"))?;
-    let major = major_version(&text).with_context(|| format!("no version in `{text}`"))?;
+fn plugin_version() -> Result<u32> {
+    let text = process::output(&mut command("qemu-system-arm --version"))?;
+    // `QEMU emulator version 7.2.22 (Debian …`
+    let version = text
+        .split_once("version ")
+        .and_then(|(_, rest)| rest.split('.').next());
+    let major: u32 = version.context("no version of QEMU")?.parse()?;
     Ok(if major < 9 { 1 } else { 2 })
-}
-
-fn major_version(text: &str) -> Option<u32> {
-    let (_, version) = text.split_once("version ")?;
-    version.split('.').next()?.parse().ok()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_version_of_qemu_is_found() {
-        let debian = "QEMU emulator version 7.2.22 (Debian 1:7.2+dfsg-7+deb12u18+b3)\nCopyright";
-        assert_eq!(major_version(debian), Some(7));
-        assert_eq!(major_version("QEMU emulator version 10.0.2"), Some(10));
-        assert_eq!(major_version("something else"), None);
-    }
-
-    #[test]
-    fn costs_add_up() {
-        let cost = |instructions, cycles| Cost {
-            instructions,
-            cycles,
-        };
-        let sum: Cost = [cost(3, Some(1.5)), cost(4, Some(2.0))].into_iter().sum();
-        assert_eq!(sum, cost(7, Some(3.5)));
-        assert_eq!([cost(3, None)].into_iter().sum::<Cost>().cycles, None);
-    }
 }

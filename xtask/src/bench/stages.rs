@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use addr2line::Loader;
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 
 /// The modules of each stage, a line each.
 const LISTED: &str = include_str!("../../../sensor/stages.txt");
@@ -18,19 +18,12 @@ const FOLDERS: [(&str, &str); 4] = [
     ("sensor/src", ""),
 ];
 
-/// The stages, in the order in which a frame goes through them.
-pub const ORDER: [&str; 10] = [
-    "threshold",
-    "dilation",
-    "runs, labels, moments",
-    "markers",
-    "features",
-    "network",
-    "steps",
-    "angles, force",
-    "pipeline",
-    "library",
-];
+/// The stages, in the order in which a frame goes through them, and at last what is a library's.
+pub fn order() -> impl Iterator<Item = &'static str> {
+    let lines = LISTED.lines().filter(|line| !line.starts_with('#'));
+    let names = lines.filter_map(|line| Some(line.rsplit_once(':')?.0));
+    names.filter(|name| *name != "caller").chain(["library"])
+}
 
 /// The stages of an image's instructions.
 ///
@@ -45,29 +38,23 @@ pub struct Stages {
 
 impl Stages {
     /// Of the image in this file.
-    ///
-    /// # Errors
-    /// When the image cannot be read or has no line table.
     pub fn of_image(image: &Path) -> Result<Stages> {
-        let loader = Loader::new(image)
-            .map_err(|error| anyhow!("{error}"))
-            .with_context(|| format!("reading the line table of {}", image.display()))?;
-        Ok(Stages {
-            loader,
-            known: HashMap::new(),
-        })
+        let loader = Loader::new(image).map_err(|error| anyhow!("{}: {error}", image.display()))?;
+        let known = HashMap::new();
+        Ok(Stages { loader, known })
     }
 
-    /// The stage of the instruction at an address, one of [`ORDER`], or `None` for the harness.
-    ///
-    /// # Errors
-    /// When the line table is not sound there.
+    /// The stage of the instruction at an address, one of [`order`], or `None` for the harness.
     pub fn stage(&mut self, address: u64) -> Result<Option<&'static str>> {
         if let Some(known) = self.known.get(&address) {
             return Ok(*known);
         }
-        let stage = match stage(&self.files(address)?) {
-            Some("library") => self.stage_of_symbol(address).or(Some("library")),
+        let files = self.files(address);
+        let files = files.map_err(|error| anyhow!("{address:#x}: {error}"))?;
+        // Assembly has no line table; its names say what it is.
+        let named = || stage_of_name(self.loader.find_symbol(address)?);
+        let stage = match stage(&files) {
+            Some("library") => named().or(Some("library")),
             stage => stage,
         };
         self.known.insert(address, stage);
@@ -75,27 +62,14 @@ impl Stages {
     }
 
     /// The source files of the functions that an instruction was inlined through, innermost first.
-    fn files(&self, address: u64) -> Result<Vec<String>> {
-        let problem = |error: String| anyhow!("looking up {address:#x}: {error}");
-        let mut frames = self
-            .loader
-            .find_frames(address)
-            .map_err(|error| problem(error.to_string()))?;
+    fn files(&self, address: u64) -> Result<Vec<String>, Box<dyn std::error::Error>> {
+        let mut frames = self.loader.find_frames(address)?;
         let mut files = Vec::new();
-        while let Some(frame) = frames.next().map_err(|error| problem(error.to_string()))? {
-            files.extend(
-                frame
-                    .location
-                    .and_then(|location| location.file)
-                    .map(str::to_owned),
-            );
+        while let Some(frame) = frames.next()? {
+            let file = frame.location.and_then(|location| location.file);
+            files.extend(file.map(str::to_owned));
         }
         Ok(files)
-    }
-
-    /// Assembly has no line table; its names say what it is.
-    fn stage_of_symbol(&self, address: u64) -> Option<&'static str> {
-        stage_of_name(self.loader.find_symbol(address)?)
     }
 }
 
@@ -112,9 +86,8 @@ fn stage_of_file(file: &str) -> Option<&'static str> {
         let name = within.split(['/', '.']).next()?;
         Some(format!("{begin}{name}"))
     })?;
-    ORDER
-        .into_iter()
-        .find(|stage| modules_of(stage).any(|name| name == module))
+    let has_it = |stage: &&str| modules_of(stage).any(|name| name == module);
+    order().find(has_it)
 }
 
 /// The modules of a stage.
@@ -128,15 +101,13 @@ fn modules_of(stage: &str) -> impl Iterator<Item = &'static str> {
 fn stage_of_name(name: &str) -> Option<&'static str> {
     let work = name.strip_prefix("hivtac_")?;
     let stages = [
-        ("threshold", "threshold"),
-        ("weigh", "threshold"),
+        ("threshold weigh", "threshold"),
         ("dilate", "dilation"),
-        ("dot", "network"),
+        ("dot expand activate", "network"),
         ("spline", "steps"),
-        ("expand", "network"),
-        ("activate", "network"),
     ];
-    let found = stages.iter().find(|(part, _)| work.contains(part));
+    let is_it = |parts: &str| parts.split(' ').any(|part| work.contains(part));
+    let found = stages.iter().find(|(parts, _)| is_it(parts));
     found.map(|(_, stage)| *stage)
 }
 
@@ -144,70 +115,44 @@ fn stage_of_name(name: &str) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    fn stage_of(files: &[&str]) -> Option<&'static str> {
-        stage(
-            &files
-                .iter()
-                .map(|&file| file.to_owned())
-                .collect::<Vec<_>>(),
-        )
-    }
-
     #[test]
     fn the_innermost_function_of_the_sensing_decides() {
-        let core = "/rustc/1/library/core/src/slice.rs";
-        let (label, scanner) = (
-            "/p/sensor/src/markers/label.rs",
+        let (core, scanner) = (
+            "/rustc/1/library/core/src/slice.rs",
             "/p/sensor/src/markers/scanner.rs",
         );
-        assert_eq!(
-            stage_of(&[core, label, scanner]),
-            Some("runs, labels, moments")
+        let (label, units) = (
+            "/p/sensor/src/markers/label.rs",
+            "/p/sensor/terms/src/units.rs",
         );
-        assert_eq!(stage_of(&[core, scanner]), Some("pipeline"));
-        assert_eq!(
-            stage_of(&["/p/sensor/terms/src/units.rs", label]),
-            Some("runs, labels, moments")
-        );
-        assert_eq!(
-            stage_of(&["/p/sensor/src/markers/rules/shape.rs"]),
-            Some("markers")
-        );
+        for (files, expected) in [
+            (&[core, label, scanner][..], Some("runs, labels, moments")),
+            (&[core, scanner], Some("pipeline")),
+            (&[units, label], Some("runs, labels, moments")),
+            (&["/p/sensor/src/markers/rules/shape.rs"], Some("markers")),
+            (&[core], Some("library")),
+            (&["/p/tests/src/golden.rs"], None),
+        ] {
+            let files: Vec<String> = files.iter().map(|&file| file.to_owned()).collect();
+            assert_eq!(stage(&files), expected, "{files:?}");
+        }
     }
 
     #[test]
     fn every_module_of_the_sensing_is_listed_once() {
-        let stages = ORDER.into_iter().chain(["caller"]);
+        let stages = order().chain(["caller"]);
         let mut listed: Vec<String> = stages.flat_map(modules_of).map(str::to_owned).collect();
         listed.sort();
-        let modules = |(folder, begin): &(&str, &str)| {
-            let entries = std::fs::read_dir(crate::workspace::folder(folder)).unwrap();
-            let name = |entry: std::io::Result<std::fs::DirEntry>| {
+        let mut found = Vec::new();
+        for (folder, begin) in FOLDERS {
+            for entry in crate::toolchain::at(folder).read_dir().unwrap() {
                 let path = entry.unwrap().path();
-                format!("{begin}{}", path.file_stem().unwrap().to_str().unwrap())
-            };
-            entries.map(name).collect::<Vec<_>>()
-        };
-        let mut found: Vec<String> = FOLDERS.iter().flat_map(modules).collect();
+                found.push(format!("{begin}{}", path.file_stem().unwrap().display()));
+            }
+        }
         // Folders of their own.
         found.retain(|module| !["markers", "force"].contains(&module.as_str()));
         found.sort();
         assert_eq!(listed, found);
-    }
-
-    #[test]
-    fn what_lies_outside_is_library_or_harness() {
-        assert_eq!(stage_of(&[]), Some("library"));
-        assert_eq!(
-            stage_of(&["/rustc/1/library/core/src/slice.rs"]),
-            Some("library")
-        );
-        assert_eq!(stage_of(&["/p/tests/src/golden.rs"]), None);
-    }
-
-    #[test]
-    fn assembly_is_known_by_its_name() {
-        assert_eq!(stage_of_name("hivtac_threshold_row"), Some("threshold"));
-        assert_eq!(stage_of_name("memset"), None);
     }
 }

@@ -1,10 +1,8 @@
-//! `benchmark-cases FOLDER [MICROSECONDS …]`: writes the scripts that `cargo xtask bench` runs, one
-//! file each, and prints what they are, one JSON object a line:
+//! `benchmark-cases FOLDER`: writes the scripts that `cargo xtask bench` runs, one file each, and
+//! prints what they are, one JSON object a line:
 //! `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
 //! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
 //! board can hold of them it writes as `board.rs`, too, for `tests/board`.
-//! With times it writes the frames of the demo's scene at these times instead, for the figure over
-//! time.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};
@@ -26,35 +24,27 @@ use hivtac_tests::{pictures, qemu};
 use hivtac_twin::{Format, Load, Options, Preset, Scene};
 use serde_json::{Value, json};
 
-/// Layer widths of the sensor's model.
+/// The model that the sensor runs.
 const SMALL: [u16; 4] = [11, 64, 64, 3];
-/// Layer widths of the paper's model.
+/// The paper's model.
 const PAPER: [u16; 5] = [11, 512, 512, 512, 3];
 /// Columns and rows of the reference frames.
 const SIZES: [[u16; 2]; 4] = [[160, 120], [320, 240], [640, 480], [800, 600]];
-/// The number of frames without a force after which the search for one with a force fails.
+/// How many frames may be without a force before one has one.
 const ATTEMPTS: u64 = 16;
-/// The sizes for which worst cases are measured: the firmware's and the paper's.
+/// The sizes whose worst cases are measured: the firmware's and the paper's.
 const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
 
-/// Columns of the largest frames that fit into a board's flash together with everything else.
+/// Columns of the largest frames that fit a board's flash beside everything else.
 const WIDEST_ON_BOARD: u16 = 320;
 
 fn main() -> Result<()> {
-    // The reader of the output may close it early.
+    // Whoever reads the output may have enough of it.
     sigpipe::reset();
     let folder = env::args_os().nth(1).map(PathBuf::from);
-    let folder = folder.context("usage: benchmark-cases FOLDER [MICROSECONDS …]")?;
-    let times: Vec<u64> = env::args()
-        .skip(2)
-        .map(|word| word.parse().with_context(|| format!("the time `{word}`")))
-        .collect::<Result<_>>()?;
+    let folder = folder.context("usage: benchmark-cases FOLDER")?;
     let mut board = Board::default();
-    let cases = if times.is_empty() {
-        cases()?
-    } else {
-        demo(&times)?
-    };
+    let cases = cases()?;
     for (number, case) in cases.iter().enumerate() {
         println!("{}", case.write(&folder, number)?);
         board.add(&folder, number, case)?;
@@ -64,7 +54,7 @@ fn main() -> Result<()> {
 
 struct Case {
     work: Work,
-    /// A model file for these frames.
+    /// A model file for such frames.
     model: Vec<u8>,
     /// Columns and rows.
     size: [u16; 2],
@@ -74,13 +64,13 @@ struct Case {
 enum Work {
     /// One frame through the whole pipeline, as the firmware runs it.
     Frame {
-        /// The frame's special property; empty for the usual one.
+        /// What is special about it; empty for the usual one.
         special: &'static str,
         pixels: Vec<u16>,
     },
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
-    /// The network of a model that gives places, and this number of steps from its answer.
+    /// The network of a model that tells places, and so many steps from its answer.
     Steps(u8, [Marker; 4], Rest),
     /// The threshold's table of 64 KiB.
     Table,
@@ -143,7 +133,7 @@ fn cases() -> Result<Vec<Case>> {
             model: weighted_model?,
             ..case(("weighted", usual.clone()))
         });
-        // The special properties are colours, drawn in RGB565.
+        // What is special are colours, drawn in RGB565.
         if format == PixelFormat::Rgb565 && STRAINED.contains(&size) {
             cases.extend(strained(size, &usual).map(case));
         }
@@ -160,14 +150,14 @@ fn cases() -> Result<Vec<Case>> {
     cases.push(Case {
         work: Work::Table,
         model: Vec::new(),
-        // As many pixels as a pixel has values.
+        // As many values as a pixel has.
         size: [256, 256],
         format: PixelFormat::Rgb565,
     });
     Ok(cases)
 }
 
-/// Returns the case of steps at a press of 0.1 N off the middle.
+/// Steps at a press of 0.1 N off the middle.
 fn stepping(steps: u8) -> Result<Case> {
     let (format, size) = (PixelFormat::Rgb565, [320, 240]);
     let model = models::anywhere(steps);
@@ -186,24 +176,7 @@ fn stepping(steps: u8) -> Result<Case> {
     })
 }
 
-/// Returns frames of the demo's scene, of the firmware's size.
-fn demo(times: &[u64]) -> Result<Vec<Case>> {
-    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
-    let model = model(format, size, BinaryMask)?;
-    let scene = scene("demo", format, size)?;
-    let case = |(number, &time): (u64, &u64)| Case {
-        work: Work::Frame {
-            special: "demo",
-            pixels: frame(&scene, number, time as f64 * 1e-6),
-        },
-        model: model.clone(),
-        size,
-        format,
-    };
-    Ok((0..).zip(times).map(case).collect())
-}
-
-/// Rust source that includes the cases that fit on a board, and the included files.
+/// Rust source that includes what a board can hold, and the files that it includes.
 #[derive(Default)]
 struct Board {
     frames: String,
@@ -217,7 +190,7 @@ impl Board {
         match &case.work {
             Work::Steps(..) | Work::Table => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
-            // The board's program only reads RGB565.
+            // The board's program reads RGB565.
             Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),
             Work::Frame {
                 special,
@@ -255,7 +228,7 @@ impl Board {
     }
 }
 
-/// Returns the worst cases that are measured in addition to the usual frame.
+/// Worst cases beside the usual frame.
 fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16>); 4] {
     [
         ("5 % salt", pictures::salted(usual.to_vec(), 5, 1)),
@@ -268,9 +241,9 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
     ]
 }
 
-/// Returns the usual frame: the simulated sensor with its usual light and noise under 0.1 N at α =
-/// 4°, β = −3°. It is the first frame with a force, to include every stage in the measurement. In
-/// the smallest frames noise can make a marker implausible.
+/// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first
+/// frame that goes all the way to a force, so that all of it is measured. In the smallest frames
+/// noise can make a marker implausible.
 fn usual_frame(
     model: &[u8],
     format: PixelFormat,
@@ -301,12 +274,12 @@ fn scene(name: &str, format: PixelFormat, [width, height]: [u16; 2]) -> Result<S
     })?)
 }
 
-/// Returns a frame in the order in which it lies in memory.
+/// A frame as it lies in memory.
 fn frame(scene: &Scene, number: u64, seconds: f64) -> Vec<u16> {
     scene.frame(number, seconds).words().into_owned()
 }
 
-/// Returns the small model, for frames of a size.
+/// The small model, for frames of a size.
 fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Result<Vec<u8>> {
     let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
     let pixels = frame(&scene("rest", format, size)?, 0, 0.0);
@@ -314,7 +287,7 @@ fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Re
     Ok(models::file_for(geometry, format, (centroid, rest), &SMALL))
 }
 
-/// Returns the markers' position in a frame.
+/// Where a frame shows the markers.
 fn position(
     geometry: Geometry,
     format: PixelFormat,
@@ -328,7 +301,7 @@ fn position(
     })
 }
 
-/// Returns the measurement of a frame.
+/// What a frame shows.
 fn seen(
     geometry: Geometry,
     format: PixelFormat,

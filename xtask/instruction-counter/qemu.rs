@@ -12,9 +12,6 @@ pub type InstructionHandle = *mut c_void;
 
 /// `QEMU_PLUGIN_CB_NO_REGS`: the callback reads no register.
 pub const NO_REGISTERS: c_int = 0;
-/// `QEMU_PLUGIN_MEM_RW`: the callback is told of loads and stores. QEMU 7.2 tells of stores when
-/// asked for loads alone.
-pub const LOADS_AND_STORES: c_int = 3;
 
 unsafe extern "C" {
     pub fn qemu_plugin_register_vcpu_tb_trans_cb(
@@ -27,14 +24,6 @@ unsafe extern "C" {
         flags: c_int,
         data: *mut c_void,
     );
-    pub fn qemu_plugin_register_vcpu_mem_cb(
-        instruction: InstructionHandle,
-        callback: extern "C" fn(c_uint, u32, u64, *mut c_void),
-        flags: c_int,
-        kinds: c_int,
-        data: *mut c_void,
-    );
-    pub fn qemu_plugin_mem_is_store(info: u32) -> bool;
     pub fn qemu_plugin_register_atexit_cb(
         id: PluginId,
         callback: extern "C" fn(PluginId, *mut c_void),

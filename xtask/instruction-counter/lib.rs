@@ -1,20 +1,19 @@
 //! A QEMU plugin that records what a program executes, exactly and repeatably: which blocks of
-//! instructions run, in which order they follow each other, and what memory they load from.
+//! instructions run, and in which order they follow each other.
 //!
 //! Recording begins when the program calls a function named `counting_begins` and ends when it
 //! calls `counting_ends`, as often as it likes; what runs after a call of `last_band_begins` is
-//! told apart from what ran before. At the end of the run the plugin writes to QEMU's log, all
-//! numbers but counts in hexadecimal:
+//! told apart from what ran before. At the end of the run the plugin writes to QEMU's log one JSON
+//! object:
 //!
 //! ```text
-//! block NUMBER ADDRESS …        the addresses of a block's instructions, in order
-//! run PART FROM TO COUNT        block TO ran so often right after block FROM (`-`: after a call)
-//! load PART ADDRESS COUNT       so many loads from the 32 bytes that begin there
+//! {"blocks":[[ADDRESS,…],…],"runs":[[LAST_BAND,FROM,TO,COUNT],…]}
 //! ```
 //!
-//! PART is 0, and 1 from the last band of rows on. Several blocks may hold the same addresses;
-//! their counts add up. A program that takes no interrupt and no fault leaves a block only at its
-//! end, so the counts are exact.
+//! A block is the addresses of its instructions, in order; block TO ran so often right after block
+//! FROM, which is `null` after a call. Blocks that QEMU translated several times count as one. A
+//! program that takes no interrupt and no fault leaves a block only at its end, so the counts are
+//! exact.
 
 mod qemu;
 mod record;
@@ -56,33 +55,15 @@ extern "C" fn translated(_id: PluginId, handle: BlockHandle) {
     let number = with_record(|record| record.add_block(addresses(handle), mark(handle)));
     // The number travels in place of a pointer; nothing is ever read through it.
     let data = ptr::without_provenance_mut(number);
-    // SAFETY: the handle is valid during this call, and the indices are inside the block.
+    // SAFETY: the handle is valid during this call.
     unsafe {
         qemu::qemu_plugin_register_vcpu_tb_exec_cb(handle, executed, qemu::NO_REGISTERS, data);
-        for i in 0..qemu::qemu_plugin_tb_n_insns(handle) {
-            let instruction = qemu::qemu_plugin_tb_get_insn(handle, i);
-            qemu::qemu_plugin_register_vcpu_mem_cb(
-                instruction,
-                accessed,
-                qemu::NO_REGISTERS,
-                qemu::LOADS_AND_STORES,
-                ptr::null_mut(),
-            );
-        }
     }
 }
 
 /// QEMU is about to run a block.
 extern "C" fn executed(_cpu: c_uint, data: *mut c_void) {
     with_record(|record| record.run(data.addr()));
-}
-
-/// An instruction loads or stores.
-extern "C" fn accessed(_cpu: c_uint, info: u32, address: u64, _data: *mut c_void) {
-    // SAFETY: reads a number that QEMU gave.
-    if !unsafe { qemu::qemu_plugin_mem_is_store(info) } {
-        with_record(|record| record.load(address));
-    }
 }
 
 /// QEMU ends.

@@ -1,10 +1,6 @@
 //! What was executed while the program asked for it to be recorded.
 
-use std::collections::BTreeMap;
-use std::fmt::Write;
-
-/// Bytes of a cache line of the Cortex-M7: loads are told apart no finer.
-const LINE: u64 = 32;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a call of one of the program's marking functions means.
 #[derive(Clone, Copy)]
@@ -23,7 +19,7 @@ struct Block {
     mark: Option<Mark>,
 }
 
-/// Blocks, how they followed each other, and loads.
+/// Blocks, and how they followed each other.
 pub struct Record {
     blocks: Vec<Block>,
     recording: bool,
@@ -32,8 +28,6 @@ pub struct Record {
     before: Option<usize>,
     /// How often a block ran in a part after another.
     runs: BTreeMap<(u8, Option<usize>, usize), u64>,
-    /// Loads in a part by the number of the cache line.
-    loads: BTreeMap<(u8, u64), u64>,
 }
 
 impl Record {
@@ -45,7 +39,6 @@ impl Record {
             part: 0,
             before: None,
             runs: BTreeMap::new(),
-            loads: BTreeMap::new(),
         }
     }
 
@@ -75,32 +68,34 @@ impl Record {
         }
     }
 
-    /// Something is loaded.
-    pub fn load(&mut self, address: u64) {
-        if self.recording {
-            *self.loads.entry((self.part, address / LINE)).or_default() += 1;
+    /// Everything, as the crate's documentation describes.
+    pub fn report(&self) -> String {
+        let (blocks, numbers) = self.blocks_that_ran();
+        let mut runs = BTreeMap::<_, u64>::new();
+        for (&(part, before, block), count) in &self.runs {
+            let before = before.map(|before| numbers[before]);
+            *runs.entry((part, before, numbers[block])).or_default() += count;
         }
+        let runs = runs.into_iter().map(|((part, before, block), count)| {
+            let before = before.map_or("null".to_owned(), |before| before.to_string());
+            format!("[{},{before},{block},{count}]", part == 1)
+        });
+        let runs: Vec<String> = runs.collect();
+        format!("{{\"blocks\":{blocks:?},\"runs\":[{}]}}\n", runs.join(","))
     }
 
-    /// Everything, in the lines that the crate's documentation describes.
-    pub fn report(&self) -> String {
-        let mut text = String::new();
-        for (number, block) in self.blocks.iter().enumerate() {
-            if self.runs.keys().any(|(_, _, ran)| *ran == number) {
-                let _ = write!(text, "block {number:x}");
-                for address in &block.addresses {
-                    let _ = write!(text, " {address:x}");
-                }
-                text.push('\n');
-            }
+    /// Each block that ran, once, and its number among these by that of translation.
+    fn blocks_that_ran(&self) -> (Vec<&Vec<u64>>, Vec<usize>) {
+        let ran: BTreeSet<usize> = self.runs.keys().map(|(.., block)| *block).collect();
+        let mut numbers = vec![usize::MAX; self.blocks.len()];
+        let (mut blocks, mut known) = (Vec::new(), BTreeMap::new());
+        for number in ran {
+            let addresses = &self.blocks[number].addresses;
+            numbers[number] = *known.entry(addresses).or_insert_with(|| {
+                blocks.push(addresses);
+                blocks.len() - 1
+            });
         }
-        for ((part, before, number), count) in &self.runs {
-            let before = before.map_or("-".to_owned(), |before| format!("{before:x}"));
-            let _ = writeln!(text, "run {part} {before} {number:x} {count}");
-        }
-        for ((part, line), count) in &self.loads {
-            let _ = writeln!(text, "load {part} {:x} {count}", line * LINE);
-        }
-        text
+        (blocks, numbers)
     }
 }
