@@ -4,7 +4,7 @@ use super::device::reason;
 use super::hear;
 use super::report::Step;
 use super::samples::{Wanted, collect};
-use crate::command::TARE_PATIENCE;
+use crate::tare::TARE_PATIENCE;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
 use hivtac_terms::marker::Marker;

@@ -1,14 +1,17 @@
 //! `hivtac settings`: what a device keeps through restarts, shown, named, saved, given back and
 //! forgotten.
 
-pub mod camera;
+mod arguments;
+mod camera;
 mod file;
 pub mod temporal;
 
-use crate::command::{send, tell};
+use crate::device::Target;
 use crate::lines::to_json;
 use crate::output;
 use crate::output::{note, print};
+use crate::request::{KEEP_PATIENCE, keep, send, show_log};
+pub use arguments::SettingsCommand;
 use file::{File, Kept};
 use hivtac_host::down::{direction, text as text_of_down};
 use hivtac_host::failure::{Failure, Kind};
@@ -24,77 +27,6 @@ use serde_json::{Value, json};
 use std::time::Duration;
 use temporal::Change;
 
-/// Longest time that keeping may take: an erased sector takes 1 to 2 s, and a worn one is tried
-/// again.
-pub const KEEP_PATIENCE: Duration = Duration::from_secs(20);
-
-/// A device and how long to wait for it.
-pub struct Options {
-    /// Where it is.
-    pub address: Address,
-    /// Longest wait for its hello and replies.
-    pub patience: Duration,
-    /// One JSON object instead of lines.
-    pub json: bool,
-}
-
-/// What to do with its settings.
-pub enum Action {
-    /// Show them.
-    Get,
-    /// Give it a name and keep that.
-    SetName(Name),
-    /// Change how forces are followed, and keep that.
-    SetTemporal(Change),
-    /// Set the camera, and keep that.
-    SetCamera(camera::Change),
-    /// Say what is known of gravity, and keep that.
-    SetDown(Down),
-    /// Save them in a file.
-    Export(String),
-    /// Set and keep those of a file.
-    Import(String),
-    /// Forget all that was kept.
-    Reset,
-}
-
-/// Does it.
-///
-/// # Errors
-/// A file that is none of settings, before anything is asked of the device; what the device
-/// refuses; those of [`Link::connect`].
-pub fn run(options: &Options, action: &Action) -> Result<(), Failure> {
-    let imported = match action {
-        Action::Import(path) => Some(file::read(path)?),
-        _ => None,
-    };
-    let (link, hello) = Link::connect(&options.address, options.patience)?;
-    let mut device = Device {
-        link,
-        hello,
-        patience: options.patience,
-        json: options.json,
-    };
-    match action {
-        Action::Get => device.show(),
-        Action::SetName(name) => device.set_name(name),
-        Action::SetTemporal(change) => device.set_temporal(*change),
-        Action::SetCamera(change) => device.set_camera(*change),
-        Action::SetDown(down) => device.set_down(*down),
-        Action::Export(path) => device.export(path),
-        Action::Import(path) => imported.map_or(Ok(()), |file| device.import(path, &file)),
-        Action::Reset => device.reset(),
-    }
-}
-
-/// Keeps these of the settings in use.
-///
-/// # Errors
-/// What the device refuses.
-pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
-    send(link, Request::Keep(selection), KEEP_PATIENCE)
-}
-
 /// A device's settings.
 ///
 /// # Errors
@@ -103,7 +35,7 @@ pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failur
     let mut report = None;
     link.request(Request::GetSettings, patience, |message| match message {
         DeviceMessage::Settings(newest) => report = Some(newest),
-        other => tell(other),
+        other => show_log(other),
     })?;
     report.ok_or_else(|| link.lost("its settings did not come"))
 }
@@ -112,7 +44,7 @@ pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failur
 ///
 /// # Errors
 /// Why it is none.
-pub fn name(text: &str) -> Result<Name, String> {
+fn name(text: &str) -> Result<Name, String> {
     if text.is_empty() {
         return Err("it is empty; `hivtac settings reset` takes a name away".to_owned());
     }
@@ -131,7 +63,7 @@ pub fn name(text: &str) -> Result<Name, String> {
 ///
 /// # Errors
 /// Why it is none of them.
-pub fn down(words: &[String]) -> Result<Down, Failure> {
+fn down(words: &[String]) -> Result<Down, Failure> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let parsed = match words.as_slice() {
         ["none"] => Ok(Down::Unknown),
@@ -146,14 +78,30 @@ pub fn down(words: &[String]) -> Result<Down, Failure> {
     parsed.map_err(|why| Failure::new(Kind::Usage, why))
 }
 
-struct Device {
+/// A device whose settings are shown or changed.
+struct Conversation {
     link: Link,
     hello: DeviceHello,
     patience: Duration,
     json: bool,
 }
 
-impl Device {
+impl Conversation {
+    fn begin(target: &Target) -> Result<Conversation, Failure> {
+        Conversation::begin_at(&target.device.address()?, target)
+    }
+
+    fn begin_at(address: &Address, target: &Target) -> Result<Conversation, Failure> {
+        let patience = target.device.timeout;
+        let (link, hello) = Link::connect(address, patience)?;
+        Ok(Conversation {
+            link,
+            hello,
+            patience,
+            json: target.json,
+        })
+    }
+
     fn settings(&mut self) -> Result<SettingsReport, Failure> {
         ask(&mut self.link, self.patience)
     }
