@@ -1,8 +1,7 @@
 //! `hivtac check`: rate, jitter, losses and latency, held against limits.
 
 use crate::device::{Device, seconds};
-use crate::lines::to_json;
-use crate::output::{note, print};
+use crate::output::{self, note};
 use crate::tally::Tally;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
@@ -40,11 +39,7 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     measured.follow(&mut link, arguments)?;
     measured.tally.rejected(link.rejected());
     let report = measured.report();
-    print(&if arguments.json {
-        to_json(&report)
-    } else {
-        report.lines(&measured.tally)
-    })?;
+    output::report(arguments.json, &report, || report.lines(&measured.tally))?;
     report.judge(arguments)
 }
 

@@ -1,7 +1,8 @@
 //! What was found in a picture, for people and as JSON.
 
-use crate::lines::{contact_text, status_text, to_json};
+use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
+use hivtac_host::shown::to_json;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;

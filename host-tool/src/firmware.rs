@@ -83,7 +83,7 @@ fn dfu_util(path: &str) -> String {
 }
 
 fn check(path: &str) -> Result<(), Failure> {
-    let wrong = |why: String| Failure::input(format!("{path}: {why}"));
+    let wrong = |why: String| Failure::of_file(path, why);
     let most = u64::from(FLASH.end - FLASH.start);
     let bytes = read_at_most(path, most).map_err(|error| wrong(error.to_string()))?;
     let bytes =

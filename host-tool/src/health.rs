@@ -2,8 +2,7 @@
 //! code.
 
 use crate::device::Device;
-use crate::lines::to_json;
-use crate::output::print;
+use crate::output;
 use crate::request::show_log;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
@@ -112,10 +111,7 @@ pub fn run(arguments: &SelfTestArguments) -> Result<(), Failure> {
             .collect(),
         health: Told::of(&health),
     };
-    print(&match arguments.json {
-        true => to_json(&report),
-        false => lines(&health).join("\n"),
-    })?;
+    output::report(arguments.json, &report, || lines(&health).join("\n"))?;
     match found.len() {
         0 => Ok(()),
         count => Err(Failure::new(

@@ -2,8 +2,7 @@
 
 use crate::device::Device;
 use crate::health::{self, Told};
-use crate::lines::to_json;
-use crate::output::{note, print};
+use crate::output::{self, note};
 use crate::settings;
 use crate::settings::temporal::FilterJson;
 use clap::Args;
@@ -13,7 +12,7 @@ use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::Threshold;
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{
     DeviceHello, DeviceMessage, ModelIdentity, ModelSource, Request, Stats,
 };
@@ -45,12 +44,7 @@ pub fn run(arguments: &InfoArguments) -> Result<(), Failure> {
         health: Some(Told::of(&health)),
         ..Info::new(&link.name, &hello, stats)
     };
-    print(&if arguments.json {
-        to_json(&info)
-    } else {
-        info.lines().join("\n")
-    })?;
-    Ok(())
+    output::report(arguments.json, &info, || info.lines().join("\n")).map(|_| ())
 }
 
 /// The hello anew, and the counters.
@@ -118,7 +112,7 @@ impl Tare {
             kept: taken && settings.kept.tare,
             drift_px: settings.drift.map(Px::to_f64),
             rezeroed_px: settings.rezeroed.to_f64(),
-            seen_px: settings.seen.map(|seen| f64::from(seen.0) * 1e-3),
+            seen_px: settings.seen.map(MilliPx::to_f64),
         }
     }
 

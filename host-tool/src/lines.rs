@@ -3,7 +3,7 @@
 use crate::truth::Truth;
 use hivtac_host::decimal::Decimal;
 use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE};
-pub use hivtac_host::shown::to_json;
+use hivtac_host::shown::to_json;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;

@@ -1,8 +1,7 @@
 //! `hivtac list`: which sensors are plugged in.
 
 use crate::device::seconds;
-use crate::lines::to_json;
-use crate::output::{note, print};
+use crate::output::{self, note};
 use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::named::Listed;
@@ -35,10 +34,7 @@ pub fn run(arguments: &ListArguments) -> Result<(), Failure> {
     }
     for sensor in attached {
         let listed = Listed::ask(sensor, arguments.timeout);
-        print(&match arguments.json {
-            true => to_json(&listed),
-            false => listed.line(),
-        })?;
+        output::report(arguments.json, &listed, || listed.line())?;
     }
     Ok(())
 }

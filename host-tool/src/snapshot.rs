@@ -2,8 +2,8 @@
 
 use crate::device::Device;
 use crate::finding::MarkerJson;
-use crate::lines::{status_text, to_json};
-use crate::output::print;
+use crate::lines::status_text;
+use crate::output;
 use crate::request::show_log;
 use clap::Args;
 use hivtac_host::failure::Failure;
@@ -61,11 +61,7 @@ pub fn run(arguments: &SnapshotArguments) -> Result<(), Failure> {
     let taken = snapshot(&mut link, device.timeout)?;
     write_files(files, &taken.frame, hello.dilations)?;
     let report = Report::new(&taken, files);
-    print(&match json {
-        true => to_json(&report),
-        false => report.text(),
-    })?;
-    Ok(())
+    output::report(*json, &report, || report.text()).map(|_| ())
 }
 
 /// One frame with its sample and the markers in it: samples flow meanwhile, and no longer.

@@ -3,8 +3,7 @@
 use crate::device::Device;
 use crate::firmware::{self, FirmwareArguments};
 use crate::info;
-use crate::lines::to_json;
-use crate::output::print;
+use crate::output;
 use crate::request::{KEEP_PATIENCE, send, show_log};
 use clap::{Args, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
@@ -66,7 +65,7 @@ pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
     let device = &arguments.device;
     let address = device.address()?;
     let file = read(path)?;
-    let model = Model::parse(&file).map_err(|error| unusable(path, error))?;
+    let model = Model::parse(&file).map_err(|error| Failure::of_file(path, error))?;
     let begun = Instant::now();
     let (mut link, hello) = Link::connect(&address, device.timeout)?;
     let bytes = file.len() as u32;
@@ -106,17 +105,14 @@ pub fn built_in_model(arguments: &ModelArguments) -> Result<(), Failure> {
 }
 
 fn read(path: &str) -> Result<Vec<u8>, Failure> {
-    let file = read_at_most(path, MODEL_BYTES as u64).map_err(|error| unusable(path, error))?;
+    let file =
+        read_at_most(path, MODEL_BYTES as u64).map_err(|error| Failure::of_file(path, error))?;
     file.ok_or_else(|| {
-        unusable(
+        Failure::of_file(
             path,
             format!("a model for a device has at most {MODEL_BYTES} bytes"),
         )
     })
-}
-
-fn unusable(path: &str, why: impl std::fmt::Display) -> Failure {
-    Failure::input(format!("{path}: {why}"))
 }
 
 fn parts(file: &[u8]) -> impl Iterator<Item = ModelPart> + '_ {
@@ -156,17 +152,17 @@ struct Update<'a> {
 
 fn say(arguments: &ModelArguments, used: &ModelIdentity, took: Duration) -> Result<(), Failure> {
     let seconds = took.as_secs_f64();
-    let line = match arguments.json {
-        true => to_json(&Update {
-            model: info::Model::of(used),
-            seconds,
-        }),
-        false => format!(
+    let update = Update {
+        model: info::Model::of(used),
+        seconds,
+    };
+    let text = || {
+        format!(
             "in use and kept: {}, CRC {:08x}, after {seconds:.1} s; take a new tare if the markers \
              are seen otherwise now (`hivtac info`)",
             shown(&used.name),
             used.crc
-        ),
+        )
     };
-    print(&line).map(|_| ())
+    output::report(arguments.json, &update, text).map(|_| ())
 }

@@ -3,7 +3,7 @@
 use hivtac_host::force_fields::{FORCE, PLACE};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::force::Force;
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{DeviceHello, Sample};
 use hivtac_wire::settings::{Moved, SettingsReport, TareReport};
 use pyo3::prelude::*;
@@ -107,7 +107,7 @@ pub fn rest(report: &SettingsReport) -> RestNumbers {
         is_taken,
         is_taken && report.kept.tare,
         px(report.rezeroed),
-        report.seen.map(|seen| f64::from(seen.0) * 1e-3),
+        report.seen.map(MilliPx::to_f64),
         report.drift.map(px),
     )
 }

@@ -7,7 +7,6 @@ mod levels;
 mod tests;
 
 use crate::device::Device;
-use crate::lines::to_json;
 use crate::output::print;
 use crate::set_threshold::set_threshold;
 use crate::snapshot::snapshot;
@@ -16,6 +15,7 @@ use find::{Found, find};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::Frame;
 use hivtac_host::look::{self, PASSED};
+use hivtac_host::shown::to_json;
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_wire::message::DeviceHello;

@@ -4,6 +4,7 @@
 mod camera;
 mod clocks;
 mod colours;
+mod complaints;
 mod device;
 mod noise;
 mod person;
@@ -15,15 +16,14 @@ mod tests;
 
 use crate::device::Device;
 use crate::focus::Focus;
-use crate::output::{note, print};
-use crate::request::show_log;
+use crate::output::print;
 use crate::snapshot::snapshot;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel};
+use hivtac_wire::message::DeviceHello;
 use person::Person;
 use report::{Report, Step};
 use serde_json::json;
@@ -170,16 +170,4 @@ fn show(arguments: &BringUpArguments, report: &mut Report, step: Step) {
         let _ = print(&step.text());
     }
     report.steps.push(step);
-}
-
-/// What the device logs while it is asked: shown, and what it complains about kept.
-fn hear(complaints: &mut Vec<String>, message: DeviceMessage) {
-    match message {
-        DeviceMessage::Log(line) if line.level != LogLevel::Info => {
-            let text = log_text(&line);
-            note(&text);
-            complaints.push(text);
-        }
-        message => show_log(message),
-    }
 }

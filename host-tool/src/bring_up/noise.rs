@@ -1,7 +1,7 @@
 //! The tare, and how still the markers then lie.
 
+use super::complaints::hear;
 use super::device::reason;
-use super::hear;
 use super::report::Step;
 use super::samples::{Wanted, collect};
 use crate::tare::TARE_PATIENCE;

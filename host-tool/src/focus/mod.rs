@@ -7,8 +7,7 @@ pub mod seen;
 pub mod tests;
 
 use crate::device::Device;
-use crate::lines::to_json;
-use crate::output::{Reader, print};
+use crate::output::{self, Reader};
 use crate::snapshot::snapshot;
 use checks::{Check, advice, checks};
 use clap::Args;
@@ -40,11 +39,8 @@ pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
     loop {
         let taken = snapshot(&mut link, arguments.device.timeout)?;
         let focus = Focus::of(&taken.frame, &hello);
-        let text = match arguments.json {
-            true => to_json(&focus),
-            false => focus.text(),
-        };
-        if print(&text)? == Reader::Gone || focus.right {
+        let reader = output::report(arguments.json, &focus, || focus.text())?;
+        if reader == Reader::Gone || focus.right {
             return Ok(());
         }
     }

@@ -6,25 +6,27 @@ mod foxglove;
 mod names;
 #[cfg(feature = "ros2")]
 mod node;
+mod outlet;
 mod sensor;
 
 use crate::device::Devices;
 use crate::follow::follow;
 use crate::output::{Reader, print};
 use crate::ros;
-use crate::ros::channel::{Channel, Frames, messages};
+use crate::ros::channel::{Frames, messages};
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::shown::shown;
 use hivtac_host::stop;
 use hivtac_wire::message::DeviceHello;
+use outlet::{Outlet, Served};
 use sensor::{Event, Sensor, TareOrder, Told, What};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Events that wait for the outlets: some seconds of one device.
@@ -88,33 +90,6 @@ struct Outlets {
     /// For Foxglove, over its WebSocket
     #[arg(long)]
     foxglove: bool,
-}
-
-/// Where messages go.
-trait Outlet {
-    /// Where it is: a word and its value, for the line that says so.
-    fn told(&self) -> Vec<(&'static str, String)>;
-
-    /// Publishes a device's message, CDR, that came at a time, ns since 1970; false when it could
-    /// not.
-    fn publish(&mut self, sensor: usize, channel: Channel, data: &[u8], came_ns: u64) -> bool;
-
-    /// Publishes how a device stands, likewise.
-    fn diagnostics(&mut self, data: &[u8], came_ns: u64);
-
-    /// Does what there is to do besides.
-    fn turn(&mut self) {}
-}
-
-/// A device, for the outlets.
-struct Served {
-    hello: DeviceHello,
-    /// Its own part of names, when it is one of several.
-    name: Option<String>,
-    frames: Frames,
-    orders: SyncSender<TareOrder>,
-    down: Told,
-    not_published: Arc<AtomicU64>,
 }
 
 /// Serves until it is interrupted. Prints `ready` and where.

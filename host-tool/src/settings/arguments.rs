@@ -1,8 +1,11 @@
 //! The command line of `hivtac settings`.
 
 use super::camera::{self, Wanted};
+use super::conversation::Conversation;
+use super::file;
+use super::gravity::down;
+use super::name::name;
 use super::temporal::{self, RezeroChange, small_thousandths, thousandths, two_thousandths};
-use super::{Conversation, down, file, name};
 use crate::device::{Device, Target};
 use clap::Subcommand;
 use hivtac_host::failure::Failure;
