@@ -5,27 +5,27 @@
 //! |---|---|
 //! | `numbers` | the numbers, and what is known of them before there is a load |
 //! | `load` | what is not known of a load |
-//! | `seen` | where a camera sees the dots of a solved film |
+//! | `view` | where a camera sees the dots of a solved film |
 //! | `problem` | numbers and loads held against what is seen |
 //! | `equations` | that linearized, as normal equations |
 //! | `descent` | Gauss–Newton steps to what explains it best |
-//! | `explained` | what χ² says of the loads, in words |
-//! | `left_out` | how good the fit is on loads left out of it |
+//! | `goodness_of_fit` | what χ² says of the loads, in words |
+//! | `leave_one_out` | how good the fit is on loads left out of it |
 //! | `field` | from few solved places of the tip to every place |
-//! | `own` | the unit's tables and what is not known of them, for its model file |
+//! | `own_film` | the unit's tables and what is not known of them, for its model file |
 //! | `weight` | what gravity does to the unit's film when it is turned |
 
 mod descent;
 mod equations;
-mod explained;
 mod field;
-mod left_out;
+mod goodness_of_fit;
+mod leave_one_out;
 mod linear;
 mod load;
 mod numbers;
-mod own;
+mod own_film;
 mod problem;
-mod seen;
+mod view;
 mod weight;
 
 use std::fmt;
@@ -33,10 +33,10 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
-use explained::Explained;
-pub use left_out::LeftOut;
+use goodness_of_fit::GoodnessOfFit;
+pub use leave_one_out::LeaveOneOutError;
 use numbers::Family;
-pub use own::{FoundNumber, OwnFilm};
+pub use own_film::{FoundNumber, OwnFilm};
 pub use problem::Bench;
 use problem::{Problem, Trust};
 
@@ -63,7 +63,7 @@ pub struct Fit {
     /// The load that is explained worst.
     worst: SeenLoad,
     /// Each load, left out of the fit.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<LeaveOneOutError>,
 }
 
 /// Fits a unit to its rest position and to loads.
@@ -110,11 +110,11 @@ pub fn fit(
 
 impl fmt::Display for Fit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let explained = Explained {
+        let goodness_of_fit = GoodnessOfFit {
             chi_square: self.chi_square,
             worst: &self.worst,
         };
-        writeln!(f, "{explained}")?;
+        writeln!(f, "{goodness_of_fit}")?;
         for FoundNumber { name, value, sigma } in &self.own.numbers {
             writeln!(f, "{name:<46} {value:>9.4} ± {sigma:.4}")?;
         }

@@ -2,9 +2,9 @@
 
 use hivtac_shell::{Change, Design};
 
-use super::own::{FoundNumber, OwnFilm};
+use super::own_film::{FoundNumber, OwnFilm};
 use super::problem::Bench;
-use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
+use crate::forward::tolerances::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
 /// Standard deviations of what the pixel grid does to a marker at rest, px, and of how far the
 /// camera is from the film beyond its nominal distance, mm.

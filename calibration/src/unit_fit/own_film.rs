@@ -94,7 +94,7 @@ impl OwnFilm {
         // A scatter beyond the noise is what no number explains.
         let scatter_px = problem.bench.noise_px * (found.scatter() - 1.0).sqrt();
         let beside = left.hypot(scatter_px.hypot(mesh_px(problem.family)) / made.focal_px);
-        let covariance = left_open(problem, found, &field, beside)?;
+        let covariance = remaining_covariance(problem, found, &field, beside)?;
         let (sin, cos) = libm::sincos(made.roll_deg.to_radians());
         Ok(Self {
             numbers: problem.found_numbers(found),
@@ -246,9 +246,9 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
     })
 }
 
-/// What the loads leave open of how the unit's dots move, with errors of each coordinate, focal
-/// lengths, that grow with the size to this at the largest.
-fn left_open(
+/// The covariance of the dots' motion that remains after the loads. To each coordinate it adds an
+/// error, focal lengths, which grows with the size to `beside` at the largest.
+fn remaining_covariance(
     problem: &Problem<'_>,
     found: &Found,
     field: &Field<'_>,

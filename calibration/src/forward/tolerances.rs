@@ -1,4 +1,4 @@
-//! How exactly units are built: standard deviations of what they differ in.
+//! The tolerances of units: standard deviations of the numbers in which they differ.
 
 /// ln of the film's Young's modulus.
 pub const STIFFNESS: f64 = 0.2;

@@ -1,24 +1,25 @@
-//! Steady stretches: a force that is held is one known load, and needs no exact clocks.
+//! Steady intervals: in each, the force stays the same, so that it is one known load and needs no
+//! exact clocks.
 
 use super::assemble::Loaded;
 
-/// A stretch lasts at least so long, s.
+/// An interval lasts at least so long, s.
 const SHORTEST_S: f64 = 0.3;
 /// Within it the force strays no farther than this from its mean: in parts of it, and in standard
 /// deviations of the gauge's noise.
 const STRAY: f64 = 0.02;
 const STRAY_SIGMAS: f64 = 4.0;
-/// Nor less than this, N.
+/// This reach is at least so large, N.
 const STRAY_N: f64 = 0.000_5;
-/// Frames farther apart belong to different stretches, s.
+/// Frames farther apart belong to different intervals, s.
 const GAP_S: f64 = 0.2;
 
-/// The frames of all steady stretches, each with the mean force of its own.
-pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>> {
+/// The frames of all steady intervals, each with the mean force of its interval.
+pub(super) fn steady_frames<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>> {
     let mut steady = Vec::new();
     let mut rest = frames;
     while !rest.is_empty() {
-        let length = stretch(rest, noise_n);
+        let length = interval_length(rest, noise_n);
         let (these, others) = rest.split_at(length);
         let lasted = these[length - 1].time_s - these[0].time_s;
         if lasted >= SHORTEST_S {
@@ -38,7 +39,7 @@ pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>>
 }
 
 /// How many of the first frames are within reach of their own mean, in one pose.
-fn stretch(frames: &[Loaded<'_>], noise_n: f64) -> usize {
+fn interval_length(frames: &[Loaded<'_>], noise_n: f64) -> usize {
     let first = &frames[0];
     let (mut low, mut high, mut sum) = (first.force_n, first.force_n, 0.0);
     for (count, frame) in frames.iter().enumerate() {
@@ -95,7 +96,7 @@ mod tests {
                 clock_n: None,
             })
             .collect();
-        let found = steady(&frames, 0.000_1);
+        let found = steady_frames(&frames, 0.000_1);
         let mut loads: Vec<(f64, Option<Pose>)> =
             found.iter().map(|f| (f.force_n, f.kept.pose)).collect();
         loads.dedup();
@@ -107,6 +108,6 @@ mod tests {
         );
         assert_eq!(loads[2].1, Some(pose([8.0, 0.0])));
         assert!(found.len() > 60, "{}", found.len());
-        assert!(steady(&[], 0.0).is_empty());
+        assert!(steady_frames(&[], 0.0).is_empty());
     }
 }

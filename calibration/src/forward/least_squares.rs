@@ -1,21 +1,22 @@
-//! Sums of terms that are nearest to samples, and splines through nodes: plain loops, the same
-//! numbers on every machine.
+//! Least squares, and splines through nodes: plain loops, which give the same numbers on every
+//! machine.
 
 use anyhow::{Result, ensure};
 use hivtac_twin::film::reduced::Axis;
 
-/// What is told least of the terms is at least this part of what is told most.
-const LEAST_TOLD: f64 = 1e-9;
+/// A column at right angles to those before it has at least this part of the largest such column's
+/// length; with less, the samples do not determine the terms.
+const LEAST_LENGTH: f64 = 1e-9;
 
-/// Finds terms' coefficients from samples at always the same loads.
-pub struct Nearest {
+/// Fits the coefficients of terms to samples, which are always taken at the same loads.
+pub struct LeastSquares {
     /// Columns at right angles, by term.
     units: Vec<Vec<f64>>,
-    /// What each column is made of, by term: parts of the units up to its own.
+    /// Each term's column in parts of the units up to its own.
     parts: Vec<Vec<f64>>,
 }
 
-impl Nearest {
+impl LeastSquares {
     /// Of the terms' values, a row for each sample.
     ///
     /// # Errors
@@ -38,7 +39,7 @@ impl Nearest {
             let own = dot(&column, &column).sqrt();
             largest = largest.max(own);
             ensure!(
-                own > LEAST_TOLD * largest,
+                own > LEAST_LENGTH * largest,
                 "the samples do not tell the terms apart"
             );
             of[term] = own;
@@ -49,7 +50,7 @@ impl Nearest {
         Ok(Self { units, parts })
     }
 
-    /// The coefficients nearest to these samples.
+    /// The coefficients of the sum of terms that is nearest to these samples.
     pub fn coefficients(&self, samples: &[f64]) -> Vec<f64> {
         let mut left = samples.to_vec();
         let mut along = Vec::with_capacity(self.units.len());
@@ -72,7 +73,7 @@ impl Nearest {
 /// The coefficients of splines through rows of numbers at the nodes of axes along x and y: by node
 /// along y and, within, along x.
 pub fn splines([x, y]: [&Axis; 2], rows: &[Vec<Vec<f64>>]) -> Result<Vec<Vec<Vec<f64>>>> {
-    let [x, y] = [x, y].map(|axis| Nearest::new(&collocation(axis)));
+    let [x, y] = [x, y].map(|axis| LeastSquares::new(&collocation(axis)));
     Ok(turned(&y?, &turned(&x?, rows)))
 }
 
@@ -89,7 +90,7 @@ fn collocation(axis: &Axis) -> Vec<Vec<f64>> {
 }
 
 /// Solves along the inner axis, and makes the outer one of it.
-fn turned(through: &Nearest, rows: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
+fn turned(through: &LeastSquares, rows: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
     let (outer, inner, numbers) = (rows.len(), rows[0].len(), rows[0][0].len());
     let mut all = vec![vec![vec![0.0; numbers]; outer]; inner];
     for (outer, line) in rows.iter().enumerate() {
@@ -128,10 +129,10 @@ mod tests {
         let rows: Vec<Vec<f64>> = (0..30).map(row).collect();
         let own = [1.0, -2.0, 0.5, 3.0, -0.25, 1.5];
         let samples: Vec<f64> = rows.iter().map(|row| dot(row, &own)).collect();
-        let found = Nearest::new(&rows).unwrap().coefficients(&samples);
+        let found = LeastSquares::new(&rows).unwrap().coefficients(&samples);
         assert!(found.iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-12));
         let alike: Vec<Vec<f64>> = rows.iter().map(|row| vec![row[0], 2.0 * row[0]]).collect();
-        assert!(Nearest::new(&alike).is_err());
+        assert!(LeastSquares::new(&alike).is_err());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Uncertainties that hold: widened until the errors on a data set lie within what they say.
+//! The scale of the stated uncertainties: it grows until they cover the errors on a data set.
 
 use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_sensor::force::model::Model;
@@ -13,21 +13,20 @@ use crate::evaluation::errors::angle_deg;
 use crate::quantize::export;
 use crate::weights::Weights;
 
-/// The part of the errors that the 95 % bounds hold on the rows that they are made from, a little
-/// more than they promise.
+/// The part of the errors that the 95 % bounds cover on the rows that set the scale: a little more
+/// than 95 %.
 const COVERED: f64 = 0.96;
 /// What the tables may leave of a marker under the largest force, px, and the part of the largest
 /// size from which on forces show it.
 const BESIDE_PX: [f64; 8] = [0.0, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012];
 const LARGE: f64 = 0.6;
 
-/// What a row's uncertainties would have to be at the least for its errors to lie within their
-/// bounds.
-struct Needed {
-    /// The size of the force that was found, in parts of the largest.
+/// The least scale of a row's uncertainties with which its bounds cover its errors.
+struct LeastScale {
+    /// The size of the force that the model finds, in parts of the largest.
     size: f64,
-    /// Of direction, |F| and place: times what they are.
-    times: [f64; 3],
+    /// For direction, |F| and place.
+    scale: [f64; 3],
 }
 
 impl Weights {
@@ -46,17 +45,17 @@ impl Weights {
             ..FilmModel::nominal(steps, &noise)
         };
         self.film = Some(film.clone());
-        let rows = needed(&self, dataset)?;
-        let times =
-            |rows: &[Needed], k: usize| quantile(COVERED, rows.iter().map(|row| row.times[k]));
-        let wider = times(&rows, 0).max(times(&rows, 2)).max(1.0);
+        let rows = least_scales(&self, dataset)?;
+        let covering =
+            |rows: &[LeastScale], k: usize| quantile(COVERED, rows.iter().map(|row| row.scale[k]));
+        let wider = covering(&rows, 0).max(covering(&rows, 2)).max(1.0);
         film.noise_px = film.noise_px.map(|part| part * wider);
         for beside_px in BESIDE_PX {
             film.beside_px = beside_px;
             self.film = Some(film.clone());
-            let mut rows = needed(&self, dataset)?;
+            let mut rows = least_scales(&self, dataset)?;
             rows.retain(|row| row.size >= LARGE);
-            if (0..3).all(|k| times(&rows, k) <= 1.0) {
+            if (0..3).all(|k| covering(&rows, k) <= 1.0) {
                 break;
             }
         }
@@ -64,7 +63,7 @@ impl Weights {
     }
 }
 
-fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
+fn least_scales(weights: &Weights, dataset: &Dataset) -> Result<Vec<LeastScale>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
     let forward = model.forward.context("the network tells no place")?;
@@ -89,9 +88,9 @@ fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
         let off_n = (magnitude_n - norm(sample.force_n)).abs();
         let magnitude = off_n / MAGNITUDE_BOUND / (f64::from(force.magnitude_sigma.0) * 1e-6);
         let place = far_mm / PLACE_BOUND / (f64::from(place.sigma.0) * 1e-3);
-        all.push(Needed {
+        all.push(LeastScale {
             size: f64::from(size / forward.limits.size),
-            times: [direction, magnitude, place],
+            scale: [direction, magnitude, place],
         });
     }
     ensure!(
@@ -101,7 +100,7 @@ fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
     Ok(all)
 }
 
-/// What a part of the values are at most; nothing of none.
+/// The value that this part of the values does not exceed; 0 without values.
 fn quantile(part: f64, values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
