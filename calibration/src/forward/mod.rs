@@ -195,14 +195,14 @@ impl Weighed for UnitSetup<'_> {
                 tilt,
                 place_mm,
             };
-            self.images(|marker| Ok(UnitSetup::moved(self, &film, &pose, marker)?))
+            self.images(|marker| UnitSetup::moved(self, &film, &pose, marker))
         };
         sizes.iter().map(of_size).collect()
     }
 
     fn hangs(&self, down: [f64; 3]) -> Result<Moved> {
         let film = self.under(down)?;
-        self.images(|marker| Ok(self.moved_by(&film, &Load::REST, marker)?))
+        self.images(|marker| self.moved_by(&film, &Load::REST, marker))
     }
 }
 
