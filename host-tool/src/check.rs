@@ -1,45 +1,46 @@
 //! `hivtac check`: rate, jitter, losses and latency, held against limits.
 
-use crate::lines::to_json;
-use crate::output::{note, print};
+use crate::device::{Device, seconds};
+use crate::output::{self, note};
 use crate::tally::Tally;
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
-use hivtac_host::port::Address;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 
-/// What to measure, and what must hold.
-pub struct Options {
-    /// Where the device is.
-    pub address: Address,
-    /// Longest wait for the device's answers.
-    pub patience: Duration,
-    /// How long to measure.
-    pub duration: Duration,
-    /// Fewest samples a second.
-    pub min_rate_hz: Option<f64>,
-    /// Most frames without a sample.
-    pub max_loss: Option<u64>,
-    /// One JSON object.
-    pub json: bool,
+/// Measure rate, jitter, losses and latency for a while, and hold them against limits
+///
+/// Example: hivtac check --seconds 10 --min-rate 150 --max-loss 0
+#[derive(Args)]
+pub struct CheckArguments {
+    #[command(flatten)]
+    device: Device,
+    /// How long to measure
+    #[arg(long, value_name = "S", default_value = "10", value_parser = seconds)]
+    seconds: Duration,
+    /// Fewest samples a second, by the device's clock
+    #[arg(long, value_name = "HZ")]
+    min_rate: Option<f64>,
+    /// Most frames without a sample
+    #[arg(long, value_name = "N")]
+    max_loss: Option<u64>,
+    /// One JSON object instead of lines
+    #[arg(long)]
+    json: bool,
 }
 
 /// Measures, prints what came of it, and says which limit failed: the rate before the losses.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let (mut link, _) = Link::connect(&options.address, options.patience)?;
+pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
+    let (mut link, _) = arguments.device.connect()?;
     let mut measured = Measured::default();
-    measured.follow(&mut link, options)?;
+    measured.follow(&mut link, arguments)?;
     measured.tally.rejected(link.rejected());
     let report = measured.report();
-    print(&if options.json {
-        to_json(&report)
-    } else {
-        report.lines(&measured.tally)
-    })?;
-    report.judge(options)
+    output::report(arguments.json, &report, || report.lines(&measured.tally))?;
+    report.judge(arguments)
 }
 
 /// What came, and when.
@@ -57,15 +58,16 @@ struct Measured {
 }
 
 impl Measured {
-    fn follow(&mut self, link: &mut Link, options: &Options) -> Result<(), Failure> {
-        self.request(link, Request::GetInfo, options.patience)?;
-        self.request(link, Request::Start, options.patience)?;
-        let end = Instant::now() + options.duration;
+    fn follow(&mut self, link: &mut Link, arguments: &CheckArguments) -> Result<(), Failure> {
+        let patience = arguments.device.timeout;
+        self.request(link, Request::GetInfo, patience)?;
+        self.request(link, Request::Start, patience)?;
+        let end = Instant::now() + arguments.seconds;
         while let Some(message) = link.receive(end)? {
             self.take(&message, Instant::now());
         }
-        self.request(link, Request::Stop, options.patience)?;
-        self.request(link, Request::GetInfo, options.patience)
+        self.request(link, Request::Stop, patience)?;
+        self.request(link, Request::GetInfo, patience)
     }
 
     fn request(
@@ -175,12 +177,12 @@ impl Report {
         .join("\n")
     }
 
-    fn judge(&self, options: &Options) -> Result<(), Failure> {
-        if let Some(least) = options.min_rate_hz.filter(|least| self.rate_hz < *least) {
+    fn judge(&self, arguments: &CheckArguments) -> Result<(), Failure> {
+        if let Some(least) = arguments.min_rate.filter(|least| self.rate_hz < *least) {
             let message = format!("{:.2} samples a second, below {least}", self.rate_hz);
             return Err(Failure::new(Kind::Rate, message));
         }
-        if let Some(most) = options.max_loss.filter(|most| self.lost > *most) {
+        if let Some(most) = arguments.max_loss.filter(|most| self.lost > *most) {
             let message = format!("{} frames lost, more than {most}", self.lost);
             return Err(Failure::new(Kind::Loss, message));
         }

@@ -99,6 +99,11 @@ impl Failure {
     pub fn input(message: impl Into<String>) -> Failure {
         Failure::new(Kind::Input, message)
     }
+
+    /// A file is not usable, and why.
+    pub fn of_file(path: &str, why: impl fmt::Display) -> Failure {
+        Failure::input(format!("{path}: {why}"))
+    }
 }
 
 impl fmt::Display for Failure {

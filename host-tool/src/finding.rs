@@ -1,8 +1,8 @@
 //! What was found in a picture, for people and as JSON.
 
-use crate::decimal::Millionths;
-use crate::force_json::ForceJson;
-use crate::lines::{contact_text, status_text, to_json};
+use crate::lines::{contact_text, status_text};
+use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
+use hivtac_host::shown::to_json;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
@@ -105,7 +105,7 @@ impl<'a> Finding<'a> {
             blobs: blobs.iter().map(BlobJson::from).collect(),
             markers,
             features,
-            force: measurement.force.as_ref().map(ForceJson::from),
+            force: measurement.force.map(ForceJson),
             contact: measurement
                 .force
                 .map(|_| measurement.status.contains(Status::CONTACT)),
@@ -198,26 +198,23 @@ impl<'a> Finding<'a> {
     }
 
     fn force_line(&self) -> Option<String> {
-        let force = self.force.as_ref()?;
-        let [x, y, z] = [force.x_n, force.y_n, force.z_n].map(Millionths::in_thousandths);
+        let ForceJson(force) = self.force.as_ref()?;
+        let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.shown(force));
         Some(format!(
-            "  force     α {}°, β {}°, |F| {} mN, F ({x}, {y}, {z}) mN; ± {}°, ± {} mN",
-            force.alpha_deg,
-            force.beta_deg,
-            force.magnitude_n.in_thousandths(),
-            force.direction_sigma_deg,
-            force.magnitude_sigma_n.in_thousandths()
+            "  force     α {alpha}°, β {beta}°, |F| {size} mN, F ({x}, {y}, {z}) mN; \
+             ± {angle_sigma}°, ± {size_sigma} mN"
         ))
     }
 
     /// Of a force; a dash when the model does not tell the place.
     fn place_line(&self) -> Option<String> {
-        let [x, y, sigma] = self.force.as_ref()?.place.numbers();
-        Some(match (x, y, sigma) {
-            (Some(x), Some(y), Some(sigma)) => {
+        let ForceJson(force) = self.force.as_ref()?;
+        Some(match &force.place {
+            Some(place) => {
+                let [x, y, sigma] = PLACE.map(|field| field.shown(place));
                 format!("  place     ({x}, {y}) mm; ± {sigma} mm")
             }
-            _ => "  place     –".to_owned(),
+            None => "  place     –".to_owned(),
         })
     }
 }

@@ -1,7 +1,9 @@
 //! `hivtac update firmware`: the device into its own loader, and what came back.
 
-use crate::command::send;
+use crate::device::{Device, seconds};
 use crate::output::{note, tell};
+use crate::request::send;
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
@@ -20,31 +22,55 @@ const DTCM: Range<u32> = 0x2000_0000..0x2002_0001;
 /// Between two looks for the device.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
+/// Restart the device into its own loader (USB DFU), say how to send it firmware, and wait for
+/// it to come back
+///
+/// Prints the `dfu-util` command to run meanwhile in another terminal, then the version before
+/// and after. What the device keeps stays. When the loader was started by mistake, take the
+/// device off its supply for a moment.
+///
+/// Example: hivtac update firmware hivtac-firmware.bin
+#[derive(Args)]
+pub struct FirmwareArguments {
+    #[command(flatten)]
+    device: Device,
+    /// The program as it lies in flash: `arm-none-eabi-objcopy -O binary ELF FILE.bin`
+    #[arg(value_name = "FILE.bin")]
+    file: String,
+    /// Longest wait for the device to come back, s
+    #[arg(long, value_name = "S", default_value = "300", value_parser = seconds)]
+    wait: Duration,
+    /// JSON objects instead of lines: the command to run, then the version before and after
+    #[arg(long)]
+    json: bool,
+}
+
 /// Starts the loader, says what to do, and waits until the device is back.
 ///
 /// # Errors
 /// A file that is no program for the device, before anything is asked of it; what it refuses;
 /// [`Kind::NoDevice`] when it does not come back.
-pub fn update(
-    address: &Address,
-    patience: Duration,
-    path: &str,
-    wait: Duration,
-    json: bool,
-) -> Result<(), Failure> {
-    check(path)?;
-    let (mut link, before) = Link::connect(address, patience)?;
-    send(&mut link, Request::StartLoader, patience)?;
+pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
+    let FirmwareArguments {
+        device,
+        file,
+        wait,
+        json,
+    } = arguments;
+    let address = device.address()?;
+    check(file)?;
+    let (mut link, before) = Link::connect(&address, device.timeout)?;
+    send(&mut link, Request::StartLoader, device.timeout)?;
     drop(link);
-    let line = dfu_util(path);
+    let line = dfu_util(file);
     let told =
         format!("the device is in its loader; now run\n\n  {line}\n\nand it comes back by itself");
-    tell(json, &told, &json!({ "run": line }))?;
-    let after = come_back(address, patience, &before, wait)?;
+    tell(*json, &told, &json!({ "run": line }))?;
+    let after = come_back(&address, device.timeout, &before, *wait)?;
     let [now, was] = [&after.firmware, &before.firmware];
     let told = format!("firmware {}, was {}", shown(now), shown(was));
     tell(
-        json,
+        *json,
         &told,
         &json!({ "firmware": now.as_str(), "was": was.as_str() }),
     )
@@ -57,7 +83,7 @@ fn dfu_util(path: &str) -> String {
 }
 
 fn check(path: &str) -> Result<(), Failure> {
-    let wrong = |why: String| Failure::input(format!("{path}: {why}"));
+    let wrong = |why: String| Failure::of_file(path, why);
     let most = u64::from(FLASH.end - FLASH.start);
     let bytes = read_at_most(path, most).map_err(|error| wrong(error.to_string()))?;
     let bytes =

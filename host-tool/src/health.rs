@@ -1,12 +1,12 @@
 //! `hivtac self-test`: what the device finds when it looks at itself and its camera, each with its
 //! code.
 
-use crate::command::tell;
-use crate::lines::to_json;
-use crate::output::print;
+use crate::device::Device;
+use crate::output;
+use crate::request::show_log;
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
-use hivtac_host::port::Address;
 use hivtac_host::shown::unit_number;
 use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::{DeviceMessage, Request};
@@ -77,13 +77,27 @@ impl Told {
     }
 }
 
+/// Have the device look at itself, and show what it finds, each with its code
+///
+/// Codes are those of docs/wire.md, "Health". Exit code 9 when something is not right.
+///
+/// Example: hivtac self-test
+#[derive(Args)]
+pub struct SelfTestArguments {
+    #[command(flatten)]
+    device: Device,
+    /// One JSON object instead of lines
+    #[arg(long)]
+    json: bool,
+}
+
 /// Has the device look at itself, and prints what it finds.
 ///
 /// # Errors
 /// [`Kind::NotRight`] when something is not right; those of [`Link::connect`].
-pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
-    let (mut link, hello) = Link::connect(address, patience)?;
-    let health = ask(&mut link, patience)?;
+pub fn run(arguments: &SelfTestArguments) -> Result<(), Failure> {
+    let (mut link, hello) = arguments.device.connect()?;
+    let health = ask(&mut link, arguments.device.timeout)?;
     let found: Vec<Problem> = problems(health.problems).collect();
     let report = Report {
         device_id: unit_number(&hello.device_id),
@@ -97,10 +111,7 @@ pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Fail
             .collect(),
         health: Told::of(&health),
     };
-    print(&match json {
-        true => to_json(&report),
-        false => lines(&health).join("\n"),
-    })?;
+    output::report(arguments.json, &report, || lines(&health).join("\n"))?;
     match found.len() {
         0 => Ok(()),
         count => Err(Failure::new(
@@ -121,7 +132,7 @@ pub fn ask(link: &mut Link, patience: Duration) -> Result<Health, Failure> {
     let mut health = None;
     link.request(Request::GetHealth, patience, |message| match message {
         DeviceMessage::Health(newest) => health = Some(newest),
-        other => tell(other),
+        other => show_log(other),
     })?;
     health.ok_or_else(|| link.lost("its health did not come"))
 }

@@ -1,18 +1,33 @@
 //! What the tool says of itself: exit codes, completions for shells, and man pages.
 
-use crate::Arguments;
 use crate::output::{note, print};
-use clap::{Command, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
-use std::path::Path;
+use std::path::PathBuf;
+
+/// Print what a shell completes this tool's commands by
+///
+/// Example: hivtac completion bash
+#[derive(Args)]
+pub struct CompletionArguments {
+    /// Which shell's
+    shell: Shell,
+}
+
+/// Write a man page of each command into a folder
+///
+/// Example: hivtac man ~/.local/share/man/man1
+#[derive(Args)]
+pub struct ManArguments {
+    /// The folder, made when it is missing
+    folder: PathBuf,
+}
 
 /// The command line with the exit codes in the help of each command.
-pub fn command() -> Command {
+pub fn with_help(command: Command) -> Command {
     let codes = exit_codes();
-    let mut command = with_exit_codes(Arguments::command(), &codes);
-    command = command.after_help(codes);
-    command
+    with_exit_codes(command, &codes).after_help(codes)
 }
 
 fn with_exit_codes(command: Command, codes: &str) -> Command {
@@ -39,21 +54,22 @@ fn exit_codes() -> String {
 }
 
 /// Prints what a shell completes this tool's commands by.
-pub fn completion(shell: Shell) -> Result<(), Failure> {
+pub fn completion(arguments: &CompletionArguments, mut command: Command) -> Result<(), Failure> {
     let mut script = Vec::new();
-    clap_complete::generate(shell, &mut command(), "hivtac", &mut script);
+    clap_complete::generate(arguments.shell, &mut command, "hivtac", &mut script);
     let script = String::from_utf8_lossy(&script);
     print(script.trim_end()).map(|_| ())
 }
 
 /// Writes a man page of each command into a folder, which is made when it is missing.
-pub fn man(folder: &Path) -> Result<(), Failure> {
+pub fn man(arguments: &ManArguments, command: Command) -> Result<(), Failure> {
+    let folder = &arguments.folder;
     let failed = |error| {
         let folder = folder.display();
         Failure::input(format!("cannot write man pages into {folder}: {error}"))
     };
     std::fs::create_dir_all(folder).map_err(failed)?;
-    clap_mangen::generate_to(command(), folder).map_err(failed)?;
+    clap_mangen::generate_to(command, folder).map_err(failed)?;
     let folder = folder.display();
     note(&format!(
         "man pages written; `man {folder}/hivtac.1` shows the first"
@@ -64,6 +80,8 @@ pub fn man(folder: &Path) -> Result<(), Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::command;
+    use std::path::Path;
 
     /// Commands that write files or a script, and say nothing that a program would read.
     const SILENT: [&str; 2] = ["hivtac completion", "hivtac man"];
@@ -98,7 +116,7 @@ mod tests {
                 .strip_prefix(&name)
                 .is_some_and(|rest| rest.is_empty() || rest.starts_with(' '));
             assert!(is_its, "{name}: {example}");
-            let parsed = super::command().try_get_matches_from(example.split(' '));
+            let parsed = crate::command().try_get_matches_from(example.split(' '));
             let error = parsed.err().map(|error| error.to_string());
             assert_eq!(error, None, "{example}");
         }
@@ -146,7 +164,10 @@ mod tests {
     #[test]
     fn each_command_has_its_man_page_with_example_and_exit_codes() {
         let folder = tempfile::tempdir().unwrap();
-        man(folder.path()).unwrap();
+        let into = |folder: &Path| ManArguments {
+            folder: folder.to_owned(),
+        };
+        man(&into(folder.path()), command()).unwrap();
         for (name, _) in doing() {
             let file = name.replace(' ', "-") + ".1";
             let page = std::fs::read_to_string(folder.path().join(&file));
@@ -156,7 +177,7 @@ mod tests {
             }
         }
         let blocked = folder.path().join("hivtac.1").join("below");
-        let error = man(&blocked).unwrap_err().to_string();
+        let error = man(&into(&blocked), command()).unwrap_err().to_string();
         assert!(error.starts_with("cannot write man pages into"), "{error}");
     }
 }

@@ -1,18 +1,18 @@
 //! `hivtac info`: what the device is and how it fares.
 
-use crate::command::px;
+use crate::device::Device;
 use crate::health::{self, Told};
-use crate::lines::to_json;
-use crate::output::{note, print};
+use crate::output::{self, note};
 use crate::settings;
 use crate::settings::temporal::FilterJson;
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::{Link, log_text};
-use hivtac_host::port::Address;
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::Threshold;
+use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{
     DeviceHello, DeviceMessage, ModelIdentity, ModelSource, Request, Stats,
 };
@@ -20,9 +20,22 @@ use hivtac_wire::settings::SettingsReport;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
+/// Show what the device is and how it fares
+///
+/// Example: hivtac info
+#[derive(Args)]
+pub struct InfoArguments {
+    #[command(flatten)]
+    device: Device,
+    /// One JSON object instead of lines
+    #[arg(long)]
+    json: bool,
+}
+
 /// Prints the device's hello and counters, as lines or as one JSON object.
-pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
-    let (mut link, hello) = Link::connect(address, patience)?;
+pub fn run(arguments: &InfoArguments) -> Result<(), Failure> {
+    let patience = arguments.device.timeout;
+    let (mut link, hello) = arguments.device.connect()?;
     let (hello, stats) = ask(&mut link, patience, hello)?;
     let settings = settings::ask(&mut link, patience)?;
     let health = health::ask(&mut link, patience)?;
@@ -31,12 +44,7 @@ pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Fail
         health: Some(Told::of(&health)),
         ..Info::new(&link.name, &hello, stats)
     };
-    print(&if json {
-        to_json(&info)
-    } else {
-        info.lines().join("\n")
-    })?;
-    Ok(())
+    output::report(arguments.json, &info, || info.lines().join("\n")).map(|_| ())
 }
 
 /// The hello anew, and the counters.
@@ -102,9 +110,9 @@ impl Tare {
         Tare {
             taken,
             kept: taken && settings.kept.tare,
-            drift_px: settings.drift.map(px),
-            rezeroed_px: px(settings.rezeroed),
-            seen_px: settings.seen.map(|seen| f64::from(seen.0) * 1e-3),
+            drift_px: settings.drift.map(Px::to_f64),
+            rezeroed_px: settings.rezeroed.to_f64(),
+            seen_px: settings.seen.map(MilliPx::to_f64),
         }
     }
 

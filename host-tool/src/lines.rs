@@ -1,9 +1,9 @@
 //! One line for each sample: for people, as JSON, or as CSV.
 
-use crate::decimal::{Millionths, Thousandths};
-use crate::force_json::{ForceJson, PlaceJson};
 use crate::truth::Truth;
-pub use hivtac_host::shown::to_json;
+use hivtac_host::decimal::Decimal;
+use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE};
+use hivtac_host::shown::to_json;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
@@ -60,23 +60,30 @@ fn told(sample: &Sample, bit: Status) -> Option<bool> {
 }
 
 fn human_header(truth: bool) -> String {
-    let columns = |names: &[&str]| {
-        names
-            .iter()
-            .map(|name| format!("{name:>9}"))
-            .collect::<String>()
-    };
+    let mut columns: Vec<[&str; 2]> = with_column(&FORCE).map(head).collect();
+    columns.extend(with_column(&PLACE).map(head));
+    columns.push(["contact", ""]);
+    if truth {
+        columns.extend([["true α", "°"], ["true β", "°"], ["true |F|", "mN"]]);
+        columns.extend([["true x", "mm"], ["true y", "mm"]]);
+    }
     let mut name = format!("{:>8}{:>8}{:>13}", "seq", "frame", "time");
     let mut unit = format!("{:>8}{:>8}{:>13}", "", "", "s");
-    name += &columns(&["α", "β", "|F|", "Fx", "Fy", "Fz"]);
-    unit += &columns(&["°", "°", "mN", "mN", "mN", "mN"]);
-    name += &columns(&["place x", "place y", "place ±", "contact"]);
-    unit += &columns(&["mm", "mm", "mm", ""]);
-    if truth {
-        name += &columns(&["true α", "true β", "true |F|", "true x", "true y"]);
-        unit += &columns(&["°", "°", "mN", "mm", "mm"]);
+    for [column_name, column_unit] in columns {
+        name += &format!("{column_name:>9}");
+        unit += &format!("{column_unit:>9}");
     }
     format!("{name}  status\n{}", unit.trim_end())
+}
+
+/// The fields that a person sees.
+fn with_column<T>(fields: &[Field<T>]) -> impl Iterator<Item = &Field<T>> {
+    fields.iter().filter(|field| !field.symbol.is_empty())
+}
+
+/// Name and unit of a field, for a person.
+fn head<T>(field: &Field<T>) -> [&'static str; 2] {
+    [field.symbol, field.quantity.unit()]
 }
 
 fn human_row(row: &Row) -> String {
@@ -88,7 +95,7 @@ fn human_row(row: &Row) -> String {
         force,
         ..
     } = row.sample;
-    let time = Millionths::from_u64(*time_us);
+    let time = Decimal::new(*time_us, 6);
     let mut line = format!("{sequence:>8}{frame:>8}{time:>13}");
     line += &human_force(force.as_ref());
     let contact = contact_text(told(row.sample, Status::CONTACT));
@@ -123,31 +130,20 @@ pub fn contact_text(contact: Option<bool>) -> &'static str {
     }
 }
 
-/// Nine columns: degrees, mN and mm with three decimals; all exact.
+/// A column for each field of a force and its place; all exact.
 fn human_force(force: Option<&Force>) -> String {
-    let Some(force) = force else {
-        return NOTHING.repeat(9);
-    };
-    let numbers = [force.alpha.0, force.beta.0, force.magnitude.0];
-    let mut text: String = numbers.map(column).concat();
-    text += &force.cartesian.map(|part| column(part.0)).concat();
-    text += &human_place(ForceJson::from(force).place);
-    text
+    columns(&FORCE, force) + &columns(&PLACE, force.and_then(|force| force.place.as_ref()))
 }
 
 /// A column with nothing in it.
 const NOTHING: &str = "        –";
 
-fn column(thousandths: i32) -> String {
-    format!("{:>9}", Thousandths::from_i32(thousandths))
-}
-
-fn human_place(place: PlaceJson) -> String {
-    let columns = place.numbers().map(|number| match number {
-        Some(millimetres) => format!("{millimetres:>9}"),
+fn columns<T>(fields: &[Field<T>], of: Option<&T>) -> String {
+    let columns = with_column(fields).map(|field| match of {
+        Some(of) => format!("{:>9}", field.shown(of)),
         None => NOTHING.to_owned(),
     });
-    columns.concat()
+    columns.collect()
 }
 
 fn human_truth(truth: Option<Truth>) -> String {
@@ -183,7 +179,7 @@ fn json_row(row: &Row) -> String {
         seq: sample.sequence,
         frame: sample.frame,
         time_us: sample.time_us,
-        force: sample.force.as_ref().map(ForceJson::from),
+        force: sample.force.map(ForceJson),
         contact: told(sample, Status::CONTACT),
         slip: told(sample, Status::SLIP),
         status: names(sample.status),
@@ -193,13 +189,17 @@ fn json_row(row: &Row) -> String {
 }
 
 fn csv_header(truth: bool) -> String {
-    let mut header = "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,\
-                      direction_sigma_deg,magnitude_sigma_n,\
-                      place_x_mm,place_y_mm,place_sigma_mm,contact,slip,status"
-        .to_owned();
+    let [force, place] = [
+        FORCE.map(|it| it.name).to_vec(),
+        PLACE.map(|it| it.name).to_vec(),
+    ];
+    let mut names = [&["seq", "frame", "time_us"], &force[..], &place[..]].concat();
+    names.extend(["contact", "slip", "status"]);
+    let mut header = names.join(",");
     if truth {
-        header += ",true_alpha_deg,true_beta_deg,true_magnitude_n,true_x_n,true_y_n,true_z_n,\
-                   true_place_x_mm,true_place_y_mm";
+        // The truth has no uncertainties.
+        let names = force[..6].iter().chain(&place[..2]);
+        header.extend(names.map(|name| format!(",true_{name}")));
     }
     header
 }
@@ -224,19 +224,10 @@ fn csv_row(row: &Row) -> String {
 }
 
 fn csv_force(force: Option<&Force>) -> Vec<String> {
-    let Some(force) = force else {
-        return vec![String::new(); 11];
-    };
-    let force = ForceJson::from(force);
-    let mut fields = [force.alpha_deg, force.beta_deg]
-        .map(|n| n.to_string())
-        .to_vec();
-    let newtons = [force.magnitude_n, force.x_n, force.y_n, force.z_n];
-    fields.extend(newtons.map(|n| n.to_string()));
-    fields.push(force.direction_sigma_deg.to_string());
-    fields.push(force.magnitude_sigma_n.to_string());
-    fields.extend(force.place.numbers().map(field));
-    fields
+    let place = force.and_then(|force| force.place.as_ref());
+    let force = FORCE.map(|it| field(force.map(|force| it.decimal(force))));
+    let place = PLACE.map(|it| field(place.map(|place| it.decimal(place))));
+    [&force[..], &place[..]].concat()
 }
 
 /// Empty for what is not there.

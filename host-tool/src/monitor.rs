@@ -1,10 +1,12 @@
 //! `hivtac monitor`: the forces as they come, and a summary at the end.
 
+use crate::device::{Device, seconds};
 use crate::follow::{RETRY_EVERY, SILENCE, note_connected_again};
 use crate::lines::{Format, Row};
 use crate::output::{self, Reader, note, print};
 use crate::tally::Tally;
 use crate::truth::TruthFile;
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::port::Address;
@@ -15,28 +17,48 @@ use std::time::{Duration, Instant};
 /// Longest wait for the last counters at the end, however patient it is otherwise.
 const FAREWELL: Duration = Duration::from_secs(10);
 
-/// What to do.
-pub struct Options {
-    /// Where the device is.
-    pub address: Address,
-    /// Longest wait for the device's answers.
-    pub patience: Duration,
-    /// End after so many frames.
-    pub frames: Option<u64>,
-    /// End so long after the first start.
-    pub duration: Option<Duration>,
+/// Show forces as they come, and a summary at the end
+///
+/// Example: hivtac monitor --seconds 10
+#[derive(Args)]
+pub struct MonitorArguments {
+    #[command(flatten)]
+    device: Device,
+    /// End after N frames
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    frames: Option<u64>,
+    /// End after S seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Option<Duration>,
+    /// One JSON object a line
+    #[arg(long, conflicts_with = "csv")]
+    json: bool,
+    /// Comma-separated values
+    #[arg(long)]
+    csv: bool,
+    /// Go on after a lost connection, trying twice a second
+    #[arg(long)]
+    reconnect: bool,
+    /// Compare with the log of a simulated sensor: JSON lines with "frame" and the true force
+    #[arg(long, value_name = "FILE")]
+    truth: Option<String>,
+}
+
+impl MonitorArguments {
     /// How samples are printed.
-    pub format: Format,
-    /// Survive a lost connection.
-    pub reconnect: bool,
-    /// The simulation's log to compare with.
-    pub truth: Option<String>,
+    fn format(&self) -> Format {
+        match (self.json, self.csv) {
+            (true, _) => Format::Json,
+            (_, true) => Format::Csv,
+            _ => Format::Human,
+        }
+    }
 }
 
 /// Shows samples until the frames or the time are over, the reader is gone, or something fails;
 /// then the summary: on standard output for a person, on standard error beside JSON and CSV.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let mut monitor = Monitor::new(options)?;
+pub fn run(arguments: &MonitorArguments) -> Result<(), Failure> {
+    let mut monitor = Monitor::new(arguments)?;
     let result = monitor.watch();
     if monitor.started.is_some() {
         monitor.print_summary();
@@ -85,7 +107,9 @@ impl Silence {
 }
 
 struct Monitor<'o> {
-    options: &'o Options,
+    arguments: &'o MonitorArguments,
+    address: Address,
+    patience: Duration,
     truth: Option<TruthFile>,
     tally: Tally,
     /// When the device first began to stream.
@@ -96,10 +120,17 @@ struct Monitor<'o> {
 }
 
 impl<'o> Monitor<'o> {
-    fn new(options: &'o Options) -> Result<Self, Failure> {
-        let truth = options.truth.as_deref().map(TruthFile::open).transpose()?;
+    fn new(arguments: &'o MonitorArguments) -> Result<Self, Failure> {
+        let address = arguments.device.address()?;
+        let truth = arguments
+            .truth
+            .as_deref()
+            .map(TruthFile::open)
+            .transpose()?;
         Ok(Monitor {
-            options,
+            arguments,
+            address,
+            patience: arguments.device.timeout,
             truth,
             tally: Tally::default(),
             started: None,
@@ -110,12 +141,12 @@ impl<'o> Monitor<'o> {
 
     /// Follows the device through as many connections as it takes.
     fn watch(&mut self) -> Result<End, Failure> {
-        let (mut link, _) = Link::connect(&self.options.address, self.options.patience)?;
+        let (mut link, _) = Link::connect(&self.address, self.patience)?;
         loop {
             let result = self.converse(&mut link);
             self.tally.rejected(link.rejected());
             match result {
-                Err(failure) if failure.kind == Kind::Lost && self.options.reconnect => {
+                Err(failure) if failure.kind == Kind::Lost && self.arguments.reconnect => {
                     drop(link);
                     note(&format!("hivtac: {failure}"));
                     match self.find_again()? {
@@ -134,7 +165,7 @@ impl<'o> Monitor<'o> {
         while !self.time_is_over() {
             stop::check()?;
             std::thread::sleep(RETRY_EVERY);
-            match Link::connect(&self.options.address, self.options.patience) {
+            match Link::connect(&self.address, self.patience) {
                 Ok((link, _)) => {
                     note_connected_again(&link.name, lost);
                     self.tally.connected_again();
@@ -150,11 +181,11 @@ impl<'o> Monitor<'o> {
 
     /// One connection from the first command to its end.
     fn converse(&mut self, link: &mut Link) -> Result<End, Failure> {
-        self.request(link, Request::GetInfo, self.options.patience)?;
+        self.request(link, Request::GetInfo, self.patience)?;
         self.started.get_or_insert_with(Instant::now);
         self.end().into_iter().for_each(output::limit);
         self.print_header()?;
-        let started = self.request(link, Request::Start, self.options.patience)?;
+        let started = self.request(link, Request::Start, self.patience)?;
         let end = match started {
             Some(end) => end,
             None => self.stream(link)?,
@@ -164,7 +195,7 @@ impl<'o> Monitor<'o> {
     }
 
     fn print_header(&mut self) -> Result<(), Failure> {
-        let header = self.options.format.header(self.truth.is_some());
+        let header = self.arguments.format().header(self.truth.is_some());
         if let (Some(header), 0) = (header, self.tally.reconnections()) {
             self.reader = print(&header)?;
         }
@@ -220,7 +251,7 @@ impl<'o> Monitor<'o> {
     /// Finds out whether the device still knows of this conversation. Behind a TCP port it may have
     /// been unplugged or restarted without the port closing.
     fn probe(&mut self, link: &mut Link) -> Result<Option<End>, Failure> {
-        match self.request(link, Request::GetInfo, self.options.patience) {
+        match self.request(link, Request::GetInfo, self.patience) {
             Err(failure) if failure.kind == Kind::Refused => {
                 Err(link.lost("the device sends nothing and does not answer"))
             }
@@ -254,7 +285,7 @@ impl<'o> Monitor<'o> {
         if let (Some(force), Some(Some(truth))) = (&sample.force, &truth) {
             self.tally.compare(force, truth);
         }
-        self.reader = print(&self.options.format.row(&Row { sample, truth }))?;
+        self.reader = print(&self.arguments.format().row(&Row { sample, truth }))?;
         match self.reader {
             Reader::There => (),
             Reader::Gone => return Ok(Some(End::ReaderGone)),
@@ -262,7 +293,7 @@ impl<'o> Monitor<'o> {
         }
         self.tally.shown += 1;
         let enough = self
-            .options
+            .arguments
             .frames
             .is_some_and(|frames| self.tally.shown >= frames);
         Ok(enough.then_some(End::Enough))
@@ -270,7 +301,7 @@ impl<'o> Monitor<'o> {
 
     /// When the time is over, if ever.
     fn end(&self) -> Option<Instant> {
-        Some(self.started? + self.options.duration?)
+        Some(self.started? + self.arguments.seconds?)
     }
 
     fn time_is_over(&self) -> bool {
@@ -285,7 +316,7 @@ impl<'o> Monitor<'o> {
                 stats.stats(&last);
             }
         };
-        let patience = FAREWELL.min(self.options.patience);
+        let patience = FAREWELL.min(self.patience);
         for request in [Request::Stop, Request::GetInfo] {
             let tally = &mut self.tally;
             let result = link.request(request, patience, |message| ignore_samples(tally, message));
@@ -297,7 +328,7 @@ impl<'o> Monitor<'o> {
 
     fn print_summary(&self) {
         let summary = self.tally.summary(self.truth.is_some());
-        let for_a_person = self.options.format == Format::Human && self.reader == Reader::There;
+        let for_a_person = self.arguments.format() == Format::Human && self.reader == Reader::There;
         let printed = for_a_person.then(|| print(&format!("\n{}", summary.trim_end())));
         if !matches!(printed, Some(Ok(Reader::There | Reader::Gone))) {
             note(summary.trim_end());

@@ -5,7 +5,9 @@
 //! no longer than [`GRACE`] once the program was interrupted or its [`limit`] has passed.
 
 use hivtac_host::failure::Failure;
+use hivtac_host::shown::to_json;
 use hivtac_host::stop;
+use serde::Serialize;
 use serde_json::Value;
 use std::fs::File;
 use std::io::{self, ErrorKind, Seek, SeekFrom, Write};
@@ -47,6 +49,18 @@ pub fn print(line: &str) -> Result<Reader, Failure> {
         let message = format!("cannot write to standard output: {error}");
         Err(Failure::input(message))
     })
+}
+
+/// Prints a report: one JSON object, or a text for a person.
+pub fn report(
+    json: bool,
+    object: &impl Serialize,
+    text: impl FnOnce() -> String,
+) -> Result<Reader, Failure> {
+    match json {
+        true => print(&to_json(object)),
+        false => print(&text()),
+    }
 }
 
 /// Tells what was done: a line for a person, or one JSON object.

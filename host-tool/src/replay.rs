@@ -1,6 +1,7 @@
 //! `hivtac replay`: a recording that answers like the device that it was made of.
 
 use crate::output::{Reader, note, print};
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::recording::Recording;
 use hivtac_host::stop;
@@ -18,32 +19,41 @@ use std::time::{Duration, Instant};
 /// How often is looked whether there is a command, or a program at the port.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
-/// What to play, and to whom.
-pub struct Options {
-    /// What `record` made.
-    pub file: PathBuf,
-    /// Whose messages, by name or serial number; not needed where there is one device.
-    pub device: Option<String>,
-    /// A port of this computer; 0 for any that is free.
-    pub port: u16,
-    /// As fast as the other program reads, not as it was recorded.
-    pub fast: bool,
-    /// One JSON object instead of the line that says where it is.
-    pub json: bool,
+/// Play a recording as if it were a device, for any other command, on a TCP port of this
+/// computer
+///
+/// Prints `ready tcp=127.0.0.1:PORT`, waits for a program there, and ends with the recording:
+/// `hivtac monitor --port tcp:127.0.0.1:7000` shows the forces of the example.
+///
+/// Example: hivtac replay press.mcap --tcp 7000
+#[derive(Args)]
+pub struct ReplayArguments {
+    /// What `record` made; also one that was cut
+    file: PathBuf,
+    /// The sensor with this name or serial number, where it holds several
+    #[arg(long, value_name = "NAME")]
+    device: Option<String>,
+    /// The port; one that is free when not given
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    tcp: u16,
+    /// As fast as the other program reads, not as it was recorded
+    #[arg(long)]
+    fast: bool,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
 }
 
 /// Waits for a program at the port, and plays the recording to it.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let Options {
-        port, fast, json, ..
-    } = *options;
-    let (mut recording, hello) = Recording::open(&options.file, options.device.as_deref())?;
+pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
+    let port = arguments.tcp;
+    let (mut recording, hello) = Recording::open(&arguments.file, arguments.device.as_deref())?;
     let listener = TcpListener::bind(("127.0.0.1", port))
         .map_err(|error| Failure::input(format!("cannot listen at port {port}: {error}")))?;
     let failed = |error| Failure::input(format!("cannot listen: {error}"));
     let address = listener.local_addr().map_err(failed)?;
     listener.set_nonblocking(true).map_err(failed)?;
-    let ready = match json {
+    let ready = match arguments.json {
         true => json!({ "tcp": address.to_string() }).to_string(),
         false => format!("ready tcp={address}"),
     };
@@ -66,7 +76,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         streaming: None,
         is_gone: false,
     };
-    player.play(&mut recording, fast)?;
+    player.play(&mut recording, arguments.fast)?;
     if recording.is_cut() {
         let name = &recording.name;
         note(&format!("hivtac: {name} is cut: it ends before its end"));

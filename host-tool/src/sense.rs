@@ -1,7 +1,9 @@
 //! `hivtac sense`: the sensor's own code on pictures, with everything it finds on the way.
 
 use crate::finding::Finding;
+use crate::hsv;
 use crate::output::{Reader, note, print};
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::files::read_at_most;
 use hivtac_host::picture::Picture;
@@ -25,43 +27,59 @@ static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
 /// Bytes of a model file at most; the sensor's flash has 2 MiB.
 const LARGEST_MODEL: u64 = 16 << 20;
 
-/// What to do.
-pub struct Options {
-    /// Files to look at.
-    pub images: Vec<String>,
-    /// Lens and pixels; the model's when not given.
-    pub preset: Option<Preset>,
-    /// Colours of a marker; the model's when not given.
-    pub threshold: Option<HsvBox>,
-    /// Smallest blob, px; a quarter of a marker when not given.
-    pub min_area: Option<u32>,
-    /// Another model file.
-    pub model: Option<String>,
-    /// A picture of the untouched film.
-    pub tare: Option<String>,
-    /// One JSON object a line.
-    pub json: bool,
+/// Look for markers and force in pictures, with the sensor's own code
+///
+/// PNG, JPEG, PPM, or a raw frame of `hivtac snapshot`, up to 800 × 800 px. Eight bits a
+/// channel are rounded to RGB565, which is what the sensor's camera delivers. There is a force
+/// only when size, preset and threshold are those of the model; the status says so otherwise,
+/// and blobs, markers and features are there all the same.
+///
+/// Example: hivtac sense photo.jpg
+#[derive(Args)]
+pub struct SenseArguments {
+    /// Pictures
+    #[arg(required = true, value_name = "IMAGE")]
+    images: Vec<String>,
+    /// Lens and pixels; the model's when not given. Other sizes than the preset's scale its focal
+    /// length
+    #[arg(long, value_name = "paper|ov7725")]
+    preset: Option<Preset>,
+    /// Colours of a marker, as in `hivtac threshold --hsv`; the model's when not given
+    #[arg(long, value_name = "h0,h1,s0,s1,v0,v1", value_parser = hsv::parse)]
+    threshold: Option<HsvBox>,
+    /// Smallest blob, px; a quarter of a marker at rest when not given
+    #[arg(long, value_name = "PX")]
+    min_area: Option<u32>,
+    /// Model file; the firmware's own when not given
+    #[arg(long, value_name = "FILE")]
+    model: Option<String>,
+    /// Picture of the untouched film, to measure displacements from
+    #[arg(long, value_name = "IMAGE")]
+    tare: Option<String>,
+    /// One JSON object a line
+    #[arg(long)]
+    json: bool,
 }
 
 /// Prints what it finds in each picture. A picture that cannot be used is named, and the others are
 /// still looked at.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let file = options.model.as_deref().map(read_model).transpose()?;
-    let name = options.model.as_deref().unwrap_or("the built-in model");
+pub fn run(arguments: &SenseArguments) -> Result<(), Failure> {
+    let file = arguments.model.as_deref().map(read_model).transpose()?;
+    let name = arguments.model.as_deref().unwrap_or("the built-in model");
     let model = Model::parse(file.as_deref().unwrap_or(MODEL))
         .map_err(|error| Failure::input(format!("{name} is no usable model: {error}")))?;
     let bench = Bench {
-        options,
+        arguments,
         model,
         name,
     };
-    let tare = options
+    let tare = arguments
         .tare
         .as_deref()
         .map(|path| bench.tare(path))
         .transpose()?;
     let mut bad = 0;
-    for path in &options.images {
+    for path in &arguments.images {
         match bench.look(path, tare.as_ref()) {
             Ok(text) => {
                 if print(&text)? != Reader::There {
@@ -78,7 +96,7 @@ pub fn run(options: &Options) -> Result<(), Failure> {
         0 => Ok(()),
         _ => Err(Failure::input(format!(
             "{bad} of {} pictures could not be used",
-            options.images.len()
+            arguments.images.len()
         ))),
     }
 }
@@ -102,7 +120,7 @@ struct Tare {
 
 /// What all pictures have in common.
 struct Bench<'a> {
-    options: &'a Options,
+    arguments: &'a SenseArguments,
     model: Model<'a>,
     /// The model's, for messages.
     name: &'a str,
@@ -132,7 +150,7 @@ impl<'a> Bench<'a> {
             measurement = sensor.finish_again(again);
         }
         let finding = Finding::new(path, sensor.settings(), &blobs, measurement);
-        Ok(if self.options.json {
+        Ok(if self.arguments.json {
             finding.json()
         } else {
             finding.text()
@@ -193,8 +211,8 @@ impl<'a> Bench<'a> {
         let mut settings = self.model.conditions.settings(ByteOrder::Native);
         let conditions = &self.model.conditions;
         let size = (conditions.geometry.width, conditions.geometry.height);
-        if self.options.preset.is_some() || size != (picture.width, picture.height) {
-            let preset = self.options.preset.unwrap_or(conditions.preset);
+        if self.arguments.preset.is_some() || size != (picture.width, picture.height) {
+            let preset = self.arguments.preset.unwrap_or(conditions.preset);
             let geometry = Geometry::preset(preset, picture.width, picture.height);
             let usual = Settings::usual(geometry, ByteOrder::Native);
             settings = Settings {
@@ -204,11 +222,11 @@ impl<'a> Bench<'a> {
                 ..usual
             };
         }
-        settings.threshold = match self.options.threshold {
+        settings.threshold = match self.arguments.threshold {
             Some(hsv_box) => hsv_box.into(),
             None => settings.threshold,
         };
-        settings.min_area = self.options.min_area.unwrap_or(settings.min_area);
+        settings.min_area = self.arguments.min_area.unwrap_or(settings.min_area);
         settings
     }
 }

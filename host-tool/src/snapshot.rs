@@ -1,15 +1,16 @@
 //! `hivtac snapshot`: one frame as the sensing saw it, into files.
 
-use crate::command::tell;
+use crate::device::Device;
 use crate::finding::MarkerJson;
-use crate::lines::{status_text, to_json};
-use crate::output::print;
+use crate::lines::status_text;
+use crate::output;
+use crate::request::show_log;
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::frame::{Frame, Taken, take};
 use hivtac_host::link::Link;
 use hivtac_host::look;
 use hivtac_host::picture::{Channels, encode};
-use hivtac_host::port::Address;
 use hivtac_host::raw;
 use hivtac_host::threshold;
 use hivtac_wire::message::Request;
@@ -17,44 +18,61 @@ use serde::Serialize;
 use serde_json::Value;
 use std::time::Duration;
 
+/// Save a frame as the sensing saw it, while forces go on
+///
+/// It says what the device itself found in it, too. `hivtac sense` on the picture or the raw
+/// frame finds the same; on that of YUV422 only on the raw frame, with the device's model.
+///
+/// Example: hivtac snapshot frame.png --mask mask.png
+#[derive(Args)]
+pub struct SnapshotArguments {
+    #[command(flatten)]
+    device: Device,
+    #[command(flatten)]
+    files: SnapshotFiles,
+    /// One JSON object instead of lines
+    #[arg(long)]
+    json: bool,
+}
+
 /// Which files to write; each is of the same frame.
-#[derive(Debug)]
-pub struct Files {
-    /// The frame as PNG.
-    pub picture: Option<String>,
-    /// The bytes as the camera sent them, with a header.
-    pub raw: Option<String>,
-    /// The mask as PNG.
-    pub mask: Option<String>,
+#[derive(Args)]
+#[group(required = true, multiple = true)]
+struct SnapshotFiles {
+    /// The frame, as PNG
+    #[arg(value_name = "FILE.png")]
+    picture: Option<String>,
+    /// The frame's bytes as the camera sent them, as PAM with two bytes a pixel
+    #[arg(long, value_name = "FILE.pam")]
+    raw: Option<String>,
+    /// What passes the threshold, white, and what dilation adds, grey, as PNG
+    #[arg(long, value_name = "FILE.png")]
+    mask: Option<String>,
 }
 
 /// Takes a frame and writes the files, and says what the device itself made of it.
-pub fn run(
-    address: &Address,
-    patience: Duration,
-    files: &Files,
-    json: bool,
-) -> Result<(), Failure> {
-    let (mut link, hello) = Link::connect(address, patience)?;
-    let taken = snapshot(&mut link, patience)?;
+pub fn run(arguments: &SnapshotArguments) -> Result<(), Failure> {
+    let SnapshotArguments {
+        device,
+        files,
+        json,
+    } = arguments;
+    let (mut link, hello) = device.connect()?;
+    let taken = snapshot(&mut link, device.timeout)?;
     write_files(files, &taken.frame, hello.dilations)?;
     let report = Report::new(&taken, files);
-    print(&match json {
-        true => to_json(&report),
-        false => report.text(),
-    })?;
-    Ok(())
+    output::report(*json, &report, || report.text()).map(|_| ())
 }
 
 /// One frame with its sample and the markers in it: samples flow meanwhile, and no longer.
 pub fn snapshot(link: &mut Link, patience: Duration) -> Result<Taken, Failure> {
-    link.request(Request::StartWithMarkers, patience, tell)?;
-    let taken = take(link, patience, tell)?;
-    link.request(Request::Stop, patience, tell)?;
+    link.request(Request::StartWithMarkers, patience, show_log)?;
+    let taken = take(link, patience, show_log)?;
+    link.request(Request::Stop, patience, show_log)?;
     Ok(taken)
 }
 
-fn write_files(files: &Files, frame: &Frame, dilations: u8) -> Result<(), Failure> {
+fn write_files(files: &SnapshotFiles, frame: &Frame, dilations: u8) -> Result<(), Failure> {
     let (width, height) = (frame.width, frame.height);
     if let Some(path) = &files.raw {
         let name = frame.format().name();
@@ -101,7 +119,7 @@ struct Report<'f> {
 }
 
 impl<'f> Report<'f> {
-    fn new(taken: &Taken, files: &'f Files) -> Report<'f> {
+    fn new(taken: &Taken, files: &'f SnapshotFiles) -> Report<'f> {
         let Taken { frame, sample } = taken;
         let markers = sample.as_ref().and_then(|sample| sample.markers);
         Report {

@@ -1,6 +1,7 @@
 //! `hivtac template`: where to punch the film and to stick the dots, to print at its true size.
 
 use crate::output::tell;
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_terms::geometry::{Geometry, Preset};
 use serde_json::json;
@@ -18,16 +19,33 @@ const PAGE_MM: [f64; 2] = [70.0, 76.0];
 /// The film's middle on it, mm.
 const MIDDLE_MM: [f64; 2] = [35.0, 26.0];
 
+/// Write a template to print: where the film is punched and the dots are stuck, as SVG
+///
+/// Example: hivtac template film.svg
+#[derive(Args)]
+pub struct TemplateArguments {
+    /// File to write
+    #[arg(value_name = "FILE.svg")]
+    file: String,
+    /// Whose markers
+    #[arg(long, value_name = "paper|ov7725", default_value = "ov7725")]
+    preset: Preset,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
+}
+
 /// Writes the template for a preset's markers.
-pub fn run(path: &str, preset: Preset, json: bool) -> Result<(), Failure> {
+pub fn run(arguments: &TemplateArguments) -> Result<(), Failure> {
+    let TemplateArguments { file, preset, json } = arguments;
     // Sizes on the film do not depend on the frame's.
-    let svg = svg(&Geometry::preset(preset, 320, 240));
-    std::fs::write(path, svg).map_err(|error| {
-        let message = format!("cannot write the template {path}: {error}");
+    let svg = svg(&Geometry::preset(*preset, 320, 240));
+    std::fs::write(file, svg).map_err(|error| {
+        let message = format!("cannot write the template {file}: {error}");
         Failure::input(message)
     })?;
-    let told = format!("{path}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
-    tell(json, &told, &json!({ "file": path, "ruler_mm": RULER_MM }))
+    let told = format!("{file}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
+    tell(*json, &told, &json!({ "file": file, "ruler_mm": RULER_MM }))
 }
 
 /// All lengths in millimetres, and so is the page's size.

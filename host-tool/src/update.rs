@@ -1,14 +1,14 @@
-//! `hivtac update`: a model of one's own for a device, without a compiler.
+//! `hivtac update`: a model of one's own for a device, without a compiler, or new firmware.
 
-use crate::command::{send, tell};
+use crate::device::Device;
+use crate::firmware::{self, FirmwareArguments};
 use crate::info;
-use crate::lines::to_json;
-use crate::output::print;
-use crate::settings::KEEP_PATIENCE;
+use crate::output;
+use crate::request::{KEEP_PATIENCE, send, show_log};
+use clap::{Args, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
-use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_sensor::force::model::Model;
 use hivtac_wire::message::{
@@ -17,14 +17,43 @@ use hivtac_wire::message::{
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
-/// How to update.
-pub struct Options {
-    /// Where the device is.
-    pub address: Address,
-    /// Longest wait for its hello and replies.
-    pub patience: Duration,
-    /// One JSON object instead of a line.
-    pub json: bool,
+/// Give the device a model of its own, or new firmware
+#[derive(Subcommand)]
+pub enum UpdateCommand {
+    Model(ModelArguments),
+    Firmware(FirmwareArguments),
+}
+
+/// Send a model file, which the device checks, keeps through restarts and uses from then on
+///
+/// Forces go on with the model before until then. What is damaged, not sound, or made for
+/// another camera or unit is refused, and nothing changes.
+///
+/// Example: hivtac update model thumb.hvtm
+#[derive(Args)]
+pub struct ModelArguments {
+    #[command(flatten)]
+    device: Device,
+    /// What `hivtac-calibrate` made
+    #[arg(value_name = "FILE.hvtm", required_unless_present = "built_in")]
+    file: Option<String>,
+    /// The model that is built into the firmware instead of a file; the kept one is forgotten
+    #[arg(long, conflicts_with = "file")]
+    built_in: bool,
+    /// One JSON object instead of a line
+    #[arg(long)]
+    json: bool,
+}
+
+/// Updates.
+pub fn run(command: &UpdateCommand) -> Result<(), Failure> {
+    match command {
+        UpdateCommand::Model(arguments) => match &arguments.file {
+            Some(path) => model(arguments, path),
+            None => built_in_model(arguments),
+        },
+        UpdateCommand::Firmware(arguments) => firmware::update(arguments),
+    }
 }
 
 /// Sends a model file, which the device checks, keeps and uses from then on.
@@ -32,53 +61,58 @@ pub struct Options {
 /// # Errors
 /// A file that is no model, before anything is asked of the device; what the device refuses; those
 /// of [`Link::connect`].
-pub fn model(options: &Options, path: &str) -> Result<(), Failure> {
+pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
+    let device = &arguments.device;
+    let address = device.address()?;
     let file = read(path)?;
-    let model = Model::parse(&file).map_err(|error| unusable(path, error))?;
+    let model = Model::parse(&file).map_err(|error| Failure::of_file(path, error))?;
     let begun = Instant::now();
-    let (mut link, hello) = Link::connect(&options.address, options.patience)?;
+    let (mut link, hello) = Link::connect(&address, device.timeout)?;
     let bytes = file.len() as u32;
-    send(&mut link, Request::BeginModel { bytes }, options.patience)?;
+    send(&mut link, Request::BeginModel { bytes }, device.timeout)?;
     for part in parts(&file) {
-        send(&mut link, Request::ModelPart(part), options.patience)?;
+        send(&mut link, Request::ModelPart(part), device.timeout)?;
     }
-    link.request(Request::UseModel, options.patience.max(KEEP_PATIENCE), tell)?;
-    let (hello, _) = info::ask(&mut link, options.patience, hello)?;
+    link.request(
+        Request::UseModel,
+        device.timeout.max(KEEP_PATIENCE),
+        show_log,
+    )?;
+    let (hello, _) = info::ask(&mut link, device.timeout, hello)?;
     let used = in_use(&link, hello, |used| {
         used.source == ModelSource::Kept && used.crc == model.crc()
     })?;
-    say(options, &used, begun.elapsed())
+    say(arguments, &used, begun.elapsed())
 }
 
 /// Has the device use the model that is built into its firmware, and forget the one it keeps.
 ///
 /// # Errors
 /// What the device refuses; those of [`Link::connect`].
-pub fn built_in_model(options: &Options) -> Result<(), Failure> {
+pub fn built_in_model(arguments: &ModelArguments) -> Result<(), Failure> {
+    let device = &arguments.device;
+    let address = device.address()?;
     let begun = Instant::now();
-    let (mut link, hello) = Link::connect(&options.address, options.patience)?;
+    let (mut link, hello) = Link::connect(&address, device.timeout)?;
     link.request(
         Request::UseBuiltInModel,
-        options.patience.max(KEEP_PATIENCE),
-        tell,
+        device.timeout.max(KEEP_PATIENCE),
+        show_log,
     )?;
-    let (hello, _) = info::ask(&mut link, options.patience, hello)?;
+    let (hello, _) = info::ask(&mut link, device.timeout, hello)?;
     let used = in_use(&link, hello, |used| used.source == ModelSource::BuiltIn)?;
-    say(options, &used, begun.elapsed())
+    say(arguments, &used, begun.elapsed())
 }
 
 fn read(path: &str) -> Result<Vec<u8>, Failure> {
-    let file = read_at_most(path, MODEL_BYTES as u64).map_err(|error| unusable(path, error))?;
+    let file =
+        read_at_most(path, MODEL_BYTES as u64).map_err(|error| Failure::of_file(path, error))?;
     file.ok_or_else(|| {
-        unusable(
+        Failure::of_file(
             path,
             format!("a model for a device has at most {MODEL_BYTES} bytes"),
         )
     })
-}
-
-fn unusable(path: &str, why: impl std::fmt::Display) -> Failure {
-    Failure::input(format!("{path}: {why}"))
 }
 
 fn parts(file: &[u8]) -> impl Iterator<Item = ModelPart> + '_ {
@@ -116,19 +150,19 @@ struct Update<'a> {
     seconds: f64,
 }
 
-fn say(options: &Options, used: &ModelIdentity, took: Duration) -> Result<(), Failure> {
+fn say(arguments: &ModelArguments, used: &ModelIdentity, took: Duration) -> Result<(), Failure> {
     let seconds = took.as_secs_f64();
-    let line = match options.json {
-        true => to_json(&Update {
-            model: info::Model::of(used),
-            seconds,
-        }),
-        false => format!(
+    let update = Update {
+        model: info::Model::of(used),
+        seconds,
+    };
+    let text = || {
+        format!(
             "in use and kept: {}, CRC {:08x}, after {seconds:.1} s; take a new tare if the markers \
              are seen otherwise now (`hivtac info`)",
             shown(&used.name),
             used.crc
-        ),
+        )
     };
-    print(&line).map(|_| ())
+    output::report(arguments.json, &update, text).map(|_| ())
 }

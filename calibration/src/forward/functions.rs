@@ -6,8 +6,8 @@ use hivtac_sensor::force::forward::{MOST_FUNCTIONS, MOST_TILTS, OUTPUTS};
 use hivtac_sensor::force::model::{TableSpec, TablesSpec};
 use hivtac_twin::film::reduced::{Axis, LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 
+use super::least_squares::{self, splines};
 use super::matrix::{Matrix, cholesky, principal};
-use super::nearest::{self, splines};
 
 /// Loads by which components are judged: the number of sizes, evenly from 0 to the largest; and the
 /// directions of each size. Each ring has its part of the largest tilt and the number of directions
@@ -127,7 +127,8 @@ fn apart(mut matrix: Matrix, odd: &[bool]) -> Matrix {
 fn table(dot: &Sampled, metric: &[Vec<f64>], kept: &[&[f64]]) -> Result<TableSpec> {
     let at = |outputs: &[Vec<f64>; OUTPUTS]| -> Vec<f64> {
         let outputs = outputs.iter().map(|row| along(metric, row));
-        let parts = outputs.flat_map(|row| kept.iter().map(move |own| nearest::dot(own, &row)));
+        let parts =
+            outputs.flat_map(|row| kept.iter().map(move |own| least_squares::dot(own, &row)));
         parts.collect()
     };
     let line = |line: &Vec<_>| line.iter().map(at).collect();

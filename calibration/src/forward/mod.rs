@@ -1,15 +1,15 @@
 //! The film run forwards, from the known numbers of a unit: a few numbers in a weights file, tables
 //! in a model file.
 
-pub mod building;
 mod covariances;
+mod coverage_scale;
 mod functions;
-mod honest;
+mod least_squares;
 mod matrix;
-mod nearest;
 mod noise;
-mod others;
+mod other_units;
 mod tables;
+pub mod tolerances;
 mod unit;
 mod weight;
 
@@ -28,9 +28,9 @@ use crate::weights::Weights;
 use covariances::even;
 pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 pub use functions::{Sampled, compressed};
-pub(crate) use nearest::{Nearest, dot};
+pub(crate) use least_squares::{LeastSquares, dot};
 pub use noise::Noise;
-pub use others::OtherUnits;
+pub use other_units::OtherUnits;
 pub use tables::{Dot, UnitSetup, tables};
 pub use unit::Known;
 pub use weight::{Pressed, Weighed, everywhere, weight};
@@ -294,7 +294,7 @@ mod tests {
 
     /// The motion that a film's tables predict for a pose, as the chip reads them, for markers at
     /// this distance from the tables' places.
-    fn told(
+    fn predicted_motion(
         forward: &forward::Forward<'_>,
         pose: &Pose,
         beside_mm: &forward::Markers,
@@ -304,8 +304,8 @@ mod tests {
             tilt: pose.tilt.map(|part| part as f32),
             place_mm: pose.place_mm.map(|part| part as f32),
         };
-        let told = (forward.tables).predict(&pose, &forward.limits, beside_mm);
-        told.moved.map(f64::from)
+        let predicted = (forward.tables).predict(&pose, &forward.limits, beside_mm);
+        predicted.moved.map(f64::from)
     }
 
     fn film_model() -> FilmModel {
@@ -361,7 +361,7 @@ mod tests {
         let forward = forward::Forward::parse(&bytes).unwrap();
         let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
         for pose in poses() {
-            let chip = told(&forward, &pose, &[[0.0; 2]; DOTS]);
+            let chip = predicted_motion(&forward, &pose, &[[0.0; 2]; DOTS]);
             for marker in 0..4 {
                 let truth = setup.moved(&film, &pose, marker).unwrap();
                 for axis in [0, 1] {

@@ -9,7 +9,7 @@ use hivtac_twin::{Camera, Disc, Load};
 use rayon::prelude::*;
 
 use super::functions::{Sampled, compressed};
-use super::nearest::Nearest;
+use super::least_squares::LeastSquares;
 
 /// Places of the tip along an axis at which the simulated film's tables hold a marker's motion, mm.
 /// For a marker to the right of the middle, or below it; closer together near the marker.
@@ -179,7 +179,7 @@ fn samples(
         values.into_iter().map(|part| weight(pose) * part).collect()
     };
     let rows: Vec<Vec<f64>> = loads.iter().map(weighted_row).collect();
-    let nearest = Nearest::new(&rows)?;
+    let least_squares = LeastSquares::new(&rows)?;
     let sampled = |(number, dot): (usize, &Dot)| -> Result<Sampled> {
         let away = dot.away();
         let at = |place_mm: [f64; 2]| -> Result<[Vec<f64>; 2]> {
@@ -196,7 +196,7 @@ fn samples(
             Ok([0, 1].map(|output| {
                 let samples = seen.iter().zip(&loads);
                 let samples = samples.map(|(moved, pose)| weight(pose) * moved[output]);
-                nearest.coefficients(&samples.collect::<Vec<f64>>())
+                least_squares.coefficients(&samples.collect::<Vec<f64>>())
             }))
         };
         let [along_x, along_y] = &dot.nodes_mm;

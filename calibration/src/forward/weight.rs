@@ -10,7 +10,7 @@ use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
 use rayon::prelude::*;
 
 use super::covariances::Moved;
-use super::nearest::Nearest;
+use super::least_squares::LeastSquares;
 
 /// Number of directions of gravity around the film, in the planes of x and z and of y and z, at
 /// which its rest is computed.
@@ -92,7 +92,7 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
     let rows = around
         .iter()
         .map(|down| functions.at(0.0, single(*down)).map(f64::from));
-    nearest(&rows.collect::<Vec<_>>(), |i, c| sides[i][c])
+    fitted_parts(&rows.collect::<Vec<_>>(), |i, c| sides[i][c])
 }
 
 /// The effect added under loads, by size, function of gravity, coordinate and term.
@@ -120,7 +120,7 @@ fn under_load(
     for (number, (of_size, size)) in under_load.iter_mut().zip(sizes).enumerate() {
         let softness = f64::from(soft(&functions.stiffness, size as f32));
         for (f, of_function) in of_size.iter_mut().enumerate() {
-            let found = nearest(&rows, |i, c| sides[i][number][f][c] / softness)?;
+            let found = fitted_parts(&rows, |i, c| sides[i][number][f][c] / softness)?;
             for (c, of_coordinate) in of_function.iter_mut().enumerate() {
                 *of_coordinate = found.map(|of_term| of_term[c]);
             }
@@ -131,11 +131,11 @@ fn under_load(
 
 /// Coefficients of `N` functions, whose values are the rows, nearest to the known values of each
 /// coordinate.
-fn nearest<const N: usize>(
+fn fitted_parts<const N: usize>(
     rows: &[[f64; N]],
     known: impl Fn(usize, usize) -> f64,
 ) -> Result<[Moved; N]> {
-    let through = Nearest::new(&rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())?;
+    let through = LeastSquares::new(&rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())?;
     let of_coordinate = |c: usize| {
         let samples: Vec<f64> = (0..rows.len()).map(|i| known(i, c)).collect();
         through.coefficients(&samples)

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::unit_fit::LeftOut;
+use crate::unit_fit::LeaveOneOutError;
 
 /// Root mean square errors.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,7 @@ pub struct Verdict {
 
 impl Verdict {
     /// From loads that were left out; includes the gauge's and the stage's own errors.
-    pub fn of(left_out: &[LeftOut]) -> Verdict {
+    pub fn of(left_out: &[LeaveOneOutError]) -> Verdict {
         let of = |values: Vec<f64>| (!values.is_empty()).then(|| root_mean_square(&values));
         let noted = left_out.iter().filter(|load| load.place_mm.is_some());
         let places = left_out.iter().filter_map(|load| load.place_mm);
@@ -61,8 +61,8 @@ impl fmt::Display for Verdict {
 mod tests {
     use super::*;
 
-    fn left_out(direction_deg: f64, size_n: f64, place_mm: [f64; 2]) -> LeftOut {
-        LeftOut {
+    fn left_out(direction_deg: f64, size_n: f64, place_mm: [f64; 2]) -> LeaveOneOutError {
+        LeaveOneOutError {
             size_n,
             direction_deg,
             place_mm: Some(place_mm),
@@ -79,7 +79,7 @@ mod tests {
         for words in ["2 loads", "direction 0.35°", "|F| 1.00 mN", "place 7 µm"] {
             assert!(text.contains(words), "no {words}: {text}");
         }
-        let anywhere = loads.map(|load| LeftOut {
+        let anywhere = loads.map(|load| LeaveOneOutError {
             place_mm: None,
             ..load
         });

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::load::UNKNOWNS;
 use super::numbers::Number;
-use super::own::FoundNumber;
+use super::own_film::FoundNumber;
 use super::problem::{At, Problem, Solved, Trust, Unknowns};
 use crate::loads::SeenLoad;
 

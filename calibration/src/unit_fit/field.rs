@@ -14,8 +14,8 @@ use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
 use rayon::prelude::*;
 
 use super::problem::{At, Problem, apart_mm};
-use super::seen::{Rim, View};
-use crate::forward::Nearest;
+use super::view::{Rim, View};
+use crate::forward::LeastSquares;
 
 /// Tip places along x and along y at which the film is solved: the first, their spacing, mm, and
 /// their number.
@@ -49,7 +49,7 @@ pub struct Field<'a> {
     poses: Vec<Pose>,
     /// By place along y, place along x, and load.
     solved: Vec<Solved>,
-    nearest: Nearest,
+    least_squares: LeastSquares,
     terms: Terms,
 }
 
@@ -73,14 +73,14 @@ impl<'a> Field<'a> {
         let poses = poses();
         let stiffness_n = stiffness_n(at)?;
         let terms = Terms::with_sizes(TERMS);
-        let nearest = nearest(&terms, &poses)?;
+        let least_squares = least_squares(&terms, &poses)?;
         let mut field = Field {
             problem,
             at,
             stiffness_n,
             poses,
             solved: Vec::new(),
-            nearest,
+            least_squares,
             terms,
         };
         let places: Vec<usize> = (0..TIPS * TIPS).collect();
@@ -224,7 +224,7 @@ impl<'a> Field<'a> {
                 }
             }
         }
-        samples.map(|samples| self.nearest.coefficients(&samples))
+        samples.map(|samples| self.least_squares.coefficients(&samples))
     }
 
     fn solved(&self, [i, j]: [usize; 2], load: usize) -> &Solved {
@@ -370,14 +370,14 @@ fn poses() -> Vec<Pose> {
 }
 
 /// Fits the terms' coefficients to values and slopes under the poses.
-fn nearest(terms: &Terms, poses: &[Pose]) -> Result<Nearest> {
+fn least_squares(terms: &Terms, poses: &[Pose]) -> Result<LeastSquares> {
     let of_pose = |pose: &Pose| {
         let [value, slopes @ ..] = terms.rows(pose);
         let weighed = |row: Vec<f64>| row.iter().map(|part| SLOPES_COUNT * part).collect();
         [value].into_iter().chain(slopes.map(weighed))
     };
     let rows: Vec<Vec<f64>> = poses.iter().flat_map(of_pose).collect();
-    Nearest::new(&rows).context("the tables' loads")
+    LeastSquares::new(&rows).context("the tables' loads")
 }
 
 /// Coefficients of force by size: sizes grow like the depth of a tip in the film's middle.

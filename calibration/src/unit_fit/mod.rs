@@ -18,15 +18,15 @@
 
 mod descent;
 mod equations;
-mod explained;
 mod field;
-mod left_out;
+mod goodness_of_fit;
+mod leave_one_out;
 mod linear;
 mod load;
 mod numbers;
-mod own;
+mod own_film;
 mod problem;
-mod seen;
+mod view;
 mod weight;
 
 use std::fmt;
@@ -34,10 +34,10 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
-use explained::Explained;
-pub use left_out::LeftOut;
+use goodness_of_fit::GoodnessOfFit;
+pub use leave_one_out::LeaveOneOutError;
 use numbers::Family;
-pub use own::{FoundNumber, OwnFilm};
+pub use own_film::{FoundNumber, OwnFilm};
 pub use problem::Bench;
 use problem::{Problem, Trust};
 
@@ -64,7 +64,7 @@ pub struct Fit {
     /// The load that the fit explains worst.
     worst: SeenLoad,
     /// The error of each load when it is left out of the fit.
-    pub left_out: Vec<LeftOut>,
+    pub left_out: Vec<LeaveOneOutError>,
 }
 
 /// Fits a unit to its rest position and to loads. `stage_mm` is the standard uncertainty of the
@@ -112,11 +112,11 @@ pub fn fit(
 
 impl fmt::Display for Fit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let explained = Explained {
+        let goodness_of_fit = GoodnessOfFit {
             chi_square: self.chi_square,
             worst: &self.worst,
         };
-        writeln!(f, "{explained}")?;
+        writeln!(f, "{goodness_of_fit}")?;
         for FoundNumber { name, value, sigma } in &self.own.numbers {
             writeln!(f, "{name:<46} {value:>9.4} ± {sigma:.4}")?;
         }

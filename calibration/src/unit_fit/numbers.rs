@@ -2,9 +2,9 @@
 
 use hivtac_shell::{Change, Design};
 
-use super::own::{FoundNumber, OwnFilm};
+use super::own_film::{FoundNumber, OwnFilm};
 use super::problem::Bench;
-use crate::forward::building::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
+use crate::forward::tolerances::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
 /// Standard deviations of the pixel grid's effect on a marker at rest, px, and of the camera's
 /// distance from the film beyond the nominal one, mm.

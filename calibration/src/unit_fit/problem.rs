@@ -9,7 +9,7 @@ use super::equations::{LoadEquations, LoadSlopes, Normal};
 use super::linear::{Matrix, inverse};
 use super::load::UNKNOWNS;
 use super::numbers::{self, Family, Number, Prior};
-use super::seen::View;
+use super::view::View;
 use super::{COARSE, FINENESS};
 use crate::loads::SeenLoad;
 

@@ -3,7 +3,7 @@ use hivtac_shell::{Design, Equilibrium, Film, Law};
 use hivtac_twin::{Camera, MARKERS, Preset};
 
 use super::problem::Made;
-use super::seen::View;
+use super::view::View;
 use super::*;
 use crate::forward::{FilmModel, Noise};
 

@@ -7,7 +7,7 @@ use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A recording of one device.
 #[pyclass(frozen)]
@@ -34,10 +34,7 @@ impl Reader {
     /// The next sample; `None` at the end.
     fn next(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
         let next = py.detach(|| {
-            let mut recording = self
-                .recording
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner);
+            let mut recording = self.lock();
             while let Some((came_ns, message)) = recording.next_message()? {
                 if let DeviceMessage::Sample(sample) = message {
                     return Ok(Some(told::sample(&sample, came_ns)));
@@ -50,12 +47,14 @@ impl Reader {
 
     /// True once its end was reached and it had been cut before its own.
     fn is_cut(&self, py: Python<'_>) -> bool {
-        py.detach(|| {
-            let recording = self
-                .recording
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner);
-            recording.is_cut()
-        })
+        py.detach(|| self.lock().is_cut())
+    }
+}
+
+impl Reader {
+    fn lock(&self) -> MutexGuard<'_, Recording> {
+        self.recording
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -1,8 +1,9 @@
 //! What the device tells, as tuples and dictionaries in SI units.
 
+use hivtac_host::force_fields::{FORCE, PLACE};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::force::Force;
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{DeviceHello, Sample};
 use hivtac_wire::settings::{Moved, SettingsReport, TareReport};
 use pyo3::prelude::*;
@@ -43,20 +44,13 @@ pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
 }
 
 fn force(force: &Force) -> ForceNumbers {
-    let newtons = |micro: i32| f64::from(micro) / 1e6;
-    let radians = |milli: f64| (milli / 1e3).to_radians();
-    let place = force.place.map(|place| {
-        let metres = [place.x, place.y].map(|micro| f64::from(micro.0) / 1e6);
-        (metres, f64::from(place.sigma.0) / 1e6)
+    let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
+    let place = force.place.as_ref().map(|place| {
+        let [x, y, sigma] = PLACE.map(|it| it.si(place));
+        ([x, y], sigma)
     });
-    (
-        force.cartesian.map(|part| newtons(part.0)),
-        [force.alpha, force.beta].map(|angle| radians(f64::from(angle.0))),
-        newtons(force.magnitude.0),
-        radians(f64::from(force.direction_sigma.0)),
-        f64::from(force.magnitude_sigma.0) / 1e6,
-        place,
-    )
+    let (vector, angles) = ([x, y, z], [alpha, beta]);
+    (vector, angles, size, angle_sigma, size_sigma, place)
 }
 
 /// Who the device is.
@@ -113,7 +107,7 @@ pub fn rest(report: &SettingsReport) -> RestNumbers {
         is_taken,
         is_taken && report.kept.tare,
         px(report.rezeroed),
-        report.seen.map(|seen| f64::from(seen.0) * 1e-3),
+        report.seen.map(MilliPx::to_f64),
         report.drift.map(px),
     )
 }

@@ -6,85 +6,97 @@ mod levels;
 #[cfg(test)]
 mod tests;
 
-use crate::command::set_threshold;
-use crate::lines::to_json;
+use crate::device::Device;
 use crate::output::print;
+use crate::set_threshold::set_threshold;
 use crate::snapshot::snapshot;
+use clap::Args;
 use find::{Found, find};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::Frame;
-use hivtac_host::link::Link;
 use hivtac_host::look::{self, PASSED};
-use hivtac_host::port::Address;
+use hivtac_host::shown::to_json;
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_wire::message::DeviceHello;
 use serde_json::{Value, json};
-use std::time::Duration;
 
 /// Pictures that are looked at: noise is in each another.
 const PICTURES: usize = 3;
 
-/// What to look at, and what to do with what is found.
-#[derive(Debug)]
-pub struct Options {
-    /// Where the device is.
-    pub address: Address,
-    /// Longest wait for its hello, replies and pictures.
-    pub patience: Duration,
-    /// Keep the threshold through restarts.
-    pub keep: bool,
-    /// Set nothing.
-    pub dry_run: bool,
-    /// One JSON object instead of lines.
-    pub json: bool,
+/// Find the threshold that separates the dots from the film in the device's own pictures, show
+/// why, and set it
+///
+/// It is half way between film and dots; or the model's, when that separates them, too, since
+/// there are forces only with that. The pixel format stays. Nothing should touch the film.
+///
+/// Example: hivtac threshold auto --dry-run
+#[derive(Args)]
+pub struct AutoArguments {
+    #[command(flatten)]
+    device: Device,
+    /// Keep it through restarts
+    #[arg(long)]
+    keep: bool,
+    /// Set nothing
+    #[arg(long, conflicts_with = "keep")]
+    dry_run: bool,
+    /// One JSON object instead of lines
+    #[arg(long)]
+    json: bool,
 }
 
 /// Finds the threshold, shows why, and sets it.
 ///
 /// # Errors
 /// [`Kind::NotRight`] when the pictures do not separate dots from film; what the device refuses.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let (mut link, hello) = Link::connect(&options.address, options.patience)?;
+pub fn run(arguments: &AutoArguments) -> Result<(), Failure> {
+    let (mut link, hello) = arguments.device.connect()?;
     let mut frames = Vec::new();
     for _ in 0..PICTURES {
-        frames.push(snapshot(&mut link, options.patience)?.frame);
+        frames.push(snapshot(&mut link, arguments.device.timeout)?.frame);
     }
     let found = find(&frames, &hello).map_err(|why| {
         let message = format!("no threshold separates the dots from the film: {why}");
         Failure::new(Kind::NotRight, message)
     })?;
-    let report = Report::new(&frames, &hello, found, options);
-    if !options.json {
+    let report = Report::new(&frames, &hello, found, arguments);
+    if !arguments.json {
         print(&report.text())?;
     }
-    if !options.dry_run {
+    if !arguments.dry_run {
         let wanted = report.wanted();
-        set_threshold(&mut link, &hello, wanted, options.patience, options.keep)?;
+        set_threshold(
+            &mut link,
+            &hello,
+            wanted,
+            arguments.device.timeout,
+            arguments.keep,
+        )?;
     }
-    if options.json {
+    if arguments.json {
         print(&to_json(&report.json()))?;
     }
     Ok(())
 }
 
 /// What was found, with what passes of the pictures.
-struct Report<'o> {
+struct Report<'a> {
     found: Found,
     frame: [u16; 2],
     /// Pixels of all pictures, and those that pass.
     pixels: usize,
     passed: usize,
-    options: &'o Options,
+    arguments: &'a AutoArguments,
 }
 
-impl<'o> Report<'o> {
+impl<'a> Report<'a> {
     fn new(
         frames: &[Frame],
         device: &DeviceHello,
         found: Found,
-        options: &'o Options,
-    ) -> Report<'o> {
+        arguments: &'a AutoArguments,
+    ) -> Report<'a> {
         let wanted = found.wanted();
         let masks = frames.iter().filter_map(|frame| {
             let frame = Frame {
@@ -100,7 +112,7 @@ impl<'o> Report<'o> {
             frame: [width, height],
             pixels: frames.len() * usize::from(width) * usize::from(height),
             passed,
-            options,
+            arguments,
         }
     }
 
@@ -141,7 +153,7 @@ impl<'o> Report<'o> {
                 self.pixels / PICTURES
             ),
         ];
-        if self.options.dry_run {
+        if self.arguments.dry_run {
             lines.push("nothing was set (--dry-run)".to_owned());
         }
         lines.join("\n")
@@ -189,8 +201,8 @@ impl<'o> Report<'o> {
             "chosen": threshold_json(&self.wanted()),
             "is_of_model": found.model.is_some(),
             "passed": self.share(),
-            "set": !self.options.dry_run,
-            "kept": self.options.keep,
+            "set": !self.arguments.dry_run,
+            "kept": self.arguments.keep,
         })
     }
 }

@@ -97,14 +97,13 @@ fn it_follows_the_light() {
     ] {
         let picture = frame(change);
         let found = find(std::slice::from_ref(&picture), &device()).unwrap();
-        let options = Options {
-            address: Address::Find,
-            patience: Duration::ZERO,
+        let arguments = AutoArguments {
+            device: Device::default(),
             keep: false,
             dry_run: true,
             json: false,
         };
-        let report = Report::new(&[picture], &device(), found, &options);
+        let report = Report::new(&[picture], &device(), found, &arguments);
         assert!(
             (0.005..0.015).contains(&report.share()),
             "{}",

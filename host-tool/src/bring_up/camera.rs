@@ -1,7 +1,7 @@
 //! Board and camera: which they are, and whether the camera holds what was written to it.
 
+use super::complaints::hear;
 use super::device::reason;
-use super::hear;
 use super::report::Step;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;

@@ -1,6 +1,6 @@
 //! The first steps: whether there is a device, and whether its USB is steady.
 
-use super::hear;
+use super::complaints::hear;
 use super::report::Step;
 use crate::info::{Info, ask};
 use hivtac_host::failure::Failure;

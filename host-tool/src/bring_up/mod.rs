@@ -4,6 +4,7 @@
 mod camera;
 mod clocks;
 mod colours;
+mod complaints;
 mod device;
 mod noise;
 mod person;
@@ -13,30 +14,38 @@ mod samples;
 #[cfg(test)]
 mod tests;
 
-use crate::command::tell;
+use crate::device::Device;
 use crate::focus::Focus;
-use crate::output::{note, print};
+use crate::output::print;
 use crate::snapshot::snapshot;
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
-use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel};
+use hivtac_wire::message::DeviceHello;
 use person::Person;
 use report::{Report, Step};
 use serde_json::json;
-use std::time::Duration;
 
-/// What to do.
-pub struct Options {
-    /// Where the device is.
-    pub address: Address,
-    /// Longest wait for the device's answers.
-    pub patience: Duration,
-    /// Where the report goes.
-    pub report: String,
-    /// The report on standard output, too, instead of a line a step.
-    pub json: bool,
+/// Look at everything about a new board, in the order in which things go wrong
+///
+/// USB, the camera and its registers, clocks, white, the markers as `focus` has them, tare and
+/// noise, and a finger's press; says what is wrong and what to do, and what a person has to do
+/// in between. Ends with the first thing on which others rest. The report is for your own
+/// notes, and to attach to a question.
+///
+/// Example: hivtac bring-up
+#[derive(Args)]
+pub struct BringUpArguments {
+    #[command(flatten)]
+    device: Device,
+    /// Where the report goes
+    #[arg(value_name = "FILE.json", default_value = "bring-up.json")]
+    report: String,
+    /// The report on standard output, too, instead of a line a step
+    #[arg(long)]
+    json: bool,
 }
 
 /// Goes through all steps, and writes the report.
@@ -44,14 +53,16 @@ pub struct Options {
 /// # Errors
 /// [`Kind::NotRight`] when something is not right; those of the link where that breaks, and of
 /// files.
-pub fn run(options: &Options) -> Result<(), Failure> {
+pub fn run(arguments: &BringUpArguments) -> Result<(), Failure> {
+    let address = arguments.device.address()?;
     let mut report = Report::new();
-    let ended = BringUp::begin(options, &mut report).and_then(|mut it| it.go(&mut report));
+    let ended =
+        BringUp::begin(arguments, &address, &mut report).and_then(|mut it| it.go(&mut report));
     report.finish();
-    report.write(&options.report)?;
-    match options.json {
+    report.write(&arguments.report)?;
+    match arguments.json {
         true => print(&report.json())?,
-        false => print(&format!("report: {}", options.report))?,
+        false => print(&format!("report: {}", arguments.report))?,
     };
     ended?;
     match report.wrong() {
@@ -68,24 +79,32 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 
 /// What the steps share.
 struct BringUp<'a> {
-    options: &'a Options,
+    arguments: &'a BringUpArguments,
     link: Link,
     hello: DeviceHello,
     person: Person,
 }
 
 impl<'a> BringUp<'a> {
-    fn begin(options: &'a Options, report: &mut Report) -> Result<BringUp<'a>, Failure> {
-        let begun = Link::connect(&options.address, options.patience);
+    fn begin(
+        arguments: &'a BringUpArguments,
+        address: &Address,
+        report: &mut Report,
+    ) -> Result<BringUp<'a>, Failure> {
+        let begun = Link::connect(address, arguments.device.timeout);
         let (mut link, hello) = begun.inspect_err(|failure| {
             if !stop::requested() {
-                show(options, report, device::not_there(failure));
+                show(arguments, report, device::not_there(failure));
             }
         })?;
-        show(options, report, device::usb(&mut link, options.patience)?);
-        report.device = device::told(&mut link, options.patience, hello.clone())?;
+        show(
+            arguments,
+            report,
+            device::usb(&mut link, arguments.device.timeout)?,
+        );
+        report.device = device::told(&mut link, arguments.device.timeout, hello.clone())?;
         Ok(BringUp {
-            options,
+            arguments,
             link,
             hello,
             person: Person::listen(),
@@ -98,27 +117,27 @@ impl<'a> BringUp<'a> {
         if !report.is_right() {
             return Ok(());
         }
-        let patience = self.options.patience;
+        let patience = self.arguments.device.timeout;
         let (step, inspection) = camera::step(&mut self.link, patience)?;
-        show(self.options, report, step);
+        show(self.arguments, report, step);
         let Some(inspection) = inspection.filter(|_| report.is_right()) else {
             return Ok(());
         };
         let step = clocks::step(&mut self.link, patience, inspection.frame_time_us)?;
-        show(self.options, report, step);
+        show(self.arguments, report, step);
         if !report.is_right() {
             return Ok(());
         }
         let step = self.white()?;
-        show(self.options, report, step);
+        show(self.arguments, report, step);
         let step = self.markers()?;
-        show(self.options, report, step);
+        show(self.arguments, report, step);
         let step = noise::step(&mut self.link, patience, self.hello.threshold.format())?;
         let at_rest = step.is_right();
-        show(self.options, report, step);
+        show(self.arguments, report, step);
         if at_rest {
             let step = press::step(&mut self.link, patience)?;
-            show(self.options, report, step);
+            show(self.arguments, report, step);
         }
         Ok(())
     }
@@ -126,14 +145,14 @@ impl<'a> BringUp<'a> {
     fn white(&mut self) -> Result<Step, Failure> {
         self.person
             .ask("Hold a white card where the film is, or leave the film on where it is clear.")?;
-        let taken = snapshot(&mut self.link, self.options.patience)?;
+        let taken = snapshot(&mut self.link, self.arguments.device.timeout)?;
         Ok(colours::step(&taken.frame))
     }
 
     fn markers(&mut self) -> Result<Step, Failure> {
         self.person
             .ask("Take the card away and put the film on; nothing touches it.")?;
-        let taken = snapshot(&mut self.link, self.options.patience)?;
+        let taken = snapshot(&mut self.link, self.arguments.device.timeout)?;
         let focus = Focus::of(&taken.frame, &self.hello);
         let said = match focus.right {
             true => "sharp, bright, of the right size, in the right place (`hivtac focus`)",
@@ -145,22 +164,10 @@ impl<'a> BringUp<'a> {
 }
 
 /// Keeps a step, and shows it.
-fn show(options: &Options, report: &mut Report, step: Step) {
-    if !options.json {
+fn show(arguments: &BringUpArguments, report: &mut Report, step: Step) {
+    if !arguments.json {
         // A reader that has gone still wants the report's file.
         let _ = print(&step.text());
     }
     report.steps.push(step);
-}
-
-/// What the device logs while it is asked: shown, and what it complains about kept.
-fn hear(complaints: &mut Vec<String>, message: DeviceMessage) {
-    match message {
-        DeviceMessage::Log(line) if line.level != LogLevel::Info => {
-            let text = log_text(&line);
-            note(&text);
-            complaints.push(text);
-        }
-        message => tell(message),
-    }
 }

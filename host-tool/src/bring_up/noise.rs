@@ -1,10 +1,10 @@
 //! The tare, and how still the markers then lie.
 
+use super::complaints::hear;
 use super::device::reason;
-use super::hear;
 use super::report::Step;
 use super::samples::{Wanted, collect};
-use crate::command::TARE_PATIENCE;
+use crate::tare::TARE_PATIENCE;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
 use hivtac_terms::marker::Marker;

@@ -1,6 +1,6 @@
 //! Samples for a while.
 
-use super::hear;
+use super::complaints::hear;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};

@@ -6,30 +6,41 @@ pub mod seen;
 #[cfg(test)]
 pub mod tests;
 
-use crate::lines::to_json;
-use crate::output::{Reader, print};
+use crate::device::Device;
+use crate::output::{self, Reader};
 use crate::snapshot::snapshot;
 use checks::{Check, advice, checks};
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::frame::Frame;
-use hivtac_host::link::Link;
-use hivtac_host::port::Address;
 use hivtac_wire::message::DeviceHello;
 use seen::look;
 use serde::Serialize;
-use std::time::Duration;
+
+/// Show how sharp, bright and well placed the markers are, until all is right
+///
+/// Picture after picture: the width of each marker's rim and of the marker, its colour and
+/// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
+/// everything is right.
+///
+/// Example: hivtac focus
+#[derive(Args)]
+pub struct FocusArguments {
+    #[command(flatten)]
+    device: Device,
+    /// One JSON object a picture
+    #[arg(long)]
+    json: bool,
+}
 
 /// Shows what is right and wrong about each picture, until all is right or it is interrupted.
-pub fn run(address: &Address, patience: Duration, json: bool) -> Result<(), Failure> {
-    let (mut link, hello) = Link::connect(address, patience)?;
+pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
+    let (mut link, hello) = arguments.device.connect()?;
     loop {
-        let taken = snapshot(&mut link, patience)?;
+        let taken = snapshot(&mut link, arguments.device.timeout)?;
         let focus = Focus::of(&taken.frame, &hello);
-        let text = match json {
-            true => to_json(&focus),
-            false => focus.text(),
-        };
-        if print(&text)? == Reader::Gone || focus.right {
+        let reader = output::report(arguments.json, &focus, || focus.text())?;
+        if reader == Reader::Gone || focus.right {
             return Ok(());
         }
     }

@@ -3,11 +3,13 @@
 use super::feed::{Cursor, Feed, News};
 use super::lights;
 use super::response::{EVENTS, begin};
+use crate::force_fields::{FORCE, PLACE};
 use crate::shown::to_json;
 use crate::stop;
 use hivtac_terms::force::Force;
 use hivtac_wire::message::Sample;
 use serde::Serialize;
+use serde_json::{Value, json};
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -100,12 +102,7 @@ struct Samples {
 
 /// A sample: sequence number, frame, device time in µs, status; then its force or `null`.
 #[derive(Serialize)]
-struct Row(u32, u32, u64, u32, Option<ForceRow>);
-
-/// Fx, Fy, Fz, |F| and its standard uncertainty in µN; α, β and the direction's in thousandths of a
-/// degree; then the place or `null`.
-#[derive(Serialize)]
-struct ForceRow(i32, i32, i32, i32, u32, i32, i32, u32, Option<[i64; 3]>);
+struct Row(u32, u32, u64, u32, Option<Value>);
 
 impl From<&Sample> for Row {
     fn from(sample: &Sample) -> Row {
@@ -114,26 +111,16 @@ impl From<&Sample> for Row {
             sample.frame,
             sample.time_us,
             sample.status.0,
-            sample.force.as_ref().map(ForceRow::from),
+            sample.force.as_ref().map(force_row),
         )
     }
 }
 
-impl From<&Force> for ForceRow {
-    fn from(force: &Force) -> ForceRow {
-        let [x, y, z] = force.cartesian.map(|component| component.0);
-        ForceRow(
-            x,
-            y,
-            z,
-            force.magnitude.0,
-            force.magnitude_sigma.0,
-            force.alpha.0,
-            force.beta.0,
-            force.direction_sigma.0,
-            force
-                .place
-                .map(|place| [place.x.0.into(), place.y.0.into(), place.sigma.0.into()]),
-        )
-    }
+/// Fx, Fy, Fz, |F| and its standard uncertainty; α, β and the direction's; then the place or `null`:
+/// integers as on the wire.
+fn force_row(force: &Force) -> Value {
+    let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.integer(force));
+    let place = force.place.as_ref();
+    let place = place.map(|place| PLACE.map(|it| it.integer(place)));
+    json!([x, y, z, size, size_sigma, alpha, beta, angle_sigma, place])
 }

@@ -7,12 +7,13 @@ mod table;
 pub use listen::Heard;
 
 use crate::clock::now_ns;
+use crate::device::{Devices, seconds};
 use crate::output::{note, print};
 use crate::tally::Tally;
 use bag::Bag;
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
-use hivtac_host::port::Address;
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use listen::{Until, listen};
@@ -30,44 +31,51 @@ use table::Table;
 /// Time between two flushes, and two lines of progress.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
-/// What to do.
-pub struct Options {
-    /// Where the devices are.
-    pub addresses: Vec<Address>,
-    /// Longest wait for a device's answers.
-    pub patience: Duration,
-    /// End after so long; else at Ctrl-C.
-    pub duration: Option<Duration>,
-    /// `….mcap` or `….csv`.
-    pub file: PathBuf,
-    /// At the end, what became of it as one JSON object.
-    pub json: bool,
+/// Record everything that one or several devices say, with both clocks, until Ctrl-C
+///
+/// FILE.mcap has ROS 2's profile: `ros2 bag play`, Foxglove and PlotJuggler read it, and
+/// `hivtac replay`. FILE.csv has a row a sample, with units in its header. Until its end it is
+/// FILE.partial; it keeps that name when the connection was lost. Several sensors are recorded
+/// into one FILE.mcap, each with its own topics.
+///
+/// Example: hivtac record press.mcap --seconds 60
+#[derive(Args)]
+pub struct RecordArguments {
+    #[command(flatten)]
+    devices: Devices,
+    /// The file to make, ….mcap or ….csv
+    file: PathBuf,
+    /// End after so many seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    seconds: Option<Duration>,
+    /// At the end, what became of it as one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 /// Records until the time is over, Ctrl-C, or a device is gone.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    check(&options.file, options.addresses.len())?;
-    let connect = |address| Link::connect(address, options.patience);
-    let connected: Result<Vec<_>, _> = options.addresses.iter().map(connect).collect();
-    let (mut links, hellos): (Vec<Link>, Vec<DeviceHello>) = connected?.into_iter().unzip();
-    let mut recording = Recording::create(&options.file, &hellos)?;
-    let result = recording.follow(&mut links, options);
+pub fn run(arguments: &RecordArguments) -> Result<(), Failure> {
+    let addresses = arguments.devices.addresses()?;
+    check(&arguments.file, addresses.len())?;
+    let (mut links, hellos) = arguments.devices.connect(&addresses)?;
+    let mut recording = Recording::create(&arguments.file, &hellos)?;
+    let result = recording.follow(&mut links, arguments);
     for (link, sensor) in links.iter().zip(&mut recording.sensors) {
         sensor.tally.rejected(link.rejected());
     }
     let counts: Vec<Value> = recording.sensors.iter().map(Sensor::counts).collect();
     let ended = recording.end(result);
-    if options.json {
-        print(&summary(options, counts, &ended).to_string())?;
+    if arguments.json {
+        print(&summary(&arguments.file, counts, &ended).to_string())?;
     }
     ended
 }
 
 /// What became of a recording, as one JSON object: of one sensor with its counts, of several with
 /// those of each.
-fn summary(options: &Options, mut counts: Vec<Value>, ended: &Result<(), Failure>) -> Value {
+fn summary(file: &Path, mut counts: Vec<Value>, ended: &Result<(), Failure>) -> Value {
     let is_whole = is_clean(ended);
-    let file = options.file.display();
+    let file = file.display();
     let mut summary = match &mut counts[..] {
         [only] => only.take(),
         _ => json!({ "sensors": counts }),
@@ -233,10 +241,10 @@ impl Recording {
     }
 
     /// Keeps what comes until the end; what goes wrong with one device ends it for all.
-    fn follow(&mut self, links: &mut [Link], options: &Options) -> Result<(), Failure> {
+    fn follow(&mut self, links: &mut [Link], arguments: &RecordArguments) -> Result<(), Failure> {
         let is_over = AtomicBool::new(false);
         let until = &Until {
-            duration: options.duration,
+            duration: arguments.seconds,
             is_over: &is_over,
         };
         let (said, heard) = mpsc::channel();
@@ -246,7 +254,7 @@ impl Recording {
                 .map(|(sensor, link)| {
                     let said = said.clone();
                     scope.spawn(move || {
-                        let result = listen(link, sensor, options.patience, until, &said);
+                        let result = listen(link, sensor, arguments.devices.timeout, until, &said);
                         if result.is_err() {
                             until.is_over.store(true, Ordering::Relaxed);
                         }

@@ -2,7 +2,7 @@
 
 pub mod channel;
 
-use hivtac_terms::force::Force;
+use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 
 /// A kind of message: name and definition, with those of the messages in it.
@@ -220,9 +220,7 @@ impl Cdr {
 /// A [`WRENCH`]. The torque is that of the force where it touches, none where that is not known.
 pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
     let [fx, fy, fz] = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
-    let [x, y] = force.place.map_or([0.0; 2], |place| {
-        [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
-    });
+    let [x, y] = force.place.map_or([0.0; 2], place_m);
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, frame);
     cdr.vector([fx, fy, fz]);
@@ -235,9 +233,14 @@ pub fn point(stamp_ns: u64, frame: &str, force: &Force) -> Option<Vec<u8>> {
     let place = force.place?;
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, frame);
-    let [x, y] = [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6);
+    let [x, y] = place_m(place);
     cdr.vector([x, y, 0.0]);
     Some(cdr.0)
+}
+
+/// Along x and y from the film's middle, m.
+fn place_m(place: Place) -> [f64; 2] {
+    [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
 }
 
 /// A [`POLYGON`].

@@ -1,7 +1,7 @@
 //! For Foxglove, over its WebSocket: the channels and schemas of a recording, live. Whoever can
 //! reach the port can read them, and nothing else.
 
-use super::{Outlet, Served};
+use super::outlet::{Outlet, Served};
 use crate::ros::channel::{Channel, topic_of};
 use crate::ros::{DIAGNOSTICS, Definition};
 use foxglove::{ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};

@@ -6,25 +6,27 @@ mod foxglove;
 mod names;
 #[cfg(feature = "ros2")]
 mod node;
+mod outlet;
 mod sensor;
 
+use crate::device::Devices;
 use crate::follow::follow;
 use crate::output::{Reader, print};
 use crate::ros;
-use crate::ros::channel::{Channel, Frames, messages};
+use crate::ros::channel::{Frames, messages};
+use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::Link;
-use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::stop;
 use hivtac_wire::message::DeviceHello;
+use outlet::{Outlet, Served};
 use sensor::{Event, Sensor, TareOrder, Told, What};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
 /// Events that wait for the outlets: some seconds of one device.
@@ -36,53 +38,58 @@ const TURN_EVERY: Duration = Duration::from_millis(20);
 /// The environment variable by which all of ROS 2 knows its domain.
 const DOMAIN: &str = "ROS_DOMAIN_ID";
 /// The largest domain: a larger one would need a UDP port above the last.
-pub const LAST_DOMAIN: u16 = 232;
+const LAST_DOMAIN: u16 = 232;
 
-/// What to serve, and how.
-pub struct Options {
-    /// Where the devices are.
-    pub addresses: Vec<Address>,
-    /// Longest wait for a device's answers.
-    pub patience: Duration,
-    /// As a node of ROS 2.
-    pub ros2: bool,
-    /// For Foxglove.
-    pub foxglove: bool,
-    /// The node's name.
-    pub name: String,
-    /// Its domain; that of the environment when none is given.
-    pub domain: Option<u16>,
-    /// Where Foxglove finds it.
-    pub listen: SocketAddr,
-    /// Where it is as one JSON object.
-    pub json: bool,
+/// Serve forces to other programs, as a node of ROS 2 or for Foxglove, until Ctrl-C
+///
+/// For a hivtac that was built with it: `cargo install --path host-tool --features
+/// ros2,foxglove`. Prints `ready` and where; goes on after a lost connection, which diagnostics
+/// tell. Topics of the node, each below its name: `wrench`, `place`, `markers`, `contact`,
+/// `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are below
+/// /NODE/SENSOR.
+///
+/// Example: hivtac serve --ros2 --foxglove
+#[derive(Args)]
+pub struct ServeArguments {
+    #[command(flatten)]
+    devices: Devices,
+    #[command(flatten)]
+    outlets: Outlets,
+    /// The node's name in ROS 2
+    #[arg(long, value_name = "NODE", default_value = "hivtac", requires = "ros2")]
+    name: String,
+    /// ROS 2's domain, 0–232; ROS_DOMAIN_ID when not given, else 0
+    #[arg(
+        long,
+        value_name = "ID",
+        requires = "ros2",
+        value_parser = clap::value_parser!(u16).range(0..=i64::from(LAST_DOMAIN))
+    )]
+    domain: Option<u16>,
+    /// Where Foxglove finds it; port 0 for any that is free. Only this computer can reach
+    /// 127.0.0.1, others too 0.0.0.0: whoever reaches it can read everything
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        default_value = "127.0.0.1:8765",
+        requires = "foxglove"
+    )]
+    listen: SocketAddr,
+    /// Where it is as one JSON object
+    #[arg(long)]
+    json: bool,
 }
 
-/// Where messages go.
-trait Outlet {
-    /// Where it is: a word and its value, for the line that says so.
-    fn told(&self) -> Vec<(&'static str, String)>;
-
-    /// Publishes a device's message, CDR, that came at a time, ns since 1970; false when it could
-    /// not.
-    fn publish(&mut self, sensor: usize, channel: Channel, data: &[u8], came_ns: u64) -> bool;
-
-    /// Publishes how a device stands, likewise.
-    fn diagnostics(&mut self, data: &[u8], came_ns: u64);
-
-    /// Does what there is to do besides.
-    fn turn(&mut self) {}
-}
-
-/// A device, for the outlets.
-struct Served {
-    hello: DeviceHello,
-    /// Its own part of names, when it is one of several.
-    name: Option<String>,
-    frames: Frames,
-    orders: SyncSender<TareOrder>,
-    down: Told,
-    not_published: Arc<AtomicU64>,
+/// Which programs are served.
+#[derive(Args)]
+#[group(required = true, multiple = true)]
+struct Outlets {
+    /// As a node of ROS 2, which needs no ROS to be installed here
+    #[arg(long)]
+    ros2: bool,
+    /// For Foxglove, over its WebSocket
+    #[arg(long)]
+    foxglove: bool,
 }
 
 /// Serves until it is interrupted. Prints `ready` and where.
@@ -90,23 +97,23 @@ struct Served {
 /// # Errors
 /// When this program was built without what is asked for, a device is not there to begin with, or
 /// an outlet cannot be opened. A device that is lost later is waited for.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    built_with(options)?;
-    names::check(&options.name)?;
-    let domain = match (options.ros2, options.domain) {
+pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
+    let addresses = arguments.devices.addresses()?;
+    built_with(&arguments.outlets)?;
+    names::check(&arguments.name)?;
+    let domain = match (arguments.outlets.ros2, arguments.domain) {
         (true, None) => domain()?,
         (_, domain) => domain.unwrap_or_default(),
     };
-    let connect = |address| Link::connect(address, options.patience);
-    let connected: Result<Vec<_>, _> = options.addresses.iter().map(connect).collect();
-    let (links, hellos): (Vec<Link>, Vec<DeviceHello>) = connected?.into_iter().unzip();
+    let (links, hellos) = arguments.devices.connect(&addresses)?;
     let units: BTreeSet<_> = hellos.iter().map(|hello| hello.device_id).collect();
     if units.len() < hellos.len() {
         return Err(usage("the same sensor is named twice"));
     }
-    let (served, orders): (Vec<Served>, Vec<_>) = served(options, hellos).into_iter().unzip();
-    let mut outlets = outlets(options, domain, &served)?;
-    if tell(options.json, &outlets)? == Reader::Gone {
+    let (served, orders): (Vec<Served>, Vec<_>) =
+        served(&arguments.name, hellos).into_iter().unzip();
+    let mut outlets = outlets(arguments, domain, &served)?;
+    if tell(arguments.json, &outlets)? == Reader::Gone {
         return Ok(());
     }
     let (events, told) = sync_channel(EVENTS);
@@ -117,14 +124,14 @@ pub fn run(options: &Options) -> Result<(), Failure> {
             let count = served.not_published.clone();
             let mut sensor = Sensor::new(
                 number,
-                options.patience,
+                arguments.devices.timeout,
                 about,
                 events.clone(),
                 (orders, served.down.clone()),
                 count,
             );
-            let address = &options.addresses[number];
-            scope.spawn(move || follow(address, options.patience, link, &mut sensor));
+            let address = &addresses[number];
+            scope.spawn(move || follow(address, arguments.devices.timeout, link, &mut sensor));
         }
         drop(events);
         publish(&told, &served, &mut outlets);
@@ -133,11 +140,11 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 }
 
 /// Says when this program cannot do what is asked for.
-fn built_with(options: &Options) -> Result<(), Failure> {
+fn built_with(outlets: &Outlets) -> Result<(), Failure> {
     for (is_wanted, is_there, what, feature) in [
-        (options.ros2, cfg!(feature = "ros2"), "ROS 2", "ros2"),
+        (outlets.ros2, cfg!(feature = "ros2"), "ROS 2", "ros2"),
         (
-            options.foxglove,
+            outlets.foxglove,
             cfg!(feature = "foxglove"),
             "Foxglove",
             "foxglove",
@@ -174,13 +181,13 @@ fn domain() -> Result<u16, Failure> {
 }
 
 /// The devices by their names, each with where its orders arrive.
-fn served(options: &Options, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<TareOrder>)> {
+fn served(node: &str, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<TareOrder>)> {
     let names = names::of_devices(&hellos);
     let each = hellos.into_iter().zip(names).map(|(hello, name)| {
         let (orders, arriving) = sync_channel(ORDERS);
         let frames = match &name {
-            None => options.name.clone(),
-            Some(name) => format!("{}_{name}", options.name),
+            None => node.to_owned(),
+            Some(name) => format!("{node}_{name}"),
         };
         let served = Served {
             hello,
@@ -205,18 +212,18 @@ fn served(options: &Options, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<
     )
 )]
 fn outlets(
-    options: &Options,
+    arguments: &ServeArguments,
     domain: u16,
     served: &[Served],
 ) -> Result<Vec<Box<dyn Outlet>>, Failure> {
     let mut outlets: Vec<Box<dyn Outlet>> = Vec::new();
     #[cfg(feature = "ros2")]
-    if options.ros2 {
-        outlets.push(Box::new(node::Ros2::open(&options.name, domain, served)?));
+    if arguments.outlets.ros2 {
+        outlets.push(Box::new(node::Ros2::open(&arguments.name, domain, served)?));
     }
     #[cfg(feature = "foxglove")]
-    if options.foxglove {
-        outlets.push(Box::new(foxglove::Server::open(options.listen, served)?));
+    if arguments.outlets.foxglove {
+        outlets.push(Box::new(foxglove::Server::open(arguments.listen, served)?));
     }
     Ok(outlets)
 }

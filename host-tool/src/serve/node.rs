@@ -4,8 +4,8 @@
 //! Writers are reliable, so that reliable and best-effort subscriptions both get what is written;
 //! one that does not keep up loses the oldest of the last ten messages of a topic.
 
+use super::outlet::{Outlet, Served};
 use super::sensor::{Answer, TareOrder, Told};
-use super::{Outlet, Served};
 use crate::output::note;
 use crate::ros::channel::Channel;
 use crate::ros::{DIAGNOSTICS, Definition, trigger_reply, vector_stamped};

@@ -3,10 +3,10 @@
 
 use super::diagnosis::diagnose;
 use crate::clock::{Clock, now_ns};
-use crate::command::usual_tare;
 use crate::follow::{Follower, note_connected_again};
 use crate::output::note;
 use crate::ros::Diagnosis;
+use crate::tare::usual_tare;
 use crate::view::state::State;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};

@@ -1,12 +1,11 @@
 //! Settings as JSON: what `export` writes and `import` reads.
 
 use super::camera::{CameraJson, InUse};
+use super::name::name;
 use super::temporal::TemporalJson;
-use super::{name, unusable};
-use crate::lines::to_json;
 use hivtac_host::failure::Failure;
 use hivtac_host::files::read_at_most;
-use hivtac_host::shown::unit_number;
+use hivtac_host::shown::{to_json, unit_number};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::down::{Direction, Down};
@@ -14,7 +13,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::settings::{Found, RestPosition, Selection, SettingsReport};
 use serde::{Deserialize, Serialize};
 
@@ -136,7 +135,7 @@ impl Kept {
         Kept {
             file: File::new(device_id, report),
             rezeroed_px: report.rezeroed.to_f64(),
-            seen_px: report.seen.map(|seen| f64::from(seen.0) * 1e-3),
+            seen_px: report.seen.map(MilliPx::to_f64),
             kept: KeptParts {
                 name,
                 threshold,
@@ -300,9 +299,9 @@ impl Rest {
 /// # Errors
 /// What is wrong with it, and where.
 pub fn read(path: &str) -> Result<File, Failure> {
-    let bytes = read_at_most(path, LONGEST_FILE).map_err(|error| unusable(path, error))?;
-    let bytes = bytes.ok_or_else(|| unusable(path, "too long for a file of settings"))?;
-    parse(&bytes).map_err(|why| unusable(path, why))
+    let bytes = read_at_most(path, LONGEST_FILE).map_err(|error| Failure::of_file(path, error))?;
+    let bytes = bytes.ok_or_else(|| Failure::of_file(path, "too long for a file of settings"))?;
+    parse(&bytes).map_err(|why| Failure::of_file(path, why))
 }
 
 fn parse(bytes: &[u8]) -> Result<File, String> {
@@ -341,7 +340,7 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
 /// When it cannot be written.
 pub fn write(path: &str, file: &File) -> Result<(), Failure> {
     let text = to_json(file) + "\n";
-    std::fs::write(path, text).map_err(|error| unusable(path, error))
+    std::fs::write(path, text).map_err(|error| Failure::of_file(path, error))
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! How forces are followed from frame to frame: contact, slip, filter, re-zeroing and creep, as
 //! JSON, as lines, and as what `settings set` changes of them.
 
-use crate::decimal::Thousandths;
+use hivtac_host::decimal::Decimal;
 use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
 use hivtac_terms::units::{
     Micrometres, MilliPx, Milliseconds, Permille, SmallPermille, UnsignedMicroNewtons,
@@ -165,9 +165,9 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
         None => "off".to_owned(),
         Some(Rezero { after, rate, total }) => format!(
             "after {} s without a contact, by {} px a second, {} px in all",
-            Thousandths::from_u64(after.0.into()),
-            Thousandths::from_u64(rate.0.into()),
-            Thousandths::from_u64(total.0.into())
+            Decimal::thousandths(after.0),
+            Decimal::thousandths(rate.0),
+            Decimal::thousandths(total.0)
         ),
     };
     [
@@ -175,8 +175,8 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
             "contact",
             format!(
                 "from {} mN on, until below {} mN",
-                Thousandths::from_u64(contact.begins.0.into()),
-                Thousandths::from_u64(contact.ends.0.into())
+                Decimal::thousandths(contact.begins.0),
+                Decimal::thousandths(contact.ends.0)
             ),
         ),
         (
@@ -185,7 +185,7 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
                 "{} µm within {} ms, from {} of the normal force on",
                 slip.distance.0,
                 slip.within.0,
-                Thousandths::from_u64(slip.ratio.0.into())
+                Decimal::thousandths(slip.ratio.0)
             ),
         ),
         ("filter", FilterJson::new(*filter).text()),
@@ -198,8 +198,8 @@ fn creep_text(creep: &Creep) -> String {
     if !creep.is_measured() {
         return "not measured: uncertain as silicones differ".to_owned();
     }
-    let [first, second] = creep.parts.map(|part| Thousandths::from_u64(part.0.into()));
-    let [short, long] = Creep::TIMES.map(|time| Thousandths::from_u64(time.0.into()));
+    let [first, second] = creep.parts.map(|part| Decimal::thousandths(part.0));
+    let [short, long] = Creep::TIMES.map(|time| Decimal::thousandths(time.0));
     format!("{first} of a force within {short} s, {second} within {long} s")
 }
 

@@ -5,7 +5,9 @@ mod picture;
 mod recorder;
 pub mod state;
 
+use crate::device::seconds;
 use crate::output::{Reader, print};
+use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
 use hivtac_host::page::{Feed, Sensor, Server};
@@ -25,33 +27,46 @@ const ORDERS: usize = 4;
 /// How often is looked whether to end.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// What to show, and where.
-pub struct Options {
-    /// Where the devices are, one or more.
-    pub addresses: Vec<Address>,
-    /// Longest wait for a device's answers.
-    pub patience: Duration,
-    /// The page's port on 127.0.0.1, 0 for any.
-    pub port: u16,
-    /// Where recordings go.
-    pub folder: PathBuf,
-    /// The page's address in a JSON object.
-    pub json: bool,
+/// Show a live page in a browser of this computer: forces, picture, threshold, status
+///
+/// Prints `ready` and the page's address, which holds a secret: nobody else on this computer or
+/// in another page can open it. Ends with Ctrl-C; goes on after a lost connection. `--port`
+/// more than once shows several sensors side by side.
+///
+/// Example: hivtac view
+#[derive(Args)]
+pub struct ViewArguments {
+    /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
+    #[arg(long, value_name = "PORT")]
+    port: Vec<String>,
+    /// Longest wait for the device's hello and replies, s
+    #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
+    timeout: Duration,
+    /// The page's port on 127.0.0.1; one that is free when not given
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    listen: u16,
+    /// Where the page's recordings go, as hivtac-UNIT-NUMBER.mcap
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    recordings: PathBuf,
+    /// The page's address in a JSON object
+    #[arg(long)]
+    json: bool,
 }
 
 /// Serves the page until it is interrupted. Prints `ready` and its address.
 ///
 /// # Errors
 /// When a device is not there to begin with; a lost one is waited for.
-pub fn run(options: &Options) -> Result<(), Failure> {
-    let opened = options
-        .addresses
-        .iter()
-        .map(|address| open(address, options));
+pub fn run(arguments: &ViewArguments) -> Result<(), Failure> {
+    let addresses = match arguments.port.as_slice() {
+        [] => vec![Address::Find],
+        ports => ports.iter().map(|port| Address::parse(port)).collect(),
+    };
+    let opened = addresses.iter().map(|address| open(address, arguments));
     let opened: Vec<(Sensor, Opened)> = opened.collect::<Result<_, _>>()?;
     let (sensors, opened): (Vec<_>, Vec<_>) = opened.into_iter().unzip();
-    let server = Arc::new(Server::new(options.port, sensors, options.patience)?);
-    let ready = match options.json {
+    let server = Arc::new(Server::new(arguments.listen, sensors, arguments.timeout)?);
+    let ready = match arguments.json {
         true => json!({ "address": server.address() }).to_string(),
         false => format!("ready {}", server.address()),
     };
@@ -76,17 +91,17 @@ pub fn run(options: &Options) -> Result<(), Failure> {
 /// A device that is connected, for its thread.
 type Opened = (Owner, Link);
 
-fn open(address: &Address, options: &Options) -> Result<(Sensor, Opened), Failure> {
-    let (link, hello) = Link::connect(address, options.patience)?;
+fn open(address: &Address, arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure> {
+    let (link, hello) = Link::connect(address, arguments.timeout)?;
     let feed = Arc::new(Feed::default());
     let (orders, posted) = sync_channel(ORDERS);
     let owner = Owner::new(
         address.clone(),
-        options.patience,
+        arguments.timeout,
         (&link, hello),
         feed.clone(),
         posted,
-        Recorder::new(&options.folder),
+        Recorder::new(&arguments.recordings),
     );
     let sensor = Sensor {
         feed,

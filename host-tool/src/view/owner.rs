@@ -4,8 +4,8 @@
 use super::picture;
 use super::recorder::Recorder;
 use super::state::State;
-use crate::command::usual_tare;
 use crate::follow::{Follower, follow};
+use crate::tare::usual_tare;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::take;
 use hivtac_host::link::Link;

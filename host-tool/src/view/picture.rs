@@ -2,10 +2,10 @@
 
 use crate::finding::MarkerJson;
 use crate::focus::Focus;
-use crate::lines::to_json;
 use hivtac_host::frame::Taken;
 use hivtac_host::look::{self, PASSED};
 use hivtac_host::page::Limits;
+use hivtac_host::shown::to_json;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::DeviceHello;
 use serde::Serialize;

@@ -146,6 +146,13 @@ pub struct SmallPermille(pub u8);
 )]
 pub struct MilliPx(pub u16);
 
+impl MilliPx {
+    /// The value in pixels, for display.
+    pub fn to_f64(self) -> f64 {
+        f64::from(self.0) * 1e-3
+    }
+}
+
 /// A short time, in millionths of a second.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(

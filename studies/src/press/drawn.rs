@@ -1,6 +1,6 @@
 //! Units as people build them, drawn at random.
 
-use hivtac_calibration::forward::building::{
+use hivtac_calibration::forward::tolerances::{
     FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS,
 };
 use hivtac_twin::film::reduced::Unit;

@@ -11,10 +11,10 @@ use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};
 use super::gauge::Unit;
 use super::gauge_file;
-use super::holds;
 use super::poses::Pose;
 use super::report::{Report, RunReport};
 use super::series::{Joined, Series};
+use super::steady_intervals::steady_frames;
 use crate::data::dataset::{About, Dataset, Free, Loads, Observation, Place, Row};
 use crate::data::loads::{PaperPoses, norm};
 use crate::data::range::Range;
@@ -356,7 +356,7 @@ impl Run<'_> {
         }
         if self.holds {
             let before = loaded.len();
-            loaded = holds::steady(&loaded, noise_n);
+            loaded = steady_frames(&loaded, noise_n);
             report.unsteady = before - loaded.len();
         }
         for loaded in loaded.iter().chain(&free) {

@@ -123,7 +123,7 @@ impl FreeTake {
     }
 
     /// The same for a page.
-    pub fn told(&self, sample: &Sample) -> page::Coverage {
+    pub fn page_coverage(&self, sample: &Sample) -> page::Coverage {
         page::Coverage {
             maps: self.coverage.maps(self.cell()),
             now: self.pressed(sample),
@@ -132,7 +132,7 @@ impl FreeTake {
     }
 
     /// The final state for a page.
-    pub fn told_at_the_end(&self) -> page::Coverage {
+    pub fn final_page_coverage(&self) -> page::Coverage {
         page::Coverage {
             maps: self.coverage.maps(None),
             now: String::new(),

@@ -19,12 +19,12 @@ pub mod gauge;
 pub mod gauge_file;
 pub mod gauge_port;
 mod gauge_unit;
-mod holds;
 pub mod poses;
 pub mod record;
 pub mod report;
 pub mod series;
 pub mod simulated;
+mod steady_intervals;
 mod take;
 mod watched;
 

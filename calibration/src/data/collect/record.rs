@@ -210,7 +210,7 @@ impl Recorder {
             if let Some(free) = free {
                 eprintln!("{}", free.end());
                 if let Some(watched) = &mut self.watched {
-                    watched.ended(free.told_at_the_end());
+                    watched.ended(free.final_page_coverage());
                 }
             }
             let is_felt = take.felt_n.is_none_or(|force_n| force_n >= LEAST_FELT_N);
@@ -393,7 +393,9 @@ impl Recorder {
                 }
                 if let Some(watched) = &mut self.watched {
                     let free = self.free.as_ref();
-                    watched.sample(&sample, take, || free.map(|free| free.told(&sample)));
+                    watched.sample(&sample, take, || {
+                        free.map(|free| free.page_coverage(&sample))
+                    });
                 }
             }
             DeviceMessage::Log(line) => eprintln!("{}", log_text(&line)),

@@ -22,11 +22,11 @@ const BESIDE_PX: [f64; 8] = [0.0, 0.001, 0.002, 0.003, 0.004, 0.006, 0.008, 0.01
 const LARGE: f64 = 0.6;
 
 /// Factors on a row's uncertainties with which its errors would just lie within their bounds.
-struct Needed {
+struct LeastScale {
     /// Size of the force that was found, in parts of the largest.
     size: f64,
     /// Of direction, |F| and place.
-    times: [f64; 3],
+    scale: [f64; 3],
 }
 
 impl Weights {
@@ -45,17 +45,17 @@ impl Weights {
             ..FilmModel::nominal(steps, &noise)
         };
         self.film = Some(film.clone());
-        let rows = needed(&self, dataset)?;
-        let times =
-            |rows: &[Needed], k: usize| quantile(COVERED, rows.iter().map(|row| row.times[k]));
-        let wider = times(&rows, 0).max(times(&rows, 2)).max(1.0);
+        let rows = least_scales(&self, dataset)?;
+        let covering =
+            |rows: &[LeastScale], k: usize| quantile(COVERED, rows.iter().map(|row| row.scale[k]));
+        let wider = covering(&rows, 0).max(covering(&rows, 2)).max(1.0);
         film.noise_px = film.noise_px.map(|part| part * wider);
         for beside_px in BESIDE_PX {
             film.beside_px = beside_px;
             self.film = Some(film.clone());
-            let mut rows = needed(&self, dataset)?;
+            let mut rows = least_scales(&self, dataset)?;
             rows.retain(|row| row.size >= LARGE);
-            if (0..3).all(|k| times(&rows, k) <= 1.0) {
+            if (0..3).all(|k| covering(&rows, k) <= 1.0) {
                 break;
             }
         }
@@ -63,7 +63,7 @@ impl Weights {
     }
 }
 
-fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
+fn least_scales(weights: &Weights, dataset: &Dataset) -> Result<Vec<LeastScale>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
     let forward = model.forward.context("the network tells no place")?;
@@ -88,9 +88,9 @@ fn needed(weights: &Weights, dataset: &Dataset) -> Result<Vec<Needed>> {
         let off_n = (magnitude_n - norm(sample.force_n)).abs();
         let magnitude = off_n / MAGNITUDE_BOUND / (f64::from(force.magnitude_sigma.0) * 1e-6);
         let place = far_mm / PLACE_BOUND / (f64::from(place.sigma.0) * 1e-3);
-        all.push(Needed {
+        all.push(LeastScale {
             size: f64::from(size / forward.limits.size),
-            times: [direction, magnitude, place],
+            scale: [direction, magnitude, place],
         });
     }
     ensure!(

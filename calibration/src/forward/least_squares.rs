@@ -6,17 +6,17 @@ use hivtac_twin::film::reduced::Axis;
 
 /// Terms whose remainder after Gram–Schmidt is below this fraction of the largest cannot be
 /// distinguished.
-const LEAST_TOLD: f64 = 1e-9;
+const LEAST_LENGTH: f64 = 1e-9;
 
 /// Fits coefficients of terms to samples at fixed loads.
-pub struct Nearest {
+pub struct LeastSquares {
     /// Orthonormal columns, by term.
     units: Vec<Vec<f64>>,
     /// Each column in parts of the units up to its own, by term.
     parts: Vec<Vec<f64>>,
 }
 
-impl Nearest {
+impl LeastSquares {
     /// From the terms' values, a row for each sample.
     ///
     /// # Errors
@@ -39,7 +39,7 @@ impl Nearest {
             let own = dot(&column, &column).sqrt();
             largest = largest.max(own);
             ensure!(
-                own > LEAST_TOLD * largest,
+                own > LEAST_LENGTH * largest,
                 "the samples do not tell the terms apart"
             );
             of[term] = own;
@@ -73,7 +73,7 @@ impl Nearest {
 /// The coefficients of splines through rows of numbers at the nodes of axes along x and y. By node
 /// along y and, within, along x.
 pub fn splines([x, y]: [&Axis; 2], rows: &[Vec<Vec<f64>>]) -> Result<Vec<Vec<Vec<f64>>>> {
-    let [x, y] = [x, y].map(|axis| Nearest::new(&collocation(axis)));
+    let [x, y] = [x, y].map(|axis| LeastSquares::new(&collocation(axis)));
     Ok(turned(&y?, &turned(&x?, rows)))
 }
 
@@ -90,7 +90,7 @@ fn collocation(axis: &Axis) -> Vec<Vec<f64>> {
 }
 
 /// Solves along the inner axis and makes the outer axis the inner one.
-fn turned(through: &Nearest, rows: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
+fn turned(through: &LeastSquares, rows: &[Vec<Vec<f64>>]) -> Vec<Vec<Vec<f64>>> {
     let (outer, inner, numbers) = (rows.len(), rows[0].len(), rows[0][0].len());
     let mut all = vec![vec![vec![0.0; numbers]; outer]; inner];
     for (outer, line) in rows.iter().enumerate() {
@@ -129,10 +129,10 @@ mod tests {
         let rows: Vec<Vec<f64>> = (0..30).map(row).collect();
         let own = [1.0, -2.0, 0.5, 3.0, -0.25, 1.5];
         let samples: Vec<f64> = rows.iter().map(|row| dot(row, &own)).collect();
-        let found = Nearest::new(&rows).unwrap().coefficients(&samples);
+        let found = LeastSquares::new(&rows).unwrap().coefficients(&samples);
         assert!(found.iter().zip(own).all(|(a, b)| (a - b).abs() < 1e-12));
         let alike: Vec<Vec<f64>> = rows.iter().map(|row| vec![row[0], 2.0 * row[0]]).collect();
-        assert!(Nearest::new(&alike).is_err());
+        assert!(LeastSquares::new(&alike).is_err());
     }
 
     #[test]

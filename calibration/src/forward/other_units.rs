@@ -17,9 +17,9 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::building::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
 use super::covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
+use super::tolerances::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
 
 /// Number of films that are drawn.
 const FILMS: u64 = 60;

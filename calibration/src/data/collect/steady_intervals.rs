@@ -14,11 +14,11 @@ const STRAY_N: f64 = 0.000_5;
 const GAP_S: f64 = 0.2;
 
 /// The frames of all steady stretches, each with the mean force of its stretch.
-pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>> {
+pub(super) fn steady_frames<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>> {
     let mut steady = Vec::new();
     let mut rest = frames;
     while !rest.is_empty() {
-        let length = stretch(rest, noise_n);
+        let length = interval_length(rest, noise_n);
         let (these, others) = rest.split_at(length);
         let lasted = these[length - 1].time_s - these[0].time_s;
         if lasted >= SHORTEST_S {
@@ -38,7 +38,7 @@ pub(super) fn steady<'a>(frames: &[Loaded<'a>], noise_n: f64) -> Vec<Loaded<'a>>
 }
 
 /// Length of the stretch at the start: frames in one pose near their common mean force.
-fn stretch(frames: &[Loaded<'_>], noise_n: f64) -> usize {
+fn interval_length(frames: &[Loaded<'_>], noise_n: f64) -> usize {
     let first = &frames[0];
     let (mut low, mut high, mut sum) = (first.force_n, first.force_n, 0.0);
     for (count, frame) in frames.iter().enumerate() {
@@ -95,7 +95,7 @@ mod tests {
                 clock_n: None,
             })
             .collect();
-        let found = steady(&frames, 0.000_1);
+        let found = steady_frames(&frames, 0.000_1);
         let mut loads: Vec<(f64, Option<Pose>)> =
             found.iter().map(|f| (f.force_n, f.kept.pose)).collect();
         loads.dedup();
@@ -107,6 +107,6 @@ mod tests {
         );
         assert_eq!(loads[2].1, Some(pose([8.0, 0.0])));
         assert!(found.len() > 60, "{}", found.len());
-        assert!(steady(&[], 0.0).is_empty());
+        assert!(steady_frames(&[], 0.0).is_empty());
     }
 }

@@ -10,16 +10,16 @@ use crate::loads::SeenLoad;
 const WRONG: f64 = 10.0;
 
 /// How well a fit explains its loads.
-pub struct Explained<'a> {
+pub struct GoodnessOfFit<'a> {
     /// χ² over the number of seen coordinates.
     pub chi_square: f64,
     /// The load that the fit explains worst.
     pub worst: &'a SeenLoad,
 }
 
-impl fmt::Display for Explained<'_> {
+impl fmt::Display for GoodnessOfFit<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Explained { chi_square, worst } = self;
+        let GoodnessOfFit { chi_square, worst } = self;
         write!(
             f,
             "χ² of what is seen, over its coordinates: {chi_square:.2}, "
@@ -74,7 +74,7 @@ mod tests {
         };
         let words = |chi_square: f64| {
             let worst = &worst;
-            Explained { chi_square, worst }.to_string()
+            GoodnessOfFit { chi_square, worst }.to_string()
         };
         let good = words(1.39);
         assert!(good.contains("1.39, as it should be") && !good.contains("200 mN"));

@@ -9,7 +9,7 @@ use super::problem::Problem;
 
 /// Difference between a load found with a model fitted to all others, and its stated values.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LeftOut {
+pub struct LeaveOneOutError {
     /// |F| found minus |F| stated, N.
     pub size_n: f64,
     /// Angle between the two directions, degrees.
@@ -25,19 +25,19 @@ impl Found {
     /// # Errors
     /// When the other loads do not determine the unit's numbers, or a load's picture does not
     /// determine the load.
-    pub fn left_out(&self, problem: &Problem<'_>) -> Result<Vec<LeftOut>> {
+    pub fn left_out(&self, problem: &Problem<'_>) -> Result<Vec<LeaveOneOutError>> {
         let of_load = |(number, load): (usize, &LoadEquations)| {
             let mut others = self.solved.whole.clone();
             others.take(load, -1.0);
             let step = times(&inverse(others.matrix)?, &others.side);
             let parts = load.found(&step)?;
-            let told = &problem.loads[number];
-            let turned = parts[1].hypot(parts[2]) * told.direction_sigma_rad();
-            let sigma_mm = told.place_sigma_mm();
-            Ok(LeftOut {
-                size_n: parts[0] * told.size_n,
+            let known = &problem.loads[number];
+            let turned = parts[1].hypot(parts[2]) * known.direction_sigma_rad();
+            let sigma_mm = known.place_sigma_mm();
+            Ok(LeaveOneOutError {
+                size_n: parts[0] * known.size_n,
                 direction_deg: turned.to_degrees(),
-                place_mm: (told.each_place_mm.is_finite())
+                place_mm: (known.each_place_mm.is_finite())
                     .then(|| [3, 4].map(|k| parts[k] * sigma_mm)),
             })
         };

@@ -95,7 +95,7 @@ impl OwnFilm {
         // Scatter beyond the noise comes from differences that no number describes.
         let scatter_px = problem.bench.noise_px * (found.scatter() - 1.0).sqrt();
         let beside = left.hypot(scatter_px.hypot(mesh_px(problem.family)) / made.focal_px);
-        let covariance = left_open(problem, found, &field, beside)?;
+        let covariance = remaining_covariance(problem, found, &field, beside)?;
         let (sin, cos) = libm::sincos(made.roll_deg.to_radians());
         Ok(Self {
             numbers: problem.found_numbers(found),
@@ -250,7 +250,7 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
 /// Covariances of how the unit's dots move, as the loads leave them open. `beside` is an
 /// independent error of each coordinate at the largest size, focal lengths; it grows in proportion
 /// to size.
-fn left_open(
+fn remaining_covariance(
     problem: &Problem<'_>,
     found: &Found,
     field: &Field<'_>,

@@ -1,0 +1,18 @@
+//! What the device complains about while it is asked.
+
+use crate::output::note;
+use crate::request::show_log;
+use hivtac_host::link::log_text;
+use hivtac_wire::message::{DeviceMessage, LogLevel};
+
+/// Shows a line that the device logs, and keeps a complaint.
+pub fn hear(complaints: &mut Vec<String>, message: DeviceMessage) {
+    match message {
+        DeviceMessage::Log(line) if line.level != LogLevel::Info => {
+            let text = log_text(&line);
+            note(&text);
+            complaints.push(text);
+        }
+        message => show_log(message),
+    }
+}

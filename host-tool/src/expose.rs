@@ -1,0 +1,32 @@
+//! `hivtac expose`: exposure and gain for the light that there is.
+
+use crate::device::Target;
+use crate::output;
+use crate::request::send;
+use clap::Args;
+use hivtac_host::failure::Failure;
+use hivtac_wire::message::Request;
+use serde_json::json;
+
+/// Let the camera find exposure and gain for the light that there is, until it restarts
+///
+/// It does so by itself when it starts. What `settings set` gave it stays.
+///
+/// Example: hivtac expose
+#[derive(Args)]
+pub struct ExposeArguments {
+    #[command(flatten)]
+    target: Target,
+}
+
+/// Has exposure and gain found anew for the light that there is.
+pub fn run(arguments: &ExposeArguments) -> Result<(), Failure> {
+    let Target { device, json } = &arguments.target;
+    let (mut link, _) = device.connect()?;
+    send(&mut link, Request::Expose, device.timeout)?;
+    output::tell(
+        *json,
+        "exposure and gain found; take a new tare",
+        &json!({ "exposed": true }),
+    )
+}

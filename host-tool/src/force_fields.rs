@@ -1,0 +1,129 @@
+//! The fields of a force: the name, the unit and the digits with which terminal, JSON, CSV, the live
+//! page and Python have each.
+
+use crate::decimal::Decimal;
+use Quantity::{Angle, Length, Newtons};
+use hivtac_terms::force::{Force, Place};
+use serde::ser::{Serialize, SerializeMap, Serializer};
+
+/// What a field measures. The wire counts it in thousandths of a degree, in µN or in µm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// Degrees.
+    Angle,
+    /// Newtons.
+    Newtons,
+    /// Millimetres.
+    Length,
+}
+
+impl Quantity {
+    /// The unit that a person reads: a thousand steps of the wire.
+    pub fn unit(self) -> &'static str {
+        match self {
+            Angle => "°",
+            Newtons => "mN",
+            Length => "mm",
+        }
+    }
+
+    /// Digits in the unit of the field's name: all that the wire has.
+    fn decimals(self) -> u32 {
+        match self {
+            Angle | Length => 3,
+            Newtons => 6,
+        }
+    }
+}
+
+/// A field of a force, or of its place.
+pub struct Field<T> {
+    /// In JSON and CSV, with its unit.
+    pub name: &'static str,
+    /// Above a person's column; empty where there is no column.
+    pub symbol: &'static str,
+    /// What it measures.
+    pub quantity: Quantity,
+    integer: fn(&T) -> i64,
+}
+
+/// All fields but the place.
+pub const FORCE: [Field<Force>; 8] = [
+    field("alpha_deg", "α", Angle, |it| it.alpha.0.into()),
+    field("beta_deg", "β", Angle, |it| it.beta.0.into()),
+    field("magnitude_n", "|F|", Newtons, |it| it.magnitude.0.into()),
+    field("x_n", "Fx", Newtons, |it| it.cartesian[0].0.into()),
+    field("y_n", "Fy", Newtons, |it| it.cartesian[1].0.into()),
+    field("z_n", "Fz", Newtons, |it| it.cartesian[2].0.into()),
+    field("direction_sigma_deg", "", Angle, |it| {
+        it.direction_sigma.0.into()
+    }),
+    field("magnitude_sigma_n", "", Newtons, |it| {
+        it.magnitude_sigma.0.into()
+    }),
+];
+
+/// Where the tip touches the film, which not every model tells.
+pub const PLACE: [Field<Place>; 3] = [
+    field("place_x_mm", "place x", Length, |it| it.x.0.into()),
+    field("place_y_mm", "place y", Length, |it| it.y.0.into()),
+    field("place_sigma_mm", "place ±", Length, |it| it.sigma.0.into()),
+];
+
+const fn field<T>(
+    name: &'static str,
+    symbol: &'static str,
+    quantity: Quantity,
+    integer: fn(&T) -> i64,
+) -> Field<T> {
+    Field {
+        name,
+        symbol,
+        quantity,
+        integer,
+    }
+}
+
+impl<T> Field<T> {
+    /// As on the wire.
+    pub fn integer(&self, of: &T) -> i64 {
+        (self.integer)(of)
+    }
+
+    /// In the unit of its name.
+    pub fn decimal(&self, of: &T) -> Decimal {
+        Decimal::new(self.integer(of), self.quantity.decimals())
+    }
+
+    /// In the unit that a person reads.
+    pub fn shown(&self, of: &T) -> Decimal {
+        Decimal::thousandths(self.integer(of))
+    }
+
+    /// In rad, N or m.
+    pub fn si(&self, of: &T) -> f64 {
+        let integer = self.integer(of) as f64;
+        match self.quantity {
+            Angle => (integer / 1e3).to_radians(),
+            Newtons | Length => integer / 1e6,
+        }
+    }
+}
+
+/// A force as JSON: an object of all fields, with `null` for those of a place that is not known.
+pub struct ForceJson(pub Force);
+
+impl Serialize for ForceJson {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let ForceJson(force) = self;
+        let mut fields = serializer.serialize_map(Some(FORCE.len() + PLACE.len()))?;
+        for field in FORCE {
+            fields.serialize_entry(field.name, &field.decimal(force))?;
+        }
+        for field in PLACE {
+            let number = force.place.as_ref().map(|place| field.decimal(place));
+            fields.serialize_entry(field.name, &number)?;
+        }
+        fields.end()
+    }
+}
