@@ -15,6 +15,10 @@ use hivtac_wire::settings::RestPosition;
 pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
 
 /// An order for the pipeline, carried out between two frames. Each is answered with its `id`.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "nothing is allocated: what is large lies in the queue"
+)]
 pub enum Order {
     /// Use this threshold and its pixel format as soon as possible.
     SetThreshold {

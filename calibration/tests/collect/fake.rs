@@ -196,7 +196,7 @@ fn tared() -> TareReport {
             centroid: CentroidEstimator::BinaryMask,
             markers: markers([0.0; 3]),
             rect_center: (Px(160 << 16), Px(120 << 16)),
-            rect_area: Q::from_bits(88 * 88 << 16),
+            rect_area: Q::from_bits((88 * 88) << 16),
             down: Some(Direction([0, 0, -1000])),
         },
         spread: Px(0),
