@@ -1,4 +1,4 @@
-//! `hivtac check`: rate, jitter, losses and latency, held against limits.
+//! `hivtac check`: measures rate, jitter, losses and latency, and compares them with limits.
 
 use crate::device::{Device, seconds};
 use crate::output::{self, note};
@@ -32,7 +32,7 @@ pub struct CheckArguments {
     json: bool,
 }
 
-/// Measures, prints what came of it, and says which limit failed: the rate before the losses.
+/// Measures, prints the results and names the first limit that failed: rate before losses.
 pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     let (mut link, _) = arguments.device.connect()?;
     let mut measured = Measured::default();
@@ -43,17 +43,18 @@ pub fn run(arguments: &CheckArguments) -> Result<(), Failure> {
     report.judge(arguments)
 }
 
-/// What came, and when.
+/// The measurements: each sample's and the device's counters.
 #[derive(Default)]
 struct Measured {
     tally: Tally,
     first_us: Option<u64>,
-    /// The newest: its sequence number, device time, µs, and arrival.
+    /// Of the newest sample: sequence number, device time (µs) and arrival.
     last: Option<(u32, u64, Instant)>,
     samples: u64,
-    /// How much later or earlier each came after the one before than it was exposed, ms.
+    /// For each sample: by how much the time between two arrivals and that between their exposures
+    /// differ, ms.
     jitter_ms: Vec<f64>,
-    /// What the device said of its latency, µs.
+    /// Latencies that the device reported, µs.
     latency_us: Vec<u32>,
 }
 
@@ -131,7 +132,8 @@ impl Measured {
     }
 }
 
-/// The value below which so large a part of sorted ones lies.
+/// The value below which the part `part` (0 to 1) of sorted values lies; `None` if there are no
+/// values.
 fn part(sorted: &[f64], part: f64) -> Option<f64> {
     let last = sorted.len().checked_sub(1)?;
     sorted.get((part * last as f64).round() as usize).copied()
@@ -145,7 +147,7 @@ struct Report {
     jitter_p99_ms: Option<f64>,
     lost: u64,
     causes: BTreeMap<&'static str, u64>,
-    /// The largest that the device told.
+    /// The largest latency that the device reported, ms.
     latency_ms: Option<f64>,
 }
 

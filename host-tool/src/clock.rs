@@ -1,11 +1,11 @@
-//! When a frame was exposed, on this computer's clock.
+//! Converts a device's time of exposure to this computer's clock.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// How fast the two clocks may run apart, as a part of the time: more than quartz crystals do.
+/// Inverse of the largest difference between the rates of the two clocks: 1 in 10,000, which is
+/// more than quartz crystals have.
 const DRIFT: u64 = 10_000;
-/// A sample is never later than this, ns, unless one of the clocks was set, or the device started
-/// anew.
+/// Largest delay of a sample, ns. A longer one means that a clock was set or the device restarted.
 const LATEST_NS: u64 = 1_000_000_000;
 
 /// This computer's time, ns since 1970.
@@ -14,18 +14,18 @@ pub fn now_ns() -> u64 {
     since.unwrap_or_default().as_nanos() as u64
 }
 
-/// Turns a device's time into this computer's: by the sample that came soonest after its frame, as
-/// far as clocks let that be known, so that what delays single samples moves no stamp.
+/// Converts device time to this computer's time. The offset comes from the sample with the shortest
+/// delay, allowing for drift, and delays of single samples do not change it.
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
-    /// Of the sample before: device time, µs, and how far this computer's clock is ahead of the
-    /// device's, ns.
+    /// Of the sample before: device time (µs), and offset of this computer's clock from the
+    /// device's (ns).
     last: Option<(u64, i128)>,
 }
 
 impl Clock {
-    /// When a frame was exposed, ns since 1970, by its device time, µs, and when its sample came,
-    /// ns since 1970. Never later than that.
+    /// Time of exposure, ns since 1970, from the device time (µs) and the sample's arrival (ns
+    /// since 1970). Never later than the arrival.
     pub fn stamp_ns(&mut self, device_us: u64, came_ns: u64) -> u64 {
         let device_ns = i128::from(device_us) * 1_000;
         let seen = i128::from(came_ns) - device_ns;
@@ -52,8 +52,8 @@ mod tests {
     const START: u64 = 1_700_000_000_000_000_000;
     const FRAME_US: u64 = 6_405;
 
-    /// Samples of a device whose clock runs so much faster, in parts of a million, each delayed by
-    /// up to 8 ms; gives by how much stamps are off in the end, ns.
+    /// Sends `frames` samples of a device whose clock is `parts` millionths fast, each delayed by
+    /// up to 8 ms. Returns the last stamp's error, ns.
     fn error_ns(parts: i64, frames: u64) -> i64 {
         let mut clock = Clock::default();
         let mut error = 0;

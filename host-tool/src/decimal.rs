@@ -1,4 +1,4 @@
-//! Decimal fractions printed exactly from integers, so that readers can compare them bit for bit.
+//! Prints decimal fractions exactly from integers, for bit-exact comparison by readers.
 
 use serde::{Serialize, Serializer};
 use serde_json::value::RawValue;
@@ -13,13 +13,13 @@ pub struct Decimal {
 }
 
 impl Decimal {
-    /// Of an integer of the wire; beyond 2⁶³ (292,000 years in µs) it stays at 2⁶³ − 1.
+    /// From an integer of the wire format; values above 2⁶³ (292,000 years in µs) become 2⁶³ − 1.
     pub fn new(integer: impl TryInto<i64>, decimals: u32) -> Decimal {
         let integer = integer.try_into().unwrap_or(i64::MAX);
         Decimal { integer, decimals }
     }
 
-    /// Thousandths of a degree in degrees, µN in mN, µm in mm.
+    /// From thousandths of a degree, µN or µm: a decimal in degrees, mN or mm.
     pub fn thousandths(integer: impl TryInto<i64>) -> Decimal {
         Decimal::new(integer, 3)
     }
@@ -35,7 +35,7 @@ impl fmt::Display for Decimal {
             size % unit,
             width = self.decimals as usize
         );
-        // Pads to the width the caller wants, sign included.
+        // Pads to the caller's width, sign included.
         f.pad(&if self.integer < 0 {
             format!("-{digits}")
         } else {

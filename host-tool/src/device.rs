@@ -1,4 +1,4 @@
-//! Which devices a command is for, on the command line.
+//! Command-line arguments that select the devices of a command.
 
 use clap::Args;
 use hivtac_host::failure::Failure;
@@ -48,7 +48,7 @@ pub struct Target {
 }
 
 impl Device {
-    /// Where it is.
+    /// The device's address.
     pub fn address(&self) -> Result<Address, Failure> {
         match (&self.port, &self.device) {
             (Some(port), _) => Ok(Address::parse(port)),
@@ -57,14 +57,14 @@ impl Device {
         }
     }
 
-    /// A connection to it, and its hello.
+    /// Connects to the device; returns the connection and the device's hello.
     pub fn connect(&self) -> Result<(Link, DeviceHello), Failure> {
         Link::connect(&self.address()?, self.timeout)
     }
 }
 
 impl Devices {
-    /// Where they are.
+    /// The addresses of the devices.
     pub fn addresses(&self) -> Result<Vec<Address>, Failure> {
         if self.port.is_empty() && self.device.is_empty() {
             return Ok(vec![Address::Find]);
@@ -74,7 +74,7 @@ impl Devices {
         ports.chain(self.device.iter().map(named)).collect()
     }
 
-    /// A connection to each of these addresses, and each one's hello.
+    /// Connects to each of these addresses; returns the connections and the devices' hellos.
     pub fn connect(&self, addresses: &[Address]) -> Result<(Vec<Link>, Vec<DeviceHello>), Failure> {
         let connect = |address| Link::connect(address, self.timeout);
         let connected: Result<Vec<_>, _> = addresses.iter().map(connect).collect();

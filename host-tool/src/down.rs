@@ -1,17 +1,17 @@
-//! Which way a sensor is held, in numbers and in words.
+//! Direction of gravity on a sensor, in numbers and in words.
 
 use hivtac_terms::down::{Direction, Down};
 
-/// The direction of a vector of any length, in the film's frame: x right and y down in the image, z
-/// away from the camera.
+/// The direction of a vector of any length. The film's frame has x right and y down in the image,
+/// and z away from the camera.
 ///
 /// # Errors
-/// When it has no direction.
+/// When the vector is zero or not finite.
 pub fn direction(vector: [f64; 3]) -> Result<Direction, String> {
     let largest = vector
         .iter()
         .fold(0.0_f64, |most, part| most.max(part.abs()));
-    // Not NaN, either.
+    // Rejects NaN, too.
     if !(largest > 0.0 && vector.iter().all(|part| part.is_finite())) {
         let [x, y, z] = vector;
         return Err(format!(
@@ -25,7 +25,7 @@ pub fn direction(vector: [f64; 3]) -> Result<Direction, String> {
     ))
 }
 
-/// What is known of gravity, for a person.
+/// Text for a person about the direction of gravity.
 pub fn text(down: Down) -> String {
     match down {
         Down::Fixed => "fixed, as when the tare was taken".to_owned(),

@@ -1,4 +1,4 @@
-//! `hivtac expose`: exposure and gain for the light that there is.
+//! `hivtac expose`: fits exposure and gain to the present light.
 
 use crate::device::Target;
 use crate::output;
@@ -19,7 +19,7 @@ pub struct ExposeArguments {
     target: Target,
 }
 
-/// Has exposure and gain found anew for the light that there is.
+/// Sends the command that fits exposure and gain to the present light.
 pub fn run(arguments: &ExposeArguments) -> Result<(), Failure> {
     let Target { device, json } = &arguments.target;
     let (mut link, _) = device.connect()?;

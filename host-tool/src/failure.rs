@@ -1,28 +1,27 @@
-//! The one error type of the tool: what went wrong, where, what to do, and the exit code it ends
-//! with.
+//! The tool's error type: what went wrong, where, what to do, and the exit code.
 
 use std::fmt;
 
-/// The kind of a failure; decides the exit code (`hivtac --help`).
+/// The kind of a failure, which sets the exit code (`hivtac --help`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// A file, an image or an argument is not usable.
+    /// A file, an image or an argument cannot be used.
     Input,
-    /// An option that cannot be used so, or that this program was built without.
+    /// An option that cannot be used this way, or that this build lacks.
     Usage,
-    /// No device: none found, the port cannot be opened, or nobody answers.
+    /// No device: not found, its port cannot be opened, or it does not answer.
     NoDevice,
     /// The device speaks another version of the protocol.
     Version,
     /// The connection was lost.
     Lost,
-    /// The device refused a command, or did not answer it.
+    /// The device refused a command or did not answer it.
     Refused,
     /// Fewer samples a second than asked for.
     Rate,
     /// More frames lost than allowed.
     Loss,
-    /// Something about the sensor is not right.
+    /// Something about the sensor is wrong.
     NotRight,
     /// Ctrl-C or a termination signal.
     Interrupted,
@@ -43,7 +42,7 @@ impl Kind {
         Kind::Interrupted,
     ];
 
-    /// What its exit code means.
+    /// The meaning of its exit code.
     pub fn meaning(self) -> &'static str {
         match self {
             Kind::Input => "a file, a picture or the output cannot be used",
@@ -81,7 +80,7 @@ impl Kind {
 /// A failure with its message for a person.
 #[derive(Debug)]
 pub struct Failure {
-    /// What kind it is.
+    /// Its kind.
     pub kind: Kind,
     message: String,
 }
@@ -95,12 +94,12 @@ impl Failure {
         }
     }
 
-    /// A file, an image or an argument is not usable.
+    /// A file, an image or an argument that cannot be used.
     pub fn input(message: impl Into<String>) -> Failure {
         Failure::new(Kind::Input, message)
     }
 
-    /// A file is not usable, and why.
+    /// A file that cannot be used, with the reason.
     pub fn of_file(path: &str, why: impl fmt::Display) -> Failure {
         Failure::input(format!("{path}: {why}"))
     }
@@ -118,7 +117,7 @@ impl std::error::Error for Failure {}
 mod tests {
     use super::*;
 
-    /// As many as the enumeration has, each with another code.
+    /// `ALL` has each kind of the enumeration, with an exit code of its own.
     #[test]
     fn all_kinds_are_listed() {
         let source = include_str!("failure.rs");

@@ -1,4 +1,4 @@
-//! What was found in a picture, for people and as JSON.
+//! What the sensing found in a picture, as text and as JSON.
 
 use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
@@ -10,7 +10,7 @@ use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
-/// Everything found in one picture. Positions in pixels, exact: 16 binary digits after the point.
+/// Everything found in one picture. Positions are in pixels, exact, with 16 binary places.
 #[derive(Serialize)]
 pub struct Finding<'a> {
     image: &'a str,
@@ -49,7 +49,7 @@ pub struct MarkerJson {
 }
 
 impl MarkerJson {
-    /// The four of a sample.
+    /// The four markers of a sample.
     pub fn all(markers: &[Marker; 4]) -> Vec<MarkerJson> {
         let markers = markers.iter().enumerate();
         markers
@@ -206,7 +206,7 @@ impl<'a> Finding<'a> {
         ))
     }
 
-    /// Of a force; a dash when the model does not tell the place.
+    /// The line for a force's place; a dash if the model gives no place. `None` without a force.
     fn place_line(&self) -> Option<String> {
         let ForceJson(force) = self.force.as_ref()?;
         Some(match &force.place {

@@ -1,4 +1,4 @@
-//! `hivtac update firmware`: the device into its own loader, and what came back.
+//! `hivtac update firmware`: starts the device's own loader, and checks the firmware afterwards.
 
 use crate::device::{Device, seconds};
 use crate::output::{note, tell};
@@ -15,11 +15,11 @@ use serde_json::json;
 use std::ops::Range;
 use std::time::{Duration, Instant};
 
-/// The first bank of the flash, which has the program.
+/// The flash's first bank, which holds the program.
 const FLASH: Range<u32> = 0x0800_0000..0x0810_0000;
-/// Where the stack may begin.
+/// Range of a valid initial stack pointer.
 const DTCM: Range<u32> = 0x2000_0000..0x2002_0001;
-/// Between two looks for the device.
+/// Time between two searches for the device.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 
 /// Restart the device into its own loader (USB DFU), say how to send it firmware, and wait for
@@ -45,11 +45,11 @@ pub struct FirmwareArguments {
     json: bool,
 }
 
-/// Starts the loader, says what to do, and waits until the device is back.
+/// Starts the loader, prints what to do, and waits until the device is back.
 ///
 /// # Errors
-/// A file that is no program for the device, before anything is asked of it; what it refuses;
-/// [`Kind::NoDevice`] when it does not come back.
+/// When the file is not a program for the device, which is checked before anything is sent; when
+/// the device refuses; [`Kind::NoDevice`] when it does not come back.
 pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
     let FirmwareArguments {
         device,
@@ -76,7 +76,8 @@ pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
     )
 }
 
-/// The command that sends the file to the loader: to the start of the flash, which is then left.
+/// The command that sends the file to the loader: to the start of the flash, then leaves the
+/// loader.
 fn dfu_util(path: &str) -> String {
     let path = path.replace('\'', "'\\''");
     format!("dfu-util -d 0483:df11 -a 0 -s 0x08000000:leave -D '{path}'")
@@ -91,7 +92,8 @@ fn check(path: &str) -> Result<(), Failure> {
     program(&bytes).map_err(|why| wrong(why.to_owned()))
 }
 
-/// Whether these bytes begin as a program does: with its stack and its first instruction.
+/// Checks that the bytes begin as a program does: with its initial stack pointer and its entry
+/// point.
 fn program(bytes: &[u8]) -> Result<(), &'static str> {
     if bytes.starts_with(b"\x7fELF") {
         return Err("an ELF; make a binary of it with `arm-none-eabi-objcopy -O binary`");
@@ -109,7 +111,7 @@ fn program(bytes: &[u8]) -> Result<(), &'static str> {
     }
 }
 
-/// The hello of the same device, once it is there again.
+/// Waits for the same device to come back; returns its hello.
 fn come_back(
     address: &Address,
     patience: Duration,

@@ -1,4 +1,4 @@
-//! A device that is followed through as many connections as it takes.
+//! Follows a device through as many connections as necessary.
 
 use crate::output::note;
 use hivtac_host::failure::{Failure, Kind};
@@ -9,41 +9,41 @@ use hivtac_wire::decoder::Rejected;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
 use std::time::{Duration, Instant};
 
-/// Time between two turns of the follower.
+/// Time between two calls of [`Follower::turn`] while there is no device.
 const TURN_EVERY: Duration = Duration::from_millis(20);
 /// Time between two attempts to connect again.
 pub const RETRY_EVERY: Duration = Duration::from_millis(500);
-/// Silence after which the device is asked whether it is still there.
+/// Silence after which the device is asked whether the conversation still exists.
 pub const SILENCE: Duration = Duration::from_secs(5);
 
-/// Whom everything about a device is told.
+/// Receives everything that happens with a device.
 pub trait Follower {
-    /// The device said something.
+    /// A message of the device arrived.
     fn message(&mut self, message: DeviceMessage);
 
-    /// The connection was lost; what its decoder threw away.
+    /// The connection was lost, with what its decoder rejected.
     fn lost(&mut self, failure: Failure, rejected: Rejected);
 
-    /// The device is there again.
+    /// The device is connected again.
     fn connected_again(&mut self, hello: DeviceHello);
 
-    /// No samples come though nothing is lost, and why.
+    /// Samples are missing although the connection stands; `why` is the reason.
     fn trouble(&mut self, why: String);
 
-    /// Does what there is to do besides, with the device while it is there. True when the device
-    /// was asked something, and answered.
+    /// Does the follower's own work, with the device while it is connected. True if the device
+    /// answered a request.
     ///
     /// # Errors
-    /// That the connection was lost.
+    /// When the connection was lost.
     fn turn(&mut self, link: Option<&mut Link>) -> Result<bool, Failure>;
 }
 
-/// Follows a device that is connected already, until the program is interrupted.
+/// Follows a connected device until the program is interrupted.
 pub fn follow(address: &Address, patience: Duration, link: Link, follower: &mut impl Follower) {
     let mut connected = Some(link);
     while !stop::requested() {
         let Some(mut link) = connected.take() else {
-            // Long enough for a person to see that it was lost.
+            // Long enough for a person to notice the loss.
             wait(follower);
             connected = connect(address, patience, follower);
             continue;
@@ -54,7 +54,7 @@ pub fn follow(address: &Address, patience: Duration, link: Link, follower: &mut 
     }
 }
 
-/// Says that a device is there again, since when it was lost.
+/// Prints that a device is connected again, and how long it was away.
 pub fn note_connected_again(port: &str, lost: Instant) {
     let seconds = lost.elapsed().as_secs_f32();
     note(&format!(
@@ -62,11 +62,11 @@ pub fn note_connected_again(port: &str, lost: Instant) {
     ));
 }
 
-/// Time without a device.
+/// Waits [`RETRY_EVERY`] without a device.
 fn wait(follower: &mut impl Follower) {
     let end = Instant::now() + RETRY_EVERY;
     while !stop::requested() && Instant::now() < end {
-        // There is no connection that could be lost.
+        // Without a connection there is no loss to report.
         let _ = follower.turn(None);
         std::thread::sleep(TURN_EVERY);
     }
@@ -78,7 +78,7 @@ fn connect(address: &Address, patience: Duration, follower: &mut impl Follower) 
             follower.connected_again(hello);
             Some(link)
         }
-        // What was lost is told already; another release of the firmware is news.
+        // The loss was reported already; another firmware release was not.
         Err(failure) if failure.kind == Kind::Version => {
             follower.trouble(failure.to_string());
             None
@@ -87,7 +87,7 @@ fn connect(address: &Address, patience: Duration, follower: &mut impl Follower) 
     }
 }
 
-/// One connection, from the start of samples to its loss.
+/// One connection, from its start of samples to its loss.
 fn converse(
     link: &mut Link,
     patience: Duration,
@@ -114,7 +114,7 @@ fn converse(
     }
 }
 
-/// Finds out whether a silent device still knows of this conversation.
+/// Checks whether a silent device still takes part in this conversation.
 fn probe(link: &mut Link, patience: Duration, follower: &mut impl Follower) -> Result<(), Failure> {
     let asked = link.request(Request::GetInfo, patience, |message| {
         follower.message(message)

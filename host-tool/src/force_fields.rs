@@ -1,5 +1,4 @@
-//! The fields of a force: the name, the unit and the digits with which terminal, JSON, CSV, the live
-//! page and Python have each.
+//! The fields of a force: name, unit and digits for terminal, JSON, CSV, live page and Python.
 
 use crate::decimal::Decimal;
 use Quantity::{Angle, Length, Newtons};
@@ -18,7 +17,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// The unit that a person reads: a thousand steps of the wire.
+    /// The unit for a person: a thousand steps of the wire format.
     pub fn unit(self) -> &'static str {
         match self {
             Angle => "°",
@@ -27,7 +26,7 @@ impl Quantity {
         }
     }
 
-    /// Digits in the unit of the field's name: all that the wire has.
+    /// Decimals in the unit of the field's name: all that the wire format has.
     fn decimals(self) -> u32 {
         match self {
             Angle | Length => 3,
@@ -38,16 +37,16 @@ impl Quantity {
 
 /// A field of a force, or of its place.
 pub struct Field<T> {
-    /// In JSON and CSV, with its unit.
+    /// Its name in JSON and CSV, with the unit.
     pub name: &'static str,
-    /// Above a person's column; empty where there is no column.
+    /// Its column heading for a person; empty if it has no column.
     pub symbol: &'static str,
-    /// What it measures.
+    /// Its quantity.
     pub quantity: Quantity,
     integer: fn(&T) -> i64,
 }
 
-/// All fields but the place.
+/// All fields except the place.
 pub const FORCE: [Field<Force>; 8] = [
     field("alpha_deg", "α", Angle, |it| it.alpha.0.into()),
     field("beta_deg", "β", Angle, |it| it.beta.0.into()),
@@ -63,7 +62,7 @@ pub const FORCE: [Field<Force>; 8] = [
     }),
 ];
 
-/// Where the tip touches the film, which not every model tells.
+/// The place where the tip touches the film; some models do not give it.
 pub const PLACE: [Field<Place>; 3] = [
     field("place_x_mm", "place x", Length, |it| it.x.0.into()),
     field("place_y_mm", "place y", Length, |it| it.y.0.into()),
@@ -85,22 +84,22 @@ const fn field<T>(
 }
 
 impl<T> Field<T> {
-    /// As on the wire.
+    /// Its integer of the wire format.
     pub fn integer(&self, of: &T) -> i64 {
         (self.integer)(of)
     }
 
-    /// In the unit of its name.
+    /// Its value in the unit of its name.
     pub fn decimal(&self, of: &T) -> Decimal {
         Decimal::new(self.integer(of), self.quantity.decimals())
     }
 
-    /// In the unit that a person reads.
+    /// Its value in the unit for a person.
     pub fn shown(&self, of: &T) -> Decimal {
         Decimal::thousandths(self.integer(of))
     }
 
-    /// In rad, N or m.
+    /// Its value in rad, N or m.
     pub fn si(&self, of: &T) -> f64 {
         let integer = self.integer(of) as f64;
         match self.quantity {
@@ -110,7 +109,7 @@ impl<T> Field<T> {
     }
 }
 
-/// A force as JSON: an object of all fields, with `null` for those of a place that is not known.
+/// A force as a JSON object of all fields; those of an unknown place are `null`.
 pub struct ForceJson(pub Force);
 
 impl Serialize for ForceJson {

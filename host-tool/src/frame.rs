@@ -1,4 +1,4 @@
-//! A frame of the device as it was captured: taking a snapshot, and its pixels.
+//! Takes a snapshot: one frame as the device captured it, with its pixels.
 
 use crate::failure::{Failure, Kind};
 use crate::link::{Link, judge};
@@ -7,11 +7,11 @@ use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample, Snapshot, Sn
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// What the device itself waits for a whole frame.
+/// Longest time that the device itself waits for a whole frame.
 const DEVICE_PATIENCE: Duration = Duration::from_secs(2);
-/// Samples that are kept until it is known which frame is meant: more than pass meanwhile.
+/// Samples that are kept until the snapshot's frame number is known: more than arrive meanwhile.
 const SAMPLES_KEPT: usize = 64;
-/// Columns and rows of the largest frame that is believed.
+/// Most columns and rows of a valid frame.
 const LARGEST_SIDE: u16 = 800;
 
 /// A frame, pixel for pixel as the sensing read it.
@@ -25,14 +25,14 @@ pub struct Frame {
     pub width: u16,
     /// Rows, px.
     pub height: u16,
-    /// What it was read with, and with that its pixel format.
+    /// The threshold it was read with, which implies its pixel format.
     pub threshold: Threshold,
     /// All rows from the top, as the camera sent them.
     pub bytes: Vec<u8>,
 }
 
 impl Frame {
-    /// A frame of which no byte has come.
+    /// A frame without bytes yet; an error when its size is invalid or does not fit its length.
     fn announced(header: &Snapshot) -> Result<Frame, String> {
         let frame = Frame {
             number: header.frame,
@@ -59,7 +59,7 @@ impl Frame {
         }
     }
 
-    /// Bytes that it has when it is whole.
+    /// Its length when it is whole, bytes.
     fn length(&self) -> usize {
         2 * self.format().row_length(self.width) * usize::from(self.height)
     }
@@ -69,8 +69,8 @@ impl Frame {
         self.threshold.format()
     }
 
-    /// Its rows as the sensing takes them on this computer: RGB565 in native order, the others as
-    /// they lie in the device's memory.
+    /// Its rows as the sensing takes them on this computer: RGB565 in native order, the other
+    /// formats as in the device's memory.
     pub fn pixels(&self) -> Vec<u16> {
         pixels(self.format(), &self.bytes)
     }
@@ -88,7 +88,7 @@ impl Frame {
     }
 }
 
-/// Rows of a format, as a camera sends them, as the sensing takes them on this computer.
+/// Converts a camera's bytes of this format to the rows that the sensing takes on this computer.
 pub fn pixels(format: PixelFormat, bytes: &[u8]) -> Vec<u16> {
     let pairs = bytes.as_chunks().0.iter();
     match format {
@@ -99,21 +99,21 @@ pub fn pixels(format: PixelFormat, bytes: &[u8]) -> Vec<u16> {
     }
 }
 
-/// A frame, and what the device itself made of it: nothing when it does not stream.
+/// A frame with the device's sample of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Taken {
     /// The frame.
     pub frame: Frame,
-    /// Its sample.
+    /// Its sample; `None` if the device does not stream.
     pub sample: Option<Sample>,
 }
 
-/// Has the device send its next whole frame, and waits for it; every other message goes to `other`.
-/// The device's patience comes on top of `patience`, the longest time without a message of it.
+/// Requests the device's next whole frame and waits for it; all other messages go to `other`. The
+/// longest silence is `patience`, plus the device's own patience before the first message.
 ///
 /// # Errors
-/// [`Kind::Refused`] when the device cannot or does not answer; [`Kind::Lost`] when a part was
-/// damaged on the way; those of [`Link::receive`].
+/// [`Kind::Refused`] when the device cannot send a frame or does not answer; [`Kind::Lost`] when a
+/// part was damaged on the way; those of [`Link::receive`].
 pub fn take(
     link: &mut Link,
     patience: Duration,
@@ -153,7 +153,7 @@ fn damaged(why: &str) -> Failure {
     )
 }
 
-/// What has come so far.
+/// The parts received until now.
 #[derive(Default)]
 struct Collected {
     frame: Option<Frame>,
@@ -184,7 +184,7 @@ impl Collected {
         self.samples.push_back(sample);
     }
 
-    /// The frame, once the device says that this was all.
+    /// The frame, once the device has sent the last part.
     fn whole(self, outcome: Outcome) -> Result<Taken, Failure> {
         if outcome == Outcome::NoGoodFrames {
             let message = "the device has no whole frame to send: its camera sent none for 2 s; \
@@ -233,7 +233,7 @@ mod tests {
         }
     }
 
-    /// What comes of these messages, or what is said of them.
+    /// The frame of these messages, or the error's text.
     fn collect(messages: &[DeviceMessage], outcome: Outcome) -> Result<Taken, String> {
         let mut collected = Collected::default();
         (0..80).for_each(|number| collected.remember(sample(number / 8)));

@@ -1,5 +1,4 @@
-//! `hivtac self-test`: what the device finds when it looks at itself and its camera, each with its
-//! code.
+//! `hivtac self-test`: what the device finds when it tests itself and its camera, with codes.
 
 use crate::device::Device;
 use crate::output;
@@ -13,7 +12,7 @@ use hivtac_wire::message::{DeviceMessage, Request};
 use serde::Serialize;
 use std::time::Duration;
 
-/// What a device says of itself.
+/// A device's report on its own state, for people and as JSON.
 #[derive(Serialize)]
 pub struct Told {
     reset: &'static str,
@@ -24,7 +23,7 @@ pub struct Told {
     at_start: Vec<&'static str>,
 }
 
-/// What a self-test found.
+/// The result of a self-test.
 #[derive(Serialize)]
 struct Report {
     device_id: String,
@@ -40,7 +39,7 @@ struct Found {
 }
 
 impl Told {
-    /// By its message.
+    /// From the device's message.
     pub fn of(health: &Health) -> Told {
         Told {
             reset: reset_name(health.reset),
@@ -52,7 +51,7 @@ impl Told {
         }
     }
 
-    /// For a person.
+    /// Lines for a person.
     pub fn lines(&self) -> Vec<String> {
         let temperature = match self.temperature_c {
             Some(temperature) => format!("{temperature:.1} °C"),
@@ -91,10 +90,10 @@ pub struct SelfTestArguments {
     json: bool,
 }
 
-/// Has the device look at itself, and prints what it finds.
+/// Has the device test itself, and prints the result.
 ///
 /// # Errors
-/// [`Kind::NotRight`] when something is not right; those of [`Link::connect`].
+/// [`Kind::NotRight`] when something is wrong; those of [`Link::connect`].
 pub fn run(arguments: &SelfTestArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
     let health = ask(&mut link, arguments.device.timeout)?;
@@ -124,10 +123,10 @@ pub fn run(arguments: &SelfTestArguments) -> Result<(), Failure> {
     }
 }
 
-/// What the device says of itself.
+/// Asks the device for its health.
 ///
 /// # Errors
-/// What it refuses.
+/// When the device refuses or does not answer.
 pub fn ask(link: &mut Link, patience: Duration) -> Result<Health, Failure> {
     let mut health = None;
     link.request(Request::GetHealth, patience, |message| match message {

@@ -1,4 +1,4 @@
-//! What the tool says of itself: exit codes, completions for shells, and man pages.
+//! The tool's help: exit codes, completions for shells, and man pages.
 
 use crate::output::{note, print};
 use clap::{Args, Command};
@@ -24,7 +24,7 @@ pub struct ManArguments {
     folder: PathBuf,
 }
 
-/// The command line with the exit codes in the help of each command.
+/// Adds the exit codes to the help of each command.
 pub fn with_help(command: Command) -> Command {
     let codes = exit_codes();
     with_exit_codes(command, &codes).after_help(codes)
@@ -41,7 +41,7 @@ fn with_exit_codes(command: Command, codes: &str) -> Command {
     })
 }
 
-/// Each code with what it means, lowest first.
+/// Each exit code with its meaning, lowest first.
 fn exit_codes() -> String {
     let done = "done; also when the reader of the output went away (broken pipe)".to_owned();
     let mut codes = vec![(0, done)];
@@ -53,7 +53,7 @@ fn exit_codes() -> String {
     format!("Exit codes:{}", lines.collect::<String>())
 }
 
-/// Prints what a shell completes this tool's commands by.
+/// Prints the completion script for a shell.
 pub fn completion(arguments: &CompletionArguments, mut command: Command) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(arguments.shell, &mut command, "hivtac", &mut script);
@@ -61,7 +61,7 @@ pub fn completion(arguments: &CompletionArguments, mut command: Command) -> Resu
     print(script.trim_end()).map(|_| ())
 }
 
-/// Writes a man page of each command into a folder, which is made when it is missing.
+/// Writes a man page of each command into a folder, which is made if it is missing.
 pub fn man(arguments: &ManArguments, command: Command) -> Result<(), Failure> {
     let folder = &arguments.folder;
     let failed = |error| {
@@ -83,10 +83,10 @@ mod tests {
     use crate::command;
     use std::path::Path;
 
-    /// Commands that write files or a script, and say nothing that a program would read.
+    /// Commands that write files or a script, and print nothing for a program.
     const SILENT: [&str; 2] = ["hivtac completion", "hivtac man"];
 
-    /// Every command that does something, with its whole name.
+    /// Every command that has no subcommands, with its full name.
     fn doing() -> Vec<(String, Command)> {
         let mut all = Vec::new();
         let mut left = vec![(String::from("hivtac"), command())];
@@ -101,7 +101,7 @@ mod tests {
         all
     }
 
-    /// The example in its long help.
+    /// The example in a command's long help.
     fn example(command: &Command) -> Option<String> {
         let text = command.get_long_about()?.to_string();
         let line = text.lines().find_map(|line| line.strip_prefix("Example: "));
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// With what it printed, in a block of its own or after another command.
+    /// With its output, in a block of its own or after another command.
     #[test]
     fn every_command_is_shown_in_the_guide() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();

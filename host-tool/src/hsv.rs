@@ -1,12 +1,12 @@
-//! Thresholds on the command line.
+//! Reads thresholds from the command line.
 
 use hivtac_terms::threshold::HsvBox;
 use hivtac_terms::threshold::Mono;
 
-/// Highest hue, saturation and value, each twice.
+/// Largest hue, saturation and value, each for both bounds.
 const HIGHEST: [u8; 6] = [179, 179, 255, 255, 255, 255];
 
-/// From `h0,h1,s0,s1,v0,v1` in OpenCV's 8-bit HSV (hue 0–179, h0 > h1 wraps through 0).
+/// Reads `h0,h1,s0,s1,v0,v1` in OpenCV's 8-bit HSV (hue 0–179, h0 > h1 wraps through 0).
 pub fn parse(text: &str) -> Result<HsvBox, String> {
     let fields: Vec<&str> = text.split(',').collect();
     let fields = <[&str; 6]>::try_from(fields).map_err(|fields| {
@@ -25,7 +25,7 @@ pub fn parse(text: &str) -> Result<HsvBox, String> {
     Ok(box_)
 }
 
-/// From `l0,l1`: lowest and highest luma.
+/// Reads `l0,l1`: lowest and highest luma.
 pub fn parse_luma(text: &str) -> Result<Mono, String> {
     let (low, high) = text
         .split_once(',')

@@ -1,4 +1,4 @@
-//! `hivtac info`: what the device is and how it fares.
+//! `hivtac info`: the device's identity, settings and counters.
 
 use crate::device::Device;
 use crate::health::{self, Told};
@@ -47,7 +47,7 @@ pub fn run(arguments: &InfoArguments) -> Result<(), Failure> {
     output::report(arguments.json, &info, || info.lines().join("\n")).map(|_| ())
 }
 
-/// The hello anew, and the counters.
+/// Asks for the hello again, and for the counters.
 pub fn ask(
     link: &mut Link,
     patience: Duration,
@@ -63,7 +63,7 @@ pub fn ask(
     Ok((hello, stats))
 }
 
-/// What a device is and how it fares.
+/// A device's identity, settings and counters.
 #[derive(Serialize)]
 pub struct Info<'a> {
     port: &'a str,
@@ -83,10 +83,10 @@ pub struct Info<'a> {
     centroid: CentroidEstimator,
     filter: FilterJson,
     stats: Option<Stats>,
-    /// `None` in what does not ask for it.
+    /// `None` for callers that do not show it.
     #[serde(skip_serializing_if = "Option::is_none")]
     tare: Option<Tare>,
-    /// Likewise.
+    /// `None` for callers that do not show it.
     #[serde(skip_serializing_if = "Option::is_none")]
     health: Option<Told>,
 }
@@ -96,11 +96,11 @@ pub struct Info<'a> {
 struct Tare {
     taken: bool,
     kept: bool,
-    /// How far it is from the kept one, px.
+    /// Distance from the kept rest position, px.
     drift_px: Option<f64>,
-    /// How far re-zeroing moved it since it was taken, px.
+    /// Distance that re-zeroing moved it since it was taken, px.
     rezeroed_px: f64,
-    /// How far from it the untouched film was seen last, px.
+    /// Distance from it of the untouched film when last seen, px.
     seen_px: Option<f64>,
 }
 
@@ -142,7 +142,7 @@ pub struct Model<'a> {
 }
 
 impl<'a> Model<'a> {
-    /// As a device names it.
+    /// From the identity that a device sends.
     pub fn of(model: &'a ModelIdentity) -> Model<'a> {
         Model {
             crc: format!("{:08x}", model.crc),
