@@ -1,10 +1,10 @@
-//! A conversation with a HiVTac sensor, for programs on the host: where it is ([`port`]), what is
-//! said ([`link`]), which sensor a name means ([`named`]), which way it is held ([`down`]), how it
-//! fails ([`failure`]), its pictures
-//! ([`frame`], [`look`]) and those in files ([`picture`], [`raw`], [`files`]), what its thresholds
-//! say ([`threshold`]), how its forces ([`force_fields`], [`decimal`])
-//! and texts ([`shown`]) are written, a live page of it ([`page`]), what was
-//! recorded of it ([`recording`]), and how a program is interrupted ([`stop`]).
+//! A library for programs that communicate with a HiVTac sensor from a host.
+//!
+//! Connection: addresses ([`port`]), conversation ([`link`]), sensors by name ([`named`]),
+//! interruption ([`stop`]), errors ([`failure`]). Pictures: of the device ([`frame`], [`look`]), in
+//! files ([`picture`], [`raw`], [`files`]). Values: direction of gravity ([`down`]), thresholds
+//! ([`threshold`]), forces ([`force_fields`], [`decimal`]), texts ([`shown`]). Also the live page
+//! ([`page`]) and recordings ([`recording`]).
 
 pub mod decimal;
 pub mod down;

@@ -1,4 +1,4 @@
-//! One line for each sample: for people, as JSON, or as CSV.
+//! Formats one line for each sample: for people, as JSON, or as CSV.
 
 use crate::truth::Truth;
 use hivtac_host::decimal::Decimal;
@@ -9,7 +9,7 @@ use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
 use serde::Serialize;
 
-/// How samples are printed.
+/// The format of the printed samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// Aligned columns with a header.
@@ -20,16 +20,17 @@ pub enum Format {
     Csv,
 }
 
-/// A sample and, when it is compared with a simulation, its truth (`Some(None)`: not found).
+/// A sample and, when it is compared with a simulation, its true force (`Some(None)`: not found).
 pub struct Row<'a> {
     /// What the device sent.
     pub sample: &'a Sample,
-    /// What it should have measured.
+    /// The true force, from the simulation.
     pub truth: Option<Option<Truth>>,
 }
 
 impl Format {
-    /// What stands above the first row; `truth` tells whether the rows have one.
+    /// The header above the first row; `None` for JSON. `truth` says whether the rows have a true
+    /// force.
     pub fn header(self, truth: bool) -> Option<String> {
         match self {
             Format::Human => Some(human_header(truth)),
@@ -48,12 +49,12 @@ impl Format {
     }
 }
 
-/// Names, set bits only, of a status.
+/// The names of the bits that are set in a status.
 fn names(status: Status) -> Vec<&'static str> {
     status.names().collect()
 }
 
-/// Whether a bit that tells of a contact is set; unknown without a force.
+/// Whether `bit` (contact or slip) is set; `None` without a force.
 fn told(sample: &Sample, bit: Status) -> Option<bool> {
     let is_set = sample.status.contains(bit);
     sample.force.is_some().then_some(is_set)
@@ -76,12 +77,12 @@ fn human_header(truth: bool) -> String {
     format!("{name}  status\n{}", unit.trim_end())
 }
 
-/// The fields that a person sees.
+/// The fields that have a column for a person.
 fn with_column<T>(fields: &[Field<T>]) -> impl Iterator<Item = &Field<T>> {
     fields.iter().filter(|field| !field.symbol.is_empty())
 }
 
-/// Name and unit of a field, for a person.
+/// A field's symbol and unit, for a person.
 fn head<T>(field: &Field<T>) -> [&'static str; 2] {
     [field.symbol, field.quantity.unit()]
 }
@@ -111,7 +112,7 @@ fn human_row(row: &Row) -> String {
     format!("{line}  {status}")
 }
 
-/// Names of status bits for a person, who is told of contact and slip elsewhere.
+/// Names of status bits for a person. Without contact and slip, which have columns of their own.
 pub fn status_text(names: &[&str], has_force: bool) -> String {
     let other = |name: &&str| !["contact", "slip"].contains(name);
     let names: Vec<_> = names.iter().copied().filter(other).collect();
@@ -121,7 +122,7 @@ pub fn status_text(names: &[&str], has_force: bool) -> String {
     names.join(" ")
 }
 
-/// Whether something touches the film, for a person.
+/// Whether something touches the film, as text for a person.
 pub fn contact_text(contact: Option<bool>) -> &'static str {
     match contact {
         Some(true) => "yes",
@@ -130,12 +131,12 @@ pub fn contact_text(contact: Option<bool>) -> &'static str {
     }
 }
 
-/// A column for each field of a force and its place; all exact.
+/// A column for each field of a force and of its place, all exact.
 fn human_force(force: Option<&Force>) -> String {
     columns(&FORCE, force) + &columns(&PLACE, force.and_then(|force| force.place.as_ref()))
 }
 
-/// A column with nothing in it.
+/// A column without a value.
 const NOTHING: &str = "        –";
 
 fn columns<T>(fields: &[Field<T>], of: Option<&T>) -> String {
@@ -197,14 +198,14 @@ fn csv_header(truth: bool) -> String {
     names.extend(["contact", "slip", "status"]);
     let mut header = names.join(",");
     if truth {
-        // The truth has no uncertainties.
+        // The true force has no uncertainties.
         let names = force[..6].iter().chain(&place[..2]);
         header.extend(names.map(|name| format!(",true_{name}")));
     }
     header
 }
 
-/// Fields that are not there are empty; names of status bits are joined by `|`.
+/// A missing field is empty; names of status bits are joined by `|`.
 fn csv_row(row: &Row) -> String {
     let sample = row.sample;
     let mut fields = vec![
@@ -230,7 +231,7 @@ fn csv_force(force: Option<&Force>) -> Vec<String> {
     [&force[..], &place[..]].concat()
 }
 
-/// Empty for what is not there.
+/// The value as text; empty for `None`.
 fn field(value: Option<impl ToString>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }

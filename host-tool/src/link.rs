@@ -14,21 +14,21 @@ use hivtac_wire::version::HelloPrefix;
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
 
-/// Time after the first hello until the second; doubles with each that is not answered, so that a
-/// device that still boots finds few of them in the line.
+/// Time from the first hello to the second. It doubles with each unanswered hello, and few of them
+/// wait in the line for a device that is still booting.
 const HELLO_AGAIN: Duration = Duration::from_millis(250);
-/// Longest time between two hellos.
+/// Longest time between two hellos while none is answered.
 const HELLO_AT_LEAST_EVERY: Duration = Duration::from_secs(2);
-/// Longest time the device may take no byte of a command.
+/// Longest time for which the device may accept no byte of a command.
 const WRITE_PATIENCE: Duration = Duration::from_secs(2);
 
-/// An open conversation.
+/// An open connection to a device.
 pub struct Link {
     port: Box<dyn Port>,
     /// The port's name, for messages.
     pub name: String,
     decoder: Decoder<DEVICE_FRAME_LIMIT>,
-    /// Bytes that were read; those before `decoded` are done with.
+    /// Bytes that were read; those before `decoded` are already decoded.
     inbox: Vec<u8>,
     decoded: usize,
     last_id: u16,
@@ -38,8 +38,8 @@ impl Link {
     /// Opens the port and exchanges hellos.
     ///
     /// # Errors
-    /// [`Kind::NoDevice`] when the port cannot be opened or nobody says hello within `patience`;
-    /// [`Kind::Version`] when the device speaks another version.
+    /// [`Kind::NoDevice`] when the port cannot be opened or no hello comes within `patience`;
+    /// [`Kind::Version`] when the device has another version of the protocol.
     pub fn connect(address: &Address, patience: Duration) -> Result<(Link, DeviceHello), Failure> {
         let (port, name) = address.open()?;
         let decoder = Decoder::new();
@@ -63,9 +63,9 @@ impl Link {
             let next = end.min(Instant::now() + pause);
             pause = HELLO_AT_LEAST_EVERY.min(pause * 2);
             while let Some(message) = self.receive(next)? {
-                // Anything else is left over from an earlier conversation.
+                // Any other message is left over from an earlier conversation.
                 if let DeviceMessage::Hello(hello) = message {
-                    // The decoder stands between two frames here; what it rejected so far does not
+                    // The decoder is between two frames here; what it rejected before does not
                     // count.
                     self.decoder = Decoder::new();
                     return Ok(hello);
@@ -91,7 +91,7 @@ impl Link {
         )
     }
 
-    /// A zero first: it ends whatever half frame is in the line.
+    /// Sends a hello after a zero, which ends any half frame in the line.
     fn say_hello(&mut self) -> Result<(), Failure> {
         self.write(&[0])?;
         self.send(&HostMessage::Hello(HelloPrefix::OURS.into()))
@@ -122,7 +122,7 @@ impl Link {
         Ok(())
     }
 
-    /// The next message; `None` from `end` on, even when there are more.
+    /// The next message; `None` once `end` has passed, even if messages wait.
     ///
     /// # Errors
     /// [`Kind::Lost`], [`Kind::Version`] or [`Kind::Interrupted`].
@@ -158,7 +158,7 @@ impl Link {
         }
     }
 
-    /// The failure of a connection that broke.
+    /// The failure for a broken connection.
     pub fn lost(&self, why: &str) -> Failure {
         let name = &self.name;
         let message = format!(
@@ -186,8 +186,8 @@ impl Link {
         Ok(id)
     }
 
-    /// Says what is known of gravity on the sensor from its next frame on: as often as is liked, as
-    /// nothing answers.
+    /// Sends what is known of gravity, which the sensor uses from its next frame on. The device
+    /// sends no reply, and this may be called at any rate.
     ///
     /// # Errors
     /// [`Kind::Lost`] or [`Kind::Interrupted`].
@@ -198,7 +198,7 @@ impl Link {
     /// Sends a command and waits for its reply; other messages that come first go to `other`.
     ///
     /// # Errors
-    /// [`Kind::Refused`] when the answer is not `Done` or there is none within `patience`; those of
+    /// [`Kind::Refused`] when the reply is not `Done` or does not come within `patience`; those of
     /// [`Link::receive`].
     pub fn request(
         &mut self,
@@ -221,13 +221,13 @@ impl Link {
         )))
     }
 
-    /// What the decoder threw away since the device's hello.
+    /// What the decoder rejected since the device's hello.
     pub fn rejected(&self) -> Rejected {
         self.decoder.rejected()
     }
 }
 
-/// True when nothing happened yet, rather than something bad.
+/// True for a timeout, where nothing has failed.
 fn is_patience(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -263,7 +263,7 @@ fn name_of(request: &Request) -> &'static str {
     }
 }
 
-/// What to do when nothing was answered. The device may carry the command out all the same.
+/// Advice when no reply came. The device may still carry the command out.
 fn after_silence(request: &Request) -> &'static str {
     match request {
         Request::Keep(_) => {
@@ -285,10 +285,10 @@ fn refused(message: String) -> Failure {
     Failure::new(Kind::Refused, message)
 }
 
-/// What an outcome means for the command `what`.
+/// Turns the outcome of the command `what` into a result.
 ///
 /// # Errors
-/// [`Kind::Refused`] with the reason unless it is done.
+/// [`Kind::Refused`] with the reason unless the outcome is `Done`.
 pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
     let why = match outcome {
         Outcome::Done => return Ok(()),
@@ -341,7 +341,7 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
     Err(refused(format!("the device refused \"{what}\": {why}")))
 }
 
-/// A device's log line for standard error.
+/// The text of a device's log line, for standard error.
 pub fn log_text(line: &LogLine) -> String {
     let level = match line.level {
         LogLevel::Error => "error",

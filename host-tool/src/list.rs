@@ -1,4 +1,4 @@
-//! `hivtac list`: which sensors are plugged in.
+//! `hivtac list`: lists the sensors that are plugged in.
 
 use crate::device::seconds;
 use crate::output::{self, note};

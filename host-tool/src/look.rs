@@ -1,5 +1,5 @@
-//! What a frame looks like, as levels of red, green and blue, and which of its pixels the sensing
-//! takes for markers.
+//! Converts a frame to levels of red, green and blue, and marks the pixels that the sensing takes
+//! for markers.
 
 use crate::frame::Frame;
 use hivtac_sensor::markers::formats::Formats;
@@ -7,13 +7,13 @@ use hivtac_sensor::markers::tables::{ByteTable, Pixels};
 use hivtac_terms::hsv::rgb888;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat};
 
-/// In the mask's picture: a pixel that passes the threshold.
+/// Value in the mask's picture of a pixel that passes the threshold.
 pub const PASSED: u8 = 255;
-/// In the mask's picture: a pixel that only dilation adds.
+/// Value in the mask's picture of a pixel that only dilation adds.
 pub const ADDED: u8 = 128;
 
-/// Levels of red, green and blue, three bytes a pixel. Those of RGB565 are its own with the high
-/// bits repeated below, so that rounding them to RGB565 gives the frame again.
+/// Levels of red, green and blue, three bytes a pixel. Those of RGB565 repeat their high bits
+/// below, and rounding them to RGB565 returns the frame.
 pub fn levels(frame: &Frame) -> Vec<u8> {
     let pixels = frame.pixels();
     match frame.format() {
@@ -26,7 +26,7 @@ pub fn levels(frame: &Frame) -> Vec<u8> {
     }
 }
 
-/// By BT.601 in full range, as the camera's data sheet has it.
+/// Converts by BT.601 in full range, as in the camera's data sheet.
 fn of_yuyv([left, right]: [u16; 2]) -> [[u8; 3]; 2] {
     let (cb, cr) = (f64::from(left >> 8) - 128.0, f64::from(right >> 8) - 128.0);
     [left, right].map(|pixel| {
@@ -40,8 +40,8 @@ fn of_yuyv([left, right]: [u16; 2]) -> [[u8; 3]; 2] {
     })
 }
 
-/// The mask as the sensing makes it of a frame: a byte a pixel, [`PASSED`], [`ADDED`] or 0.
-/// Nothing when the threshold means nothing.
+/// The sensing's mask of a frame: a byte a pixel, [`PASSED`], [`ADDED`] or 0. `None` when the
+/// threshold is invalid.
 pub fn mask(frame: &Frame, dilations: u8) -> Option<Vec<u8>> {
     let mut formats = Box::new(Formats::<ByteTable>::CLOSED);
     formats.set(&frame.threshold, ByteOrder::Native).ok()?;
@@ -95,7 +95,7 @@ mod tests {
         }
     }
 
-    /// A red pixel in a corner: it passes, and dilation adds the three around it.
+    /// A red pixel in a corner passes, and dilation adds the three pixels around it.
     #[test]
     fn the_mask_shows_what_passes_and_what_dilation_adds() {
         let bytes = [vec![RED], vec![GREY; 11]].concat().concat();

@@ -1,4 +1,4 @@
-//! `hivtac`: shows the forces of a HiVTac sensor, asks and commands it, and tries pictures.
+//! `hivtac`: shows a HiVTac sensor's forces, queries and commands it, and reads pictures.
 
 mod auto_threshold;
 mod bring_up;
@@ -107,7 +107,6 @@ impl Command {
     }
 }
 
-/// The command line.
 fn command() -> clap::Command {
     help::with_help(Arguments::command())
 }

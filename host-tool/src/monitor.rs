@@ -1,4 +1,4 @@
-//! `hivtac monitor`: the forces as they come, and a summary at the end.
+//! `hivtac monitor`: shows the forces as they arrive, and a summary at the end.
 
 use crate::device::{Device, seconds};
 use crate::follow::{RETRY_EVERY, SILENCE, note_connected_again};
@@ -14,7 +14,7 @@ use hivtac_host::stop;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use std::time::{Duration, Instant};
 
-/// Longest wait for the last counters at the end, however patient it is otherwise.
+/// Longest wait for the last counters at the end, even when `--timeout` is longer.
 const FAREWELL: Duration = Duration::from_secs(10);
 
 /// Show forces as they come, and a summary at the end
@@ -55,8 +55,8 @@ impl MonitorArguments {
     }
 }
 
-/// Shows samples until the frames or the time are over, the reader is gone, or something fails;
-/// then the summary: on standard output for a person, on standard error beside JSON and CSV.
+/// Shows samples until the frames or the time are over, the reader is gone, or something fails.
+/// Then prints the summary: to standard output for a person, to standard error with JSON and CSV.
 pub fn run(arguments: &MonitorArguments) -> Result<(), Failure> {
     let mut monitor = Monitor::new(arguments)?;
     let result = monitor.watch();
@@ -68,13 +68,13 @@ pub fn run(arguments: &MonitorArguments) -> Result<(), Failure> {
 
 /// Why the samples ended without a failure.
 enum End {
-    /// As many frames or as long as wanted.
+    /// The wanted number of frames was shown, or the wanted time has passed.
     Enough,
-    /// Nobody reads the output any more.
+    /// The reader of the output is gone.
     ReaderGone,
 }
 
-/// Time without a sample.
+/// Time since the last sample.
 struct Silence {
     since: Instant,
     told: bool,
@@ -88,12 +88,12 @@ impl Silence {
         }
     }
 
-    /// When it is long enough to ask the device.
+    /// The time at which the device is asked whether it is there.
     fn end(&self) -> Instant {
         self.since + SILENCE
     }
 
-    /// The device answered: tells a person once, and counts anew.
+    /// Notes that the device answered: the first time with a message, and starts the time anew.
     fn tell(&mut self) {
         if !std::mem::replace(&mut self.told, true) {
             let seconds = SILENCE.as_secs();
@@ -112,10 +112,10 @@ struct Monitor<'o> {
     patience: Duration,
     truth: Option<TruthFile>,
     tally: Tally,
-    /// When the device first began to stream.
+    /// Time of the first start of samples.
     started: Option<Instant>,
     reader: Reader,
-    /// Connected again, and no sample yet.
+    /// True from a new connection to its first sample.
     just_back: bool,
 }
 
@@ -139,7 +139,7 @@ impl<'o> Monitor<'o> {
         })
     }
 
-    /// Follows the device through as many connections as it takes.
+    /// Follows the device through as many connections as necessary.
     fn watch(&mut self) -> Result<End, Failure> {
         let (mut link, _) = Link::connect(&self.address, self.patience)?;
         loop {
@@ -159,7 +159,7 @@ impl<'o> Monitor<'o> {
         }
     }
 
-    /// Connects again, however long it takes; `None` when the time is over.
+    /// Connects again, however long it takes; `None` if the monitor's time ends first.
     fn find_again(&mut self) -> Result<Option<Link>, Failure> {
         let lost = Instant::now();
         while !self.time_is_over() {
@@ -202,7 +202,7 @@ impl<'o> Monitor<'o> {
         Ok(())
     }
 
-    /// Sends a command; samples that come before its reply are shown like any other.
+    /// Sends a command; samples that arrive before its reply are shown.
     fn request(
         &mut self,
         link: &mut Link,
@@ -231,7 +231,7 @@ impl<'o> Monitor<'o> {
                     if let Some(end) = self.take(message)? {
                         return Ok(end);
                     }
-                    // After `take`, which may have waited for whoever reads the output.
+                    // After `take`, which may have waited for the reader of the output.
                     if is_sample {
                         silence = Silence::new();
                     }
@@ -248,8 +248,8 @@ impl<'o> Monitor<'o> {
         Ok(End::Enough)
     }
 
-    /// Finds out whether the device still knows of this conversation. Behind a TCP port it may have
-    /// been unplugged or restarted without the port closing.
+    /// Checks whether the device still takes part in this conversation. Behind a TCP port it may
+    /// have been unplugged or restarted while the port stayed open.
     fn probe(&mut self, link: &mut Link) -> Result<Option<End>, Failure> {
         match self.request(link, Request::GetInfo, self.patience) {
             Err(failure) if failure.kind == Kind::Refused => {
@@ -259,13 +259,13 @@ impl<'o> Monitor<'o> {
         }
     }
 
-    /// Deals with one message; returns why to end, if so.
+    /// Handles one message; returns the reason to end, if there is one.
     fn take(&mut self, message: DeviceMessage) -> Result<Option<End>, Failure> {
         match message {
             DeviceMessage::Sample(sample) => return self.show(&sample),
             DeviceMessage::Stats(stats) => self.tally.stats(&stats),
             DeviceMessage::Log(line) => note(&log_text(&line)),
-            // Late answers to a repeated hello, and to commands that were given up.
+            // Late replies to a repeated hello or to commands whose wait is over.
             _ => (),
         }
         Ok(None)
@@ -299,7 +299,7 @@ impl<'o> Monitor<'o> {
         Ok(enough.then_some(End::Enough))
     }
 
-    /// When the time is over, if ever.
+    /// The time to end; `None` before the first start of samples or without a limit.
     fn end(&self) -> Option<Instant> {
         Some(self.started? + self.arguments.seconds?)
     }
@@ -308,8 +308,7 @@ impl<'o> Monitor<'o> {
         self.end().is_some_and(|end| Instant::now() >= end)
     }
 
-    /// Stops the device and fetches its last counters; it is no failure when that does not work any
-    /// more.
+    /// Stops the device and fetches its last counters; errors are ignored.
     fn say_goodbye(&mut self, link: &mut Link) {
         let ignore_samples = |stats: &mut Tally, message| {
             if let DeviceMessage::Stats(last) = message {

@@ -1,4 +1,4 @@
-//! Which sensors are plugged in, what they say of themselves, and which of them is meant by a name.
+//! Finds plugged-in sensors and their identities, and selects one by name.
 
 use crate::failure::{Failure, Kind};
 use crate::link::Link;
@@ -7,25 +7,25 @@ use crate::shown::shown;
 use serde::Serialize;
 use std::time::Duration;
 
-/// A sensor, and what it says of itself; nothing when it does not answer.
+/// A plugged-in sensor with its identity; fields are `None` if it does not answer.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Listed {
-    /// Its port.
+    /// Its port's name.
     pub port: String,
     /// Its serial number, lower case.
     pub serial: String,
-    /// What its user calls it.
+    /// The name that its user set.
     pub name: Option<String>,
     /// Its board and camera.
     pub board: Option<String>,
-    /// Its firmware.
+    /// Its firmware's version.
     pub firmware: Option<String>,
-    /// Why it does not answer.
+    /// Why there is no answer; `None` if it answered.
     pub problem: Option<String>,
 }
 
 impl Listed {
-    /// What a sensor that is plugged in says of itself.
+    /// Asks a plugged-in sensor for its identity.
     pub fn ask(Attached { port, serial }: Attached, patience: Duration) -> Listed {
         let none = Listed {
             port,
@@ -70,10 +70,10 @@ impl Listed {
     }
 }
 
-/// Which sensor a user means by its name or its serial number.
+/// The address of the sensor with this name or serial number.
 ///
 /// # Errors
-/// [`Kind::NoDevice`] when it is none, or more than one.
+/// [`Kind::NoDevice`] when no sensor has it, or more than one.
 pub fn find(wanted: &str, patience: Duration) -> Result<Address, Failure> {
     let attached = port::attached()?;
     let serial = wanted.to_lowercase();
@@ -88,7 +88,7 @@ pub fn find(wanted: &str, patience: Duration) -> Result<Address, Failure> {
     Ok(Address::Tty(found.port.clone()))
 }
 
-/// The one with this name.
+/// The sensor with this name; the error's text if it is missing or not unique.
 fn called<'l>(listed: &'l [Listed], name: &str) -> Result<&'l Listed, String> {
     let has_it = |sensor: &&Listed| sensor.name.as_deref() == Some(name);
     let found: Vec<&Listed> = listed.iter().filter(has_it).collect();

@@ -1,8 +1,8 @@
-//! Writing to standard output and standard error: whole lines, a closed pipe is an end and no
-//! crash, and a reader that stalls holds nobody up once the program is to end.
+//! Writes whole lines to standard output and standard error.
 //!
-//! A stream is written by a thread of its own, one text at a time. Whoever prints waits for it, but
-//! no longer than [`GRACE`] once the program was interrupted or its [`limit`] has passed.
+//! A closed pipe ends the output without a crash, and a stalled reader does not keep the program
+//! from ending. Each stream has its own thread, which writes one text at a time. The caller waits
+//! for it, but at most [`GRACE`] after the program was interrupted or its [`limit`] has passed.
 
 use hivtac_host::failure::Failure;
 use hivtac_host::shown::to_json;
@@ -15,27 +15,27 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Whether there is still a reader.
+/// The state of the output's reader after a text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reader {
     /// The text was written.
     There,
-    /// The pipe is closed: nobody wants more.
+    /// The pipe is closed.
     Gone,
-    /// The program is to end, and nobody has read the text yet.
+    /// The program must end, and the text has not been read yet.
     Stalled,
 }
 
-/// How long a text may take once the program is to end.
+/// Longest time for a text once the program must end.
 const GRACE: Duration = Duration::from_millis(50);
-/// How often is looked whether it is.
+/// Time between two checks whether the program must end.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
 static OUTPUT: LazyLock<Mutex<Stream>> = LazyLock::new(|| Mutex::new(Stream::new(Target::Output)));
 static NOTES: LazyLock<Mutex<Stream>> = LazyLock::new(|| Mutex::new(Stream::new(Target::Notes)));
 static END: Mutex<Option<Instant>> = Mutex::new(None);
 
-/// Nobody waits for a reader after this.
+/// Sets the time after which no text waits for a reader.
 pub fn limit(end: Instant) {
     *lock(&END) = Some(end);
 }
@@ -63,7 +63,7 @@ pub fn report(
     }
 }
 
-/// Tells what was done: a line for a person, or one JSON object.
+/// Prints the result of a command: a line for a person, or one JSON object.
 pub fn tell(json: bool, line: &str, object: &Value) -> Result<(), Failure> {
     match json {
         true => print(&object.to_string()),
@@ -72,7 +72,7 @@ pub fn tell(json: bool, line: &str, object: &Value) -> Result<(), Failure> {
     .map(|_| ())
 }
 
-/// Writes a line for a person to standard error; there is nothing to do when that fails.
+/// Writes a line for a person to standard error; errors are ignored.
 pub fn note(line: &str) {
     let _ = lock(&NOTES).write(format!("{line}\n"));
 }
@@ -81,23 +81,23 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Whether the program is to end.
+/// Whether the program must end.
 fn is_over() -> bool {
     stop::requested() || lock(&END).is_some_and(|end| Instant::now() >= end)
 }
 
-/// Where texts go.
+/// The stream that a text goes to.
 #[derive(Clone, Copy)]
 enum Target {
     Output,
     Notes,
 }
 
-/// A thread that writes, and what it has not yet answered.
+/// A thread that writes texts and reports each result.
 struct Stream {
     texts: SyncSender<String>,
     done: Receiver<io::Result<()>>,
-    /// A text was handed over, and what became of it is not known.
+    /// A text was handed over, and its result has not come yet.
     under_way: bool,
 }
 
@@ -165,7 +165,7 @@ impl Target {
     }
 }
 
-/// Standard output when it is a file on a disk.
+/// Standard output if it is a regular file, else `None`.
 fn regular_output() -> Option<File> {
     #[cfg(unix)]
     let owned = std::os::fd::AsFd::as_fd(&io::stdout()).try_clone_to_owned();
@@ -175,7 +175,7 @@ fn regular_output() -> Option<File> {
     file.metadata().ok()?.is_file().then_some(file)
 }
 
-/// Writes a text to a file, or nothing of it: a disk that is full would keep its beginning.
+/// Writes all of a text to a file or, on an error, none: a full disk would keep its beginning.
 pub fn write_whole(file: &mut File, text: &[u8]) -> io::Result<()> {
     let mut written = 0;
     while written < text.len() {
@@ -189,7 +189,8 @@ pub fn write_whole(file: &mut File, text: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Cuts the last bytes off a file, unless somebody else has gone on with it; gives the error.
+/// Removes the last `count` bytes of a file unless another program has appended to it; returns
+/// `error`.
 fn take_back(file: &mut File, count: usize, error: io::Error) -> io::Result<()> {
     let end = file.stream_position()?;
     if count > 0 && file.metadata()?.len() == end {

@@ -1,4 +1,4 @@
-//! Pictures as a camera would deliver them: rows of pixels.
+//! Reads and writes pictures: rows of pixels, as a camera delivers them.
 
 use std::io::Cursor;
 
@@ -14,7 +14,7 @@ use crate::raw;
 use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use hivtac_terms::threshold::PixelFormat;
 
-/// A picture as the sensing takes it: RGB565 with red in the high bits, or a frame of the device.
+/// A picture in the sensing's format: RGB565 with red in the high bits, or a frame of the device.
 pub struct Picture {
     /// Columns, 1 to [`MAX_WIDTH`].
     pub width: u16,
@@ -22,26 +22,26 @@ pub struct Picture {
     pub height: u16,
     /// Its pixel format.
     pub format: PixelFormat,
-    /// Row after row from the top.
+    /// Rows from the top.
     pub pixels: Vec<u16>,
 }
 
 impl Picture {
-    /// Reads a PNG, JPEG or PPM file, or a raw frame of `hivtac snapshot`, told apart by content;
-    /// 8 bits a channel are rounded to the nearest of RGB565.
+    /// Reads a PNG, JPEG or PPM file, or a raw frame of `hivtac snapshot`, by its content. Levels
+    /// of 8 bits are rounded to the nearest of RGB565.
     ///
     /// # Errors
-    /// When the file cannot be read, is no such picture, or is larger than a frame can be.
+    /// When the file cannot be read, has another format, or is larger than a frame can be.
     pub fn load(path: &str) -> Result<Picture, Failure> {
         let file = read_at_most(path, LARGEST_FILE).map_err(|error| unreadable(path, &error))?;
         let too_long = || unreadable(path, &format_args!("it has more than {LARGEST_FILE} bytes"));
         Picture::parse(path, &file.ok_or_else(too_long)?)
     }
 
-    /// What such a file has in it; errors call it by its path.
+    /// Reads the bytes of such a file; errors name `path`.
     ///
     /// # Errors
-    /// When it is no such picture, or is larger than a frame can be.
+    /// When the bytes have another format, or the picture is larger than a frame can be.
     pub fn parse(path: &str, file: &[u8]) -> Result<Picture, Failure> {
         if raw::is_one(file) {
             let raw = raw::parse(file).map_err(|error| unreadable(path, &error))?;
@@ -68,7 +68,7 @@ fn unreadable(path: &str, why: &dyn std::fmt::Display) -> Failure {
     Failure::input(format!("cannot read the picture {path}: {why}"))
 }
 
-/// Channels of a picture that is written.
+/// The channels of a written picture.
 #[derive(Clone, Copy, Debug)]
 pub enum Channels {
     /// One byte a pixel.
@@ -84,11 +84,11 @@ struct Rgb {
     pixels: Vec<[u8; 3]>,
 }
 
-/// The largest file that is read: a picture of the largest frame has a fiftieth of it.
+/// Most bytes of a file that is read. A picture of the largest frame has a fiftieth of it.
 const LARGEST_FILE: u64 = 100 << 20;
 
-/// Turned as its EXIF data say it was taken. A file may claim any size: it is held against a
-/// frame's before there is memory for it.
+/// Decodes a picture and turns it by its EXIF data. Its claimed size is checked against a frame's
+/// before memory is taken.
 fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
     let damaged = |error: image::ImageError| unreadable(path, &error);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
@@ -114,10 +114,10 @@ fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
     })
 }
 
-/// Whether a JPEG file goes on to its end-of-image marker: decoders paint what is missing grey.
+/// Whether a JPEG file has its end-of-image marker: decoders paint missing parts grey.
 ///
-/// Segments have their length; after a start of scan come coded bytes, in which FF is followed by 0
-/// or the number of a restart. A thumbnail's end lies within a segment.
+/// A segment has its length. After a start of scan come coded bytes, where FF is followed by 0 or a
+/// restart's number. The end of a thumbnail lies within a segment.
 fn is_whole_jpeg(bytes: &[u8]) -> bool {
     const END: u8 = 0xD9;
     let mut at = 2;
@@ -183,7 +183,7 @@ fn rgb565([red, green, blue]: [u8; 3]) -> u16 {
 mod tests {
     use super::*;
 
-    /// A frame saved with the bits of each channel repeated comes back as it was.
+    /// A saved frame, with the bits of each channel repeated, is read back unchanged.
     #[test]
     fn every_rgb565_value_survives_the_way_through_a_picture() {
         for pixel in 0..=u16::MAX {
@@ -197,7 +197,7 @@ mod tests {
         }
     }
 
-    /// 8 columns and 4,194,303,749 rows: 100 GB of pixels, of a file of 239 bytes.
+    /// 8 columns and 4,194,303,749 rows: 100 GB of pixels in a file of 239 bytes.
     #[test]
     fn a_picture_that_claims_to_be_huge_takes_no_memory() {
         let file = include_bytes!("../../tests/fuzz/corpus/picture/claims_100_gb");

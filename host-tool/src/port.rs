@@ -1,4 +1,4 @@
-//! Where the device is: a serial port found by its USB id or named, or a TCP address.
+//! Opens the device's port: a serial port found by USB id or name, or a TCP address.
 
 use crate::failure::{Failure, Kind};
 use hivtac_wire::usb::{PRODUCT_ID, VENDOR_ID};
@@ -17,7 +17,7 @@ const TCP_PATIENCE: Duration = Duration::from_secs(2);
 pub trait Port: Read + Write + Send {}
 impl<T: Read + Write + Send> Port for T {}
 
-/// Which port to use.
+/// The address of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
     /// The one serial port with the sensor's USB id.
@@ -42,7 +42,7 @@ impl Address {
     /// Opens the port; returns it with its name.
     ///
     /// # Errors
-    /// [`Kind::NoDevice`] when there is none or it cannot be opened.
+    /// [`Kind::NoDevice`] when the port is missing or cannot be opened.
     pub fn open(&self) -> Result<(Box<dyn Port>, String), Failure> {
         match self {
             Address::Find => open_tty(&find(&ports()?)?),
@@ -62,7 +62,7 @@ pub struct Attached {
     pub serial: String,
 }
 
-/// All sensors on this machine's serial ports.
+/// All sensors on the serial ports of this machine.
 ///
 /// # Errors
 /// [`Kind::NoDevice`] when the ports cannot be listed.
@@ -76,7 +76,7 @@ fn failure(message: String) -> Failure {
 
 /// All serial ports of this machine.
 fn ports() -> Result<Vec<SerialPortInfo>, Failure> {
-    // `serialport` panics where Linux has no such directory, as in some containers.
+    // `serialport` panics on a Linux without this directory, as in some containers.
     if cfg!(target_os = "linux") && !std::path::Path::new("/sys/class/tty").exists() {
         return Ok(Vec::new());
     }
@@ -85,14 +85,14 @@ fn ports() -> Result<Vec<SerialPortInfo>, Failure> {
             "cannot list the serial ports: {error}; name one with --port"
         ))
     })?;
-    // macOS shows each port twice; opening the `tty` one would wait for a carrier.
+    // macOS lists each port twice; opening the `tty` one would wait for a carrier.
     Ok(ports
         .into_iter()
         .filter(|port| !port.port_name.starts_with("/dev/tty."))
         .collect())
 }
 
-/// The name of the one port that has the sensor's USB id.
+/// The name of the only port with the sensor's USB id; an error if none or several have it.
 fn find(ports: &[SerialPortInfo]) -> Result<String, Failure> {
     let sensors: Vec<_> = ports.iter().filter(|port| is_sensor(port)).collect();
     match sensors[..] {
@@ -109,7 +109,7 @@ fn find(ports: &[SerialPortInfo]) -> Result<String, Failure> {
     }
 }
 
-/// The name of the port of the sensor with this serial number.
+/// The name of the port whose sensor has this serial number.
 fn find_serial(ports: &[SerialPortInfo], number: &str) -> Result<String, Failure> {
     let mut sensors = ports.iter().filter_map(sensor);
     let found = sensors.find(|sensor| sensor.serial == number);
@@ -161,8 +161,7 @@ fn describe(port: &SerialPortInfo) -> String {
 }
 
 fn open_tty(name: &str) -> Result<(Box<dyn Port>, String), Failure> {
-    // The baud rate means nothing to the device; some drivers want one. DTR tells it that a host is
-    // there.
+    // The device ignores the baud rate, which some drivers require. DTR signals a host to it.
     let port = serialport::new(name, 115_200)
         .timeout(PATIENCE)
         .dtr_on_open(true)
@@ -173,7 +172,7 @@ fn open_tty(name: &str) -> Result<(Box<dyn Port>, String), Failure> {
     }
 }
 
-/// What is wrong with a port and what to do.
+/// The cause of an error on a port, and what to do.
 fn advice(error: &serialport::Error) -> String {
     match error.kind {
         ErrorKind::Io(io::ErrorKind::NotFound) => {

@@ -1,21 +1,21 @@
-//! Frames in files as the camera sent them: PAM (`P7` of Netpbm) with two bytes a pixel and a tuple
-//! type of our own, so that size and format travel with the bytes.
+//! Frames in files, as the camera sent them: PAM (`P7` of Netpbm) with two bytes a pixel. The
+//! project's own tuple types keep size and pixel format with the bytes.
 
 use crate::frame::Frame;
 use hivtac_terms::threshold::PixelFormat;
 
-/// What every PAM begins with.
+/// The first bytes of every PAM.
 const MAGIC: &[u8] = b"P7\n";
-/// The line of the tuple type lies within so many bytes.
+/// The line of the tuple type lies within this number of bytes.
 const HEADER_AT_MOST: usize = 256;
 
-/// The tuple types by pixel format. RGB565: the high byte first; YUV422: Y0 Cb Y1 Cr.
+/// The tuple type of each pixel format. RGB565: the high byte first; YUV422: Y0 Cb Y1 Cr.
 const TUPLE_TYPES: [(PixelFormat, &str); 2] = [
     (PixelFormat::Rgb565, "RGB565"),
     (PixelFormat::Yuv422, "YUYV"),
 ];
 
-/// Bytes of a pixel.
+/// Bytes a pixel.
 const DEPTH: usize = 2;
 
 /// A frame read from a file.
@@ -30,7 +30,7 @@ pub struct Raw<'b> {
     pub bytes: &'b [u8],
 }
 
-/// The file of a frame; none for a format that files do not have.
+/// A frame as the bytes of a file; `None` for a pixel format without a tuple type.
 pub fn of(frame: &Frame) -> Option<Vec<u8>> {
     let known = TUPLE_TYPES
         .iter()
@@ -43,7 +43,7 @@ pub fn of(frame: &Frame) -> Option<Vec<u8>> {
     Some([header.as_bytes(), &frame.bytes].concat())
 }
 
-/// Whether a file is such a frame; other PAMs are ordinary pictures.
+/// Whether a file is such a frame; any other PAM is an ordinary picture.
 pub fn is_one(file: &[u8]) -> bool {
     let header = &file[..file.len().min(HEADER_AT_MOST)];
     let has = |line: &str| {
@@ -55,10 +55,10 @@ pub fn is_one(file: &[u8]) -> bool {
     header.starts_with(MAGIC) && names.any(|name| has(&format!("\nTUPLTYPE {name}\n")))
 }
 
-/// Reads such a file.
+/// Reads the bytes of such a file.
 ///
 /// # Errors
-/// What is wrong with it.
+/// The text says which part of the file is invalid.
 pub fn parse(file: &[u8]) -> Result<Raw<'_>, String> {
     const END: &[u8] = b"\nENDHDR\n";
     let end = file.windows(END.len()).position(|bytes| bytes == END);
@@ -95,7 +95,7 @@ pub fn parse(file: &[u8]) -> Result<Raw<'_>, String> {
     })
 }
 
-/// What a line of the header says behind its name.
+/// The value behind a name in the header.
 fn value_of<'h>(header: &'h str, name: &str) -> Result<&'h str, String> {
     let value = |line: &'h str| line.strip_prefix(name)?.strip_prefix(' ');
     let found = header.lines().find_map(value);
@@ -158,7 +158,7 @@ mod tests {
         assert!(!is_one(b""));
     }
 
-    /// Whatever a file holds, it is read or refused.
+    /// The reader accepts or refuses any file, and never panics.
     #[test]
     fn no_header_breaks_the_reader() {
         let good = of(&frame(HsvBox::RED.into())).unwrap();

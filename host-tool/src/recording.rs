@@ -1,4 +1,4 @@
-//! Reading what `hivtac record` made: every message of a device as it came.
+//! Reads the recordings of `hivtac record`: every message of a device, as it was received.
 
 use crate::failure::Failure;
 use crate::shown::{shown, unit_number};
@@ -12,40 +12,40 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// End of the topic of a device's messages.
+/// End of the topic with a device's messages.
 pub const WIRE: &str = "/wire";
-/// Bytes of a message of [`WIRE`] before those of the device: the encoding, and the lengths of an
-/// empty layout and of the bytes.
+/// Bytes before the device's in a message of [`WIRE`]: the encoding, and the lengths of an empty
+/// layout and of the device's bytes.
 pub const BEFORE_BYTES: usize = 16;
 /// Longest record of a recording.
 const LONGEST_RECORD: usize = 1 << 24;
 
-/// A message and when it came, ns since 1970.
+/// A message with its receive time, ns since 1970.
 pub type Kept = (u64, DeviceMessage);
 
-/// A recording of one device that is read from its beginning.
+/// A recording that is read from its beginning, for one device.
 pub struct Recording {
     /// The file's name.
     pub name: String,
     file: File,
     reader: LinearReader,
-    /// The channels of devices' messages.
+    /// The channels with devices' messages.
     channels: Vec<u16>,
-    /// The device's own channel.
+    /// The chosen device's channel.
     chosen: Option<u16>,
-    /// Read already, and of which channel.
+    /// A message that was read ahead, with its channel.
     waiting: Option<(u16, Kept)>,
     is_over: bool,
     is_cut: bool,
 }
 
 impl Recording {
-    /// Opens a recording for the messages of one device, by its name or serial number where there
-    /// are more than one; returns it with the device's hello.
+    /// Opens a recording and chooses a device; returns it with the device's hello. `device` is a
+    /// name or serial number, necessary if there are several.
     ///
     /// # Errors
-    /// [`Kind::Input`](crate::failure::Kind::Input) when the file cannot be read, is no recording
-    /// of this release's version, or has no such device or more than one.
+    /// [`Kind::Input`](crate::failure::Kind::Input) when the file cannot be read or is not a
+    /// recording of this version, or when the device is missing or not unique.
     pub fn open(path: &Path, device: Option<&str>) -> Result<(Recording, DeviceHello), Failure> {
         let name = path.display().to_string();
         let file = File::open(path)
@@ -71,7 +71,7 @@ impl Recording {
         Ok((recording, hello))
     }
 
-    /// The devices' hellos, which a recording begins with, each with its channel.
+    /// The devices' hellos, with which a recording begins, each with its channel.
     fn hellos(&mut self) -> Result<Vec<(u16, DeviceHello)>, Failure> {
         let mut hellos = Vec::new();
         while let Some((channel, kept)) = self.next_of_any()? {
@@ -89,7 +89,7 @@ impl Recording {
         }
     }
 
-    /// The device's next message; `None` at the end, also where the recording was cut.
+    /// The device's next message; `None` at the end, or where a recording was cut.
     ///
     /// # Errors
     /// [`Kind::Input`](crate::failure::Kind::Input) when the file cannot be read.
@@ -102,18 +102,18 @@ impl Recording {
         Ok(None)
     }
 
-    /// True once the end was reached of a recording that was cut before its own.
+    /// True after the end of a recording that was cut.
     pub fn is_cut(&self) -> bool {
         self.is_cut
     }
 
-    /// That it cannot be used, and why.
+    /// The failure of a recording that cannot be used.
     pub fn failure(&self, why: impl Display) -> Failure {
         let name = &self.name;
         Failure::input(format!("{name} is no recording of `hivtac record`: {why}"))
     }
 
-    /// The next message of whichever device, with its channel.
+    /// The next message of any device, with its channel.
     fn next_of_any(&mut self) -> Result<Option<(u16, Kept)>, Failure> {
         if let Some(waiting) = self.waiting.take() {
             return Ok(Some(waiting));
@@ -159,7 +159,7 @@ impl Recording {
     }
 }
 
-/// Which of the devices is meant.
+/// The index of the wanted device.
 fn chosen(hellos: &[(u16, DeviceHello)], device: Option<&str>) -> Result<usize, String> {
     let number = |hello: &DeviceHello| unit_number(&hello.device_id);
     let is_meant = |hello: &DeviceHello| match device {
@@ -190,7 +190,7 @@ fn chosen(hellos: &[(u16, DeviceHello)], device: Option<&str>) -> Result<usize, 
     }
 }
 
-/// The message in a frame that was kept; `None` of another version's.
+/// The message in a kept frame; `None` if its protocol version is different.
 fn decoded(data: &[u8]) -> Option<DeviceMessage> {
     let mut frame = data.get(BEFORE_BYTES..)?;
     match Decoder::<DEVICE_FRAME_LIMIT>::new().feed(&mut frame)? {

@@ -1,4 +1,4 @@
-//! `hivtac replay`: a recording that answers like the device that it was made of.
+//! `hivtac replay`: answers as the recorded device would, from a recording.
 
 use crate::output::{Reader, note, print};
 use clap::Args;
@@ -16,7 +16,7 @@ use std::net::{TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// How often is looked whether there is a command, or a program at the port.
+/// Time between two checks for a command, or for a program at the port.
 const LOOK_EVERY: Duration = Duration::from_millis(5);
 
 /// Play a recording as if it were a device, for any other command, on a TCP port of this
@@ -84,21 +84,21 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The other program, and what it is told.
+/// The program at the port, and the state of its conversation.
 struct Player {
     stream: TcpStream,
     decoder: Decoder<HOST_FRAME_LIMIT>,
     hello: DeviceHello,
     stats: Stats,
-    /// Whether samples flow, and with their markers.
+    /// `None` while samples are stopped, else whether they have markers.
     streaming: Option<bool>,
     is_gone: bool,
 }
 
 impl Player {
-    /// Until the recording is over, or the other program gone.
+    /// Plays until the recording is over or the program is gone.
     fn play(&mut self, recording: &mut Recording, fast: bool) -> Result<(), Failure> {
-        // It was accepted by a listener that does not wait.
+        // The listener that accepted the stream does not block.
         let patience = self.stream.set_nonblocking(false);
         let patience = patience.and_then(|()| self.stream.set_read_timeout(Some(LOOK_EVERY)));
         patience.map_err(|error| recording.failure(error))?;
@@ -146,7 +146,7 @@ impl Player {
         self.is_gone |= self.stream.set_nonblocking(false).is_err();
     }
 
-    /// Answers what has come.
+    /// Reads the program's messages and answers them.
     fn listen(&mut self) {
         let mut bytes = [0; 256];
         match self.stream.read(&mut bytes) {
@@ -188,7 +188,7 @@ impl Player {
                 self.streaming = None;
                 Outcome::Done
             }
-            // What was recorded cannot be changed, and has no pictures.
+            // A recording cannot be changed, and has no pictures.
             Request::SetThreshold(_)
             | Request::Tare { .. }
             | Request::Expose

@@ -1,4 +1,4 @@
-//! Commands to a device, and what it logs meanwhile.
+//! Sends commands to a device and shows its log lines meanwhile.
 
 use crate::output::note;
 use hivtac_host::failure::Failure;
@@ -7,24 +7,24 @@ use hivtac_wire::message::{DeviceMessage, Request};
 use hivtac_wire::settings::Selection;
 use std::time::Duration;
 
-/// Longest time that keeping may take: an erased sector takes 1 to 2 s, and a worn one is tried
-/// again.
+/// Longest time for keeping settings: erasing a sector takes 1 to 2 s and is repeated for a worn
+/// one.
 pub const KEEP_PATIENCE: Duration = Duration::from_secs(20);
 
-/// Keeps these of the settings in use through restarts.
+/// Keeps the selected settings through restarts.
 ///
 /// # Errors
-/// What the device refuses.
+/// When the device refuses or does not answer.
 pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
     send(link, Request::Keep(selection), KEEP_PATIENCE)
 }
 
-/// Sends a command and waits for its reply.
+/// Sends a command and waits at most `wait` for its reply.
 pub fn send(link: &mut Link, request: Request, wait: Duration) -> Result<(), Failure> {
     link.request(request, wait, show_log)
 }
 
-/// Shows a line that the device logs; of other messages nothing.
+/// Shows a log line of the device; ignores other messages.
 pub fn show_log(message: DeviceMessage) {
     if let DeviceMessage::Log(line) = message {
         note(&log_text(&line));

@@ -1,4 +1,4 @@
-//! `hivtac sense`: the sensor's own code on pictures, with everything it finds on the way.
+//! `hivtac sense`: runs the sensor's own code on pictures, and shows each intermediate result.
 
 use crate::finding::Finding;
 use crate::hsv;
@@ -18,13 +18,13 @@ use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, HsvBox};
 
-/// The sensing, with the table that is fastest on a computer.
+/// The sensing with the table type that is fastest on a computer.
 type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
 
-/// The model that the firmware has, too.
+/// The model that is built into the firmware.
 static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
 
-/// Bytes of a model file at most; the sensor's flash has 2 MiB.
+/// Most bytes of a model file; the sensor's flash has 2 MiB.
 const LARGEST_MODEL: u64 = 16 << 20;
 
 /// Look for markers and force in pictures, with the sensor's own code
@@ -61,8 +61,8 @@ pub struct SenseArguments {
     json: bool,
 }
 
-/// Prints what it finds in each picture. A picture that cannot be used is named, and the others are
-/// still looked at.
+/// Prints what is found in each picture. A picture that cannot be used is reported, and the others
+/// are still processed.
 pub fn run(arguments: &SenseArguments) -> Result<(), Failure> {
     let file = arguments.model.as_deref().map(read_model).transpose()?;
     let name = arguments.model.as_deref().unwrap_or("the built-in model");
@@ -118,16 +118,16 @@ struct Tare {
     size: (u16, u16),
 }
 
-/// What all pictures have in common.
+/// The arguments and model that all pictures share.
 struct Bench<'a> {
     arguments: &'a SenseArguments,
     model: Model<'a>,
-    /// The model's, for messages.
+    /// The model's name, for messages.
     name: &'a str,
 }
 
 impl<'a> Bench<'a> {
-    /// What is in one picture, as text or as JSON.
+    /// The result for one picture, as text or JSON.
     fn look(&self, path: &str, tare: Option<&Tare>) -> Result<String, Failure> {
         let picture = Picture::load(path)?;
         let mut sensor = self.sensor(path, &picture)?;
@@ -143,7 +143,7 @@ impl<'a> Bench<'a> {
             sensor.set_tare(Some(tare.rest), Drift::UNSEEN);
         }
         let mut measurement = sensor.measure_frame(&picture.pixels);
-        // What the threshold makes of the picture, whatever another look does.
+        // What the threshold finds, whether or not the sensing looks again.
         let blobs = sensor.blobs().to_vec();
         if let Some(again) = sensor.look_again() {
             sensor.push_rows(&picture.pixels);
@@ -157,7 +157,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// The rest position in a picture.
+    /// Finds the rest position in a picture.
     fn tare(&self, path: &str) -> Result<Tare, Failure> {
         let picture = Picture::load(path)?;
         let mut sensor = self.sensor(path, &picture)?;
@@ -184,7 +184,7 @@ impl<'a> Bench<'a> {
         }
     }
 
-    /// A sensor for pictures like this one.
+    /// A sensor set for this picture.
     fn sensor(&self, path: &str, picture: &Picture) -> Result<Box<Sensor<'a>>, Failure> {
         let (made_for, format) = (self.model.conditions.threshold.format(), picture.format);
         if format != made_for {
@@ -205,8 +205,8 @@ impl<'a> Bench<'a> {
         Ok(sensor)
     }
 
-    /// The model's conditions as far as nothing else is said; a picture of another size is taken as
-    /// one by the same preset, its focal length scaled with it.
+    /// The model's conditions, changed by the arguments. For a picture of another size the preset's
+    /// focal length is scaled with it.
     fn settings(&self, picture: &Picture) -> Settings {
         let mut settings = self.model.conditions.settings(ByteOrder::Native);
         let conditions = &self.model.conditions;
@@ -231,7 +231,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// What is wrong with a tare's picture, and what to do.
+/// Why a tare's picture was refused, and what to do.
 fn complaint(refusal: Refusal) -> String {
     match refusal {
         Refusal::Touched(force) => {

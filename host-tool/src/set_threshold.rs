@@ -1,4 +1,4 @@
-//! Setting a device's threshold.
+//! Sets a device's threshold.
 
 use crate::output::note;
 use crate::request::{keep, send};
@@ -10,8 +10,8 @@ use hivtac_wire::message::{DeviceHello, Request};
 use hivtac_wire::settings::Selection;
 use std::time::Duration;
 
-/// Sets a threshold, until the device restarts or for good, and says when there will be no forces
-/// with it.
+/// Sets a threshold, until the device restarts or for good. Warns if there will be no forces with
+/// it.
 pub fn set_threshold(
     link: &mut Link,
     device: &DeviceHello,

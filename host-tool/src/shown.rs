@@ -1,9 +1,9 @@
-//! Text from a device, for a terminal: what would act on it instead of being read is escaped.
+//! Escapes text from a device for a terminal: characters that would act instead of being read.
 
 use serde::Serialize;
 
-/// The text with every character escaped (`\\u{1b}`) that a terminal or a reader could take for
-/// something else: controls, line ends, and what turns the direction of text or is invisible.
+/// Escapes (`\\u{1b}`) every character that a terminal or a reader could misread: controls, line
+/// ends, and characters that turn the text's direction or are invisible.
 pub fn shown(text: &str) -> String {
     let escaped = |c: char| match acts(c) {
         true => c.escape_unicode().collect(),
@@ -12,7 +12,7 @@ pub fn shown(text: &str) -> String {
     text.chars().map(escaped).collect()
 }
 
-/// The same for JSON text, in its own escapes: the values stay what they are.
+/// The same for JSON text, with JSON's escapes, which keep the values.
 pub fn shown_json(text: &str) -> String {
     let escaped = |c: char| match acts(c) {
         true => format!("\\u{:04x}", u32::from(c)),
@@ -23,8 +23,8 @@ pub fn shown_json(text: &str) -> String {
 
 /// A JSON object without a line end.
 pub fn to_json(value: &impl Serialize) -> String {
-    // Only maps with odd keys and failing `Serialize` implementations give an error; there are none
-    // here.
+    // Only maps with unusual keys and failing `Serialize` implementations cause an error; there are
+    // no such types here.
     shown_json(&serde_json::to_string(value).expect("plain data becomes JSON"))
 }
 
@@ -33,7 +33,7 @@ pub fn unit_number(device_id: &[u8; 12]) -> String {
     device_id.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// All of these are below U+10000.
+/// Whether a character must be escaped; all of them are below U+10000.
 fn acts(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}');
     let is_invisible = matches!(c, '\u{ad}' | '\u{2060}'..='\u{206f}' | '\u{feff}');

@@ -1,4 +1,4 @@
-//! `hivtac snapshot`: one frame as the sensing saw it, into files.
+//! `hivtac snapshot`: writes one frame, as the sensing saw it, into files.
 
 use crate::device::Device;
 use crate::finding::MarkerJson;
@@ -50,7 +50,7 @@ struct SnapshotFiles {
     mask: Option<String>,
 }
 
-/// Takes a frame and writes the files, and says what the device itself made of it.
+/// Takes a frame, writes the files, and prints the device's own result for it.
 pub fn run(arguments: &SnapshotArguments) -> Result<(), Failure> {
     let SnapshotArguments {
         device,
@@ -64,7 +64,7 @@ pub fn run(arguments: &SnapshotArguments) -> Result<(), Failure> {
     output::report(*json, &report, || report.text()).map(|_| ())
 }
 
-/// One frame with its sample and the markers in it: samples flow meanwhile, and no longer.
+/// Takes one frame with its sample and its markers. Samples flow only until it is complete.
 pub fn snapshot(link: &mut Link, patience: Duration) -> Result<Taken, Failure> {
     link.request(Request::StartWithMarkers, patience, show_log)?;
     let taken = take(link, patience, show_log)?;
@@ -99,7 +99,7 @@ fn write(path: &str, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|error| Failure::input(format!("cannot write {path}: {error}")))
 }
 
-/// What was taken, and what the device made of it.
+/// The frame's data and the device's own result.
 #[derive(Serialize)]
 struct Report<'f> {
     frame: u32,
@@ -110,9 +110,9 @@ struct Report<'f> {
     picture: Option<&'f str>,
     raw: Option<&'f str>,
     mask: Option<&'f str>,
-    /// As the device found them; none when it did not.
+    /// The device's markers; `None` if it found none.
     markers: Option<Vec<MarkerJson>>,
-    /// Of the frame's sample; nothing when that was lost.
+    /// The status of the frame's sample; `None` if the sample was lost.
     status: Option<Vec<&'static str>>,
     #[serde(skip)]
     threshold_text: String,

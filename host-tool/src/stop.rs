@@ -1,4 +1,4 @@
-//! Ctrl-C and termination: a flag that the loops look at, so that they end with their summary.
+//! Catches Ctrl-C and termination in a flag; loops read it and end with their summary.
 
 use crate::failure::{Failure, Kind};
 use std::sync::OnceLock;
@@ -13,18 +13,19 @@ pub fn install() -> Result<(), Failure> {
         .map_err(|error| Failure::input(format!("cannot catch Ctrl-C: {error}")))
 }
 
-/// Asks `is_over`, too, in a program whose signals something else catches. Every loop that waits
-/// calls it again and again, at least every 0.1 s; the first function that was given stays.
+/// Adds a second condition for the end, for a program that catches its signals elsewhere. Every
+/// waiting loop calls `is_over` at least every 0.1 s. The first function stays; later ones are
+/// ignored.
 pub fn ask_besides(is_over: fn() -> bool) {
     ASKED_BESIDES.get_or_init(|| is_over);
 }
 
-/// True once it was asked to end.
+/// True once the program should end.
 pub fn requested() -> bool {
     STOP.load(Ordering::Relaxed) || ASKED_BESIDES.get().is_some_and(|is_over| is_over())
 }
 
-/// An error once it was asked to end.
+/// An error once the program should end.
 pub fn check() -> Result<(), Failure> {
     match requested() {
         true => Err(Failure::new(Kind::Interrupted, "interrupted")),

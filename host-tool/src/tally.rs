@@ -1,5 +1,4 @@
-//! What a monitor saw in all: frames shown, received and lost by cause, and the error against the
-//! truth.
+//! Counts for a summary: frames shown, received and lost by cause, and errors against true forces.
 
 use crate::truth::Truth;
 use hivtac_terms::force::Force;
@@ -9,10 +8,10 @@ use hivtac_wire::message::{Sample, Stats};
 use std::collections::BTreeMap;
 use std::fmt;
 
-/// |F| from which a direction means something, N.
+/// |F| from which a direction is compared, N.
 const DIRECTION_FLOOR_N: f64 = 0.05;
 
-/// Everything the summary says.
+/// Everything that the summary shows.
 #[derive(Default)]
 pub struct Tally {
     /// Samples printed.
@@ -22,7 +21,7 @@ pub struct Tally {
     rejected: Rejected,
     device: DeviceCounts,
     without_force: u64,
-    /// Of those without a force, how many had each "no force" bit, by its place in
+    /// Among samples without a force, the number with each "no force" bit, by the bit's index in
     /// [`Status::NAMES`].
     reasons: BTreeMap<usize, u64>,
     errors: Errors,
@@ -30,8 +29,7 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Connected again: frames that passed meanwhile were not sent, so it says nothing that they
-    /// are missing.
+    /// Notes a new connection: frames that passed while there was none do not count as lost.
     pub fn connected_again(&mut self) {
         self.reconnections += 1;
         self.gaps.away = true;
@@ -42,7 +40,8 @@ impl Tally {
         self.reconnections
     }
 
-    /// Counts a sample; returns how many samples, and frames beyond those, are missing before it.
+    /// Counts a sample; returns the numbers of samples, and of frames beyond those, missing before
+    /// it.
     pub fn sample(&mut self, sample: &Sample) -> (u32, u32) {
         self.received += 1;
         if sample.force.is_none() {
@@ -57,17 +56,17 @@ impl Tally {
         self.gaps.count(sample.sequence, sample.frame)
     }
 
-    /// Compares a sample that has a truth with it.
+    /// Compares a sample's force with its true force.
     pub fn compare(&mut self, force: &Force, truth: &Truth) {
         self.errors.count(force, truth);
     }
 
-    /// Takes in the device's counters.
+    /// Adds the device's counters.
     pub fn stats(&mut self, stats: &Stats) {
         self.device.count(stats);
     }
 
-    /// Takes in what the decoder of a connection threw away, once, when it ends.
+    /// Adds what the decoder of a connection rejected; call it once, when the connection ends.
     pub fn rejected(&mut self, of_connection: Rejected) {
         let sum = &mut self.rejected;
         sum.overlong = sum.overlong.saturating_add(of_connection.overlong);
@@ -78,28 +77,28 @@ impl Tally {
         sum.bytes = sum.bytes.saturating_add(of_connection.bytes);
     }
 
-    /// The summary for a person; with `truth`, the errors too.
+    /// The summary for a person; with `truth`, including the errors.
     pub fn summary(&self, truth: bool) -> String {
         let shown = format!("{} frames shown, ", self.shown);
         shown + &self.summary_of_received(truth)
     }
 
-    /// The same of samples that were recorded.
+    /// The summary of recorded samples.
     pub fn summary_of_recorded(&self) -> String {
         "recorded: ".to_owned() + &self.summary_of_received(false)
     }
 
-    /// How many samples came, and how many frames have none.
+    /// The numbers of samples received and of frames without a sample.
     pub fn received_line(&self) -> String {
         format!("{} received, {} lost", self.received, self.lost())
     }
 
-    /// Frames without a sample, whatever the cause.
+    /// Frames without a sample, from any cause.
     pub fn lost(&self) -> u64 {
         self.gaps.samples + self.gaps.frames
     }
 
-    /// Losses by cause: on the way, and as the device counts them.
+    /// Losses by cause: on the way, and those that the device counts.
     pub fn causes(&self) -> BTreeMap<&'static str, u64> {
         let [_, _, busy, overrun, size, setup, usb, ..] = self.device.grown;
         [
@@ -114,7 +113,7 @@ impl Tally {
         .into()
     }
 
-    /// What a recording says of itself.
+    /// The counts that a recording holds of itself.
     pub fn counts(&self) -> [(&'static str, u64); 6] {
         [
             ("samples", self.received),
@@ -148,7 +147,7 @@ impl Tally {
         lines.join("\n") + "\n"
     }
 
-    /// Losses by cause.
+    /// A line with the losses by cause.
     pub fn loss_line(&self) -> String {
         let Rejected {
             overlong,
@@ -190,21 +189,21 @@ impl Tally {
     }
 }
 
-/// Gaps in the two counters of a sample.
+/// Gaps in a sample's two counters, sequence number and frame number.
 #[derive(Default)]
 struct Gaps {
     last: Option<(u32, u32)>,
     samples: u64,
     frames: u64,
-    /// No sample since the connection is back.
+    /// True from a new connection to its first sample.
     away: bool,
-    /// Frames, beyond the samples, that passed between connections.
+    /// Frames without a sample that passed between connections.
     frames_away: u64,
     restarts: u64,
 }
 
 impl Gaps {
-    /// Missing samples, and missing frames beyond those, between this sample and the one before.
+    /// Counts a sample; returns the samples, and the frames beyond those, missing before it.
     fn count(&mut self, sequence: u32, frame: u32) -> (u32, u32) {
         let away = std::mem::take(&mut self.away);
         let Some((last_sequence, last_frame)) = self.last.replace((sequence, frame)) else {
@@ -212,7 +211,7 @@ impl Gaps {
         };
         let samples = sequence.wrapping_sub(last_sequence).wrapping_sub(1);
         let frames = frame.wrapping_sub(last_frame).wrapping_sub(1);
-        // Counters that step back are those of a device that started anew.
+        // Counters that step back show a restart of the device.
         if samples > u32::MAX / 2 || frames > u32::MAX / 2 {
             self.restarts += 1;
             return (0, 0);
@@ -228,11 +227,11 @@ impl Gaps {
     }
 }
 
-/// How the device's counters grew while it was watched.
+/// Growth of the device's counters while it was watched.
 #[derive(Default)]
 struct DeviceCounts {
     last: Option<Stats>,
-    /// How often they were received after the first time.
+    /// Number of times they were received after the first.
     updates: u64,
     grown: [u64; 11],
 }
@@ -297,7 +296,7 @@ impl fmt::Display for DeviceCounts {
     }
 }
 
-/// A mean in the making.
+/// A mean of numbers that are added one at a time.
 #[derive(Default)]
 struct Mean {
     sum: f64,
@@ -315,13 +314,13 @@ impl Mean {
     }
 }
 
-/// Errors against the truth.
+/// Errors against the true forces.
 #[derive(Default)]
 struct Errors {
     direction_deg: Mean,
     direction_deg_from_floor: Mean,
     magnitude_squared: Mean,
-    /// Of the distance between the places found and true, µm².
+    /// Square of the distance between the place found and the true one, µm².
     place_squared: Mean,
 }
 
@@ -376,8 +375,8 @@ impl Errors {
     }
 }
 
-/// Angle between two vectors, degrees, well conditioned everywhere; `None` when one of them has no
-/// direction.
+/// Angle between two vectors, degrees, well conditioned at every angle; `None` if one of them has
+/// no direction.
 fn angle_deg(a: [f64; 3], b: [f64; 3]) -> Option<f64> {
     let dot: f64 = a.iter().zip(b).map(|(a, b)| a * b).sum();
     let cross = [

@@ -1,4 +1,4 @@
-//! `hivtac tare`: the present position of the film as its rest position.
+//! `hivtac tare`: takes the film's present position as its rest position.
 
 use crate::device::Device;
 use crate::output;
@@ -11,11 +11,11 @@ use serde::Serialize;
 use serde_json::json;
 use std::time::Duration;
 
-/// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
+/// Longest time between two frames; an emulated device is slower than a real one.
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
-/// Time a tare may need besides.
+/// Time for a tare in addition to its frames.
 pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
-/// Good frames that a tare averages when nothing else is said.
+/// Good frames that a tare averages by default.
 const TARE_FRAMES: u16 = 32;
 
 /// Take the present position of the film as its rest position, until the device restarts
@@ -47,7 +47,7 @@ pub struct TareArguments {
     json: bool,
 }
 
-/// What a tare gave: pixels.
+/// The result of a tare, px.
 #[derive(Serialize)]
 struct Tared {
     frames: u16,
@@ -57,7 +57,8 @@ struct Tared {
     moved: Option<MovedPx>,
 }
 
-/// How far the rest position is from the one before, and what a camera's motion explains of it.
+/// Distance of the new rest position from the old one, and the part that a motion of the camera
+/// explains.
 #[derive(Serialize)]
 struct MovedPx {
     farthest_px: f64,
@@ -67,8 +68,7 @@ struct MovedPx {
     beside_px: f64,
 }
 
-/// A tare when nothing else is said: the request, how long it may take, and what is said once it is
-/// done.
+/// The default tare: the request, the longest time it may take, and the message when it is done.
 pub fn usual_tare(patience: Duration) -> (Request, Duration, String) {
     let frames = TARE_FRAMES;
     let done = taken_over(frames);
@@ -79,7 +79,7 @@ fn taken_over(frames: u16) -> String {
     format!("tare taken over {frames} frames")
 }
 
-/// Takes the mean of the next good frames as the rest position, and tells it.
+/// Takes the mean of the next good frames as the rest position, and prints the result.
 pub fn run(tare: &TareArguments) -> Result<(), Failure> {
     let frames = tare.frames;
     let wait = TARE_PATIENCE + SLOWEST_FRAME * frames.into();

@@ -1,4 +1,4 @@
-//! `hivtac template`: where to punch the film and to stick the dots, to print at its true size.
+//! `hivtac template`: a drawing at true size of where to punch the film and stick the dots.
 
 use crate::output::tell;
 use clap::Args;
@@ -6,17 +6,17 @@ use hivtac_host::failure::Failure;
 use hivtac_terms::geometry::{Geometry, Preset};
 use serde_json::json;
 
-/// From the film's middle to each post, along x and y, mm: that of the simulated sensor.
+/// Distance of each post from the film's middle, along x and y, mm, as on the simulated sensor.
 const POST_MM: f64 = 14.0;
-/// From the film's middle to its edge, along x and y, mm.
+/// Distance of the film's edge from its middle, along x and y, mm.
 const EDGE_MM: f64 = 20.0;
-/// Hole for an M3 screw, mm.
+/// Diameter of a hole for an M3 screw, mm.
 const HOLE_MM: f64 = 3.2;
-/// The ruler that shows whether it was printed at its size, mm.
+/// Length of the ruler that shows whether the print has true size, mm.
 const RULER_MM: u32 = 50;
-/// The page, mm.
+/// Size of the page, mm.
 const PAGE_MM: [f64; 2] = [70.0, 76.0];
-/// The film's middle on it, mm.
+/// Position of the film's middle on the page, mm.
 const MIDDLE_MM: [f64; 2] = [35.0, 26.0];
 
 /// Write a template to print: where the film is punched and the dots are stuck, as SVG
@@ -38,7 +38,7 @@ pub struct TemplateArguments {
 /// Writes the template for a preset's markers.
 pub fn run(arguments: &TemplateArguments) -> Result<(), Failure> {
     let TemplateArguments { file, preset, json } = arguments;
-    // Sizes on the film do not depend on the frame's.
+    // Sizes on the film do not depend on the frame's size.
     let svg = svg(&Geometry::preset(*preset, 320, 240));
     std::fs::write(file, svg).map_err(|error| {
         let message = format!("cannot write the template {file}: {error}");
@@ -48,7 +48,7 @@ pub fn run(arguments: &TemplateArguments) -> Result<(), Failure> {
     tell(*json, &told, &json!({ "file": file, "ruler_mm": RULER_MM }))
 }
 
-/// All lengths in millimetres, and so is the page's size.
+/// The drawing as SVG, with all lengths in millimetres, the page's size included.
 fn svg(geometry: &Geometry) -> String {
     let [width, height] = PAGE_MM;
     let body = [film(), marks(geometry), ruler()].concat();
@@ -60,7 +60,7 @@ fn svg(geometry: &Geometry) -> String {
     )
 }
 
-/// The film's edge, its middle and the holes for the posts.
+/// Draws the film's edge, its middle and the holes for the posts.
 fn film() -> String {
     let [x, y] = MIDDLE_MM;
     let (left, top, side) = (x - EDGE_MM, y - EDGE_MM, 2.0 * EDGE_MM);
@@ -77,7 +77,7 @@ fn film() -> String {
     edge + &CORNERS.map(hole).concat()
 }
 
-/// The dots, each with a cross that sticks out from under it.
+/// Draws the dots, each on a cross that sticks out from under it.
 fn marks(geometry: &Geometry) -> String {
     let [x, y] = MIDDLE_MM;
     let rest_mm = f64::from(geometry.marker_radius.0) / 1e3 / std::f64::consts::SQRT_2;
@@ -91,7 +91,7 @@ fn marks(geometry: &Geometry) -> String {
     CORNERS.map(dot).concat()
 }
 
-/// From the upper left clockwise.
+/// Directions of the four corners, from the upper left clockwise.
 const CORNERS: [[f64; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
 
 fn circle(class: &str, [x, y]: [f64; 2], diameter_mm: f64) -> String {
@@ -126,7 +126,7 @@ mod tests {
     use super::*;
     use hivtac_twin::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM};
 
-    /// Numbers of all circles of a class.
+    /// Centre and diameter of all circles of a class.
     fn circles(svg: &str, class: &str) -> Vec<[f64; 3]> {
         let opening = format!("<circle class=\"{class}\"");
         let own = svg.lines().filter(|line| line.starts_with(&opening));
@@ -139,7 +139,7 @@ mod tests {
         .collect()
     }
 
-    /// Dots and posts lie where the simulated sensor has them, and are as large.
+    /// Dots and posts have the places and sizes of the simulated sensor's.
     #[test]
     fn it_is_the_scenes_geometry_to_scale() {
         for preset in Preset::ALL {

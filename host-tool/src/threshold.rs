@@ -1,9 +1,9 @@
-//! Thresholds as text and JSON.
+//! Formats thresholds as text and JSON.
 
 use hivtac_terms::threshold::Threshold;
 use serde_json::{Value, json};
 
-/// For a person: pixel format and limits.
+/// A threshold's pixel format and limits, for a person.
 pub fn text(threshold: &Threshold) -> String {
     let format = threshold.format().name();
     match threshold {
@@ -21,7 +21,7 @@ pub fn text(threshold: &Threshold) -> String {
     }
 }
 
-/// For a program: `format` and the limits by their names.
+/// A threshold as JSON: `format` and the limits by their names.
 pub fn to_json(threshold: &Threshold) -> Value {
     let format = threshold.format().name();
     match threshold {

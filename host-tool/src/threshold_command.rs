@@ -1,4 +1,4 @@
-//! `hivtac threshold`: which pixels a marker may have.
+//! `hivtac threshold`: sets which pixels belong to a marker.
 
 use crate::auto_threshold::{self, AutoArguments};
 use crate::device::Device;
@@ -63,7 +63,7 @@ struct WantedThreshold {
 }
 
 impl WantedThreshold {
-    /// `None` for the model's.
+    /// The wanted threshold; `None` for the model's.
     fn threshold(&self) -> Option<Threshold> {
         let hsv = self.hsv.map(Threshold::Rgb565);
         let cr = self.cr.map(|cr_low| Threshold::Yuv422(Yuv422 { cr_low }));
@@ -71,8 +71,7 @@ impl WantedThreshold {
     }
 }
 
-/// Sets the threshold, until the device restarts or for good: this one, or the
-/// model's; or finds one.
+/// Sets the given or the model's threshold, until the device restarts or for good; or finds one.
 pub fn run(arguments: &ThresholdArguments) -> Result<(), Failure> {
     let ThresholdArguments {
         auto,

@@ -1,5 +1,4 @@
-//! The true force of each frame and where it acts, from the log of a simulated sensor, joined by
-//! frame number.
+//! Reads the true force of each frame and its place from a simulated sensor's log, by frame number.
 
 use hivtac_host::failure::Failure;
 use serde::{Deserialize, Serialize};
@@ -8,19 +7,19 @@ use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::time::{Duration, Instant};
 
-/// Longest wait for the line of a frame that was received already.
+/// Longest wait for the line of a frame that was received.
 const PATIENCE: Duration = Duration::from_millis(300);
-/// Time between two looks at a file that grows.
+/// Time between two reads of a growing file.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
 
-/// Bytes of the longest line, and of what is read at once.
+/// Most bytes of a line, and of one read.
 const LONGEST_LINE: usize = 1 << 16;
 const READ_AT_ONCE: u64 = 1 << 16;
-/// The most frames that were read and not yet asked for: some hours of them.
+/// Most frames that were read and not yet asked for: some hours of them.
 const MOST_WAITING: usize = 1 << 22;
 
-/// One line of the log. A line without a force, as of a test picture, is that of a frame without a
-/// truth.
+/// One line of the log. A line without a force, such as of a test picture, belongs to a frame
+/// without a true force.
 #[derive(Deserialize)]
 struct Line {
     /// Frame number, as in the samples.
@@ -29,7 +28,7 @@ struct Line {
     truth: Option<Truth>,
 }
 
-/// The true force of a frame and, where the log tells it, where the tip touches the film.
+/// The true force of a frame and, if the log has it, the place where the tip touches the film.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Truth {
     /// α, degrees.
@@ -44,16 +43,17 @@ pub struct Truth {
     pub y_n: f64,
     /// Fz, N.
     pub z_n: f64,
-    /// To the right in the image, mm from the film's middle.
+    /// Place to the right in the image, mm from the film's middle.
     #[serde(default)]
     pub place_x_mm: Option<f64>,
-    /// Down in the image, mm from the film's middle.
+    /// Place down in the image, mm from the film's middle.
     #[serde(default)]
     pub place_y_mm: Option<f64>,
 }
 
 impl Truth {
-    /// A value that is no truth, with its name: a summary would be of that alone.
+    /// The first value that cannot be a true one, with its name. A single such value would spoil
+    /// the summary.
     fn impossible(&self) -> Option<(&'static str, f64)> {
         let place = [self.place_x_mm, self.place_y_mm].map(Option::unwrap_or_default);
         let values = [
@@ -82,7 +82,7 @@ impl Truth {
 pub struct TruthFile {
     path: String,
     file: File,
-    /// What was read of a line that has no end yet.
+    /// The part of a line whose end was not read yet.
     partial: Vec<u8>,
     lines: usize,
     frames: HashMap<u32, Option<Truth>>,
@@ -108,8 +108,8 @@ impl TruthFile {
         })
     }
 
-    /// The truth of a frame and forgets it; waits a little for its line to be written. `None` when
-    /// it does not come.
+    /// Returns a frame's true force and forgets it; waits a little for its line. `None` if the line
+    /// does not come or has no force.
     pub fn take(&mut self, frame: u32) -> Result<Option<Truth>, Failure> {
         let end = Instant::now() + PATIENCE;
         loop {
@@ -123,13 +123,13 @@ impl TruthFile {
         }
     }
 
-    /// Reads to the file's end, or until there is a frame.
+    /// Reads to the file's end, or until the frame's line was read.
     fn read_on(&mut self, frame: u32) -> Result<(), Failure> {
         while !self.frames.contains_key(&frame) && self.read_some()? {}
         Ok(())
     }
 
-    /// Reads a little more; false at the end.
+    /// Reads one block; false at the file's end.
     fn read_some(&mut self) -> Result<bool, Failure> {
         let before = self.partial.len();
         (&self.file)

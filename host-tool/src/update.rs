@@ -1,4 +1,4 @@
-//! `hivtac update`: a model of one's own for a device, without a compiler, or new firmware.
+//! `hivtac update`: sends a model or new firmware to a device, without a compiler.
 
 use crate::device::Device;
 use crate::firmware::{self, FirmwareArguments};
@@ -45,7 +45,7 @@ pub struct ModelArguments {
     json: bool,
 }
 
-/// Updates.
+/// Sends a model file, has the built-in model used, or updates the firmware.
 pub fn run(command: &UpdateCommand) -> Result<(), Failure> {
     match command {
         UpdateCommand::Model(arguments) => match &arguments.file {
@@ -56,11 +56,11 @@ pub fn run(command: &UpdateCommand) -> Result<(), Failure> {
     }
 }
 
-/// Sends a model file, which the device checks, keeps and uses from then on.
+/// Sends a model file, which the device checks, keeps and then uses.
 ///
 /// # Errors
-/// A file that is no model, before anything is asked of the device; what the device refuses; those
-/// of [`Link::connect`].
+/// When the file is not a model, which is checked before anything is sent; when the device refuses;
+/// those of [`Link::connect`].
 pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
     let device = &arguments.device;
     let address = device.address()?;
@@ -85,10 +85,10 @@ pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
     say(arguments, &used, begun.elapsed())
 }
 
-/// Has the device use the model that is built into its firmware, and forget the one it keeps.
+/// Has the device use its built-in model, and forget the one it keeps.
 ///
 /// # Errors
-/// What the device refuses; those of [`Link::connect`].
+/// When the device refuses; those of [`Link::connect`].
 pub fn built_in_model(arguments: &ModelArguments) -> Result<(), Failure> {
     let device = &arguments.device;
     let address = device.address()?;
@@ -121,12 +121,12 @@ fn parts(file: &[u8]) -> impl Iterator<Item = ModelPart> + '_ {
         .zip(file.chunks(MODEL_PART_BYTES));
     chunks.map(|(offset, chunk)| ModelPart {
         offset,
-        // A chunk has at most as many bytes as a part.
+        // A chunk is at most as long as a part.
         bytes: chunk.iter().copied().collect(),
     })
 }
 
-/// The model that the device says it uses, which is the wanted one.
+/// The model that the device now reports; an error if it is not the wanted one.
 fn in_use(
     link: &Link,
     hello: DeviceHello,
@@ -143,7 +143,7 @@ fn in_use(
     })
 }
 
-/// What an update did.
+/// The result of an update.
 #[derive(Serialize)]
 struct Update<'a> {
     model: info::Model<'a>,
