@@ -1,4 +1,4 @@
-//! Which threshold separates dots from film.
+//! Finds the threshold that separates dots from film.
 
 use super::levels::{Histogram, Scale};
 use crate::focus::checks::{DARKEST_VALUES, advice};
@@ -8,37 +8,37 @@ use hivtac_terms::hsv::Hsv;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_wire::message::DeviceHello;
 
-/// Distance between two levels that are tried.
+/// Distance between two limits that are tried.
 const STEP: usize = 4;
-/// The largest part of a picture that dots and other things of their colour have: four dots have
-/// a hundredth.
+/// Largest part of a picture that dots and other objects of their colour fill. Four dots fill a
+/// hundredth.
 const LARGEST_PART: f64 = 0.03;
-/// Limits that show the same number of blobs, when these are things and no noise.
+/// Fewest limits that must show the same number of blobs, for these to be objects instead of noise.
 const FEWEST: usize = 3;
-/// Levels that a threshold lies above nearly all of the film and below nearly all of the dots:
-/// five standard deviations of the simulated camera's noise, 2.5 levels. The quantiles allow for
-/// three.
+/// Margin of a threshold, in levels: above nearly all of the film, below nearly all of the dots.
+/// Five standard deviations (2.5 levels each) of the simulated camera's noise; the quantiles allow
+/// for three.
 const MARGIN: u8 = 12;
-/// The part of the film's pixels that are not above its highest, and of the dots' that are not
-/// below their lowest.
+/// Part of the film's pixels that are not above its upper level, and part of the dots' pixels that
+/// are not below their lower level.
 const NEARLY_ALL: [f64; 2] = [0.999, 0.99];
-/// A dot's colour is that of the pixels within this part of its radius, the film's that of those
-/// beyond this many radii of every dot.
+/// A dot's colour is the colour of the pixels within this part of its radius. The film's is that of
+/// the pixels beyond [`BEYOND`] radii from every dot.
 const CORE: f64 = 0.5;
 /// See [`CORE`].
 const BEYOND: f64 = 1.6;
-/// The film beside the dots is that within so many radii.
+/// The film near the dots is the film within this many radii of a dot.
 const NEAR: f64 = 4.0;
-/// How far the hues of a box go beyond those of the dots, 2° each: as far as the usual box beyond
-/// red tape in white light.
+/// Margin of a box around the dots' hues, in units of 2°: as wide as the usual box's beyond red
+/// tape in white light.
 const HUE_MARGIN: i16 = 8;
-/// A picture whose median is darker, of 255, has no colours to tell apart.
+/// A picture with a median below this, of 255, has no distinguishable colours.
 const DARK: u8 = 20;
 
-/// What to do about pale dots.
+/// Advice about pale dots.
 const PALE: &str = "use dots of a stronger colour, white light, and no light from outside";
 
-/// What a threshold lies between, each a number of the scale from 0 to 255.
+/// The levels on both sides of a threshold, each from 0 to 255 on the scale.
 #[derive(Clone, Copy, Debug)]
 pub struct Levels {
     /// The film's median.
@@ -47,7 +47,7 @@ pub struct Levels {
     pub film_high: u8,
     /// 99 % of the dots' cores are not below.
     pub dots_low: u8,
-    /// Their median.
+    /// The median of the dots' cores.
     pub dots: u8,
 }
 
@@ -56,34 +56,35 @@ pub struct Levels {
 pub struct Found {
     pub scale: Scale,
     pub levels: Levels,
-    /// The sensing finds its four markers from the first to the last of these limits, at least.
+    /// First and last limit of the widest range in which the sensing finds the four markers.
     pub span: [u8; 2],
     pub chosen: Threshold,
-    /// The model's, when it separates dots from film, too.
+    /// The model's threshold, if that also separates dots from film.
     pub model: Option<Threshold>,
-    /// Of the dots' cores in RGB565: first and last hue, and the lowest value.
+    /// The colour of the dots' cores, for RGB565.
     pub colour: Option<Colour>,
 }
 
 impl Found {
-    /// The model's when it separates: there are forces only with that.
+    /// The model's threshold if it separates, because only that one gives forces; else the chosen
+    /// one.
     pub fn wanted(&self) -> Threshold {
         self.model.unwrap_or(self.chosen)
     }
 }
 
-/// The colour of the dots' cores: 98 % of their hues, and the value that 99 % are not below.
+/// The colour of the dots' cores: the range of 98 % of their hues, and the value that 99 % reach.
 #[derive(Clone, Copy, Debug)]
 pub struct Colour {
-    /// 0–179; the first above the second wraps through 0.
+    /// First and last hue, 0–179; a first above the last wraps through 0.
     pub hues: [u8; 2],
     pub value_low: u8,
 }
 
-/// Looks for it in pictures of one device.
+/// Finds the threshold in pictures of one device.
 ///
 /// # Errors
-/// Why the pictures do not separate, and what to do.
+/// Why the pictures do not separate dots from film, and what to do.
 pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
     let format = frames[0].format();
     let brightness = brightness(frames);
@@ -128,7 +129,7 @@ pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
     })
 }
 
-/// A frame with the level of each of its pixels.
+/// A frame with the level of each pixel.
 struct Picture<'f> {
     frame: &'f Frame,
     levels: Vec<u8>,
@@ -140,7 +141,7 @@ impl<'f> Picture<'f> {
         Picture { frame, levels }
     }
 
-    /// Distance of a pixel from the nearest spot, in radii of that.
+    /// Distance of a pixel from the nearest spot, in radii of that spot.
     fn off(&self, index: usize, spots: &[Spot; 4]) -> f64 {
         let width = usize::from(self.frame.width);
         let (x, y) = ((index % width) as f64, (index / width) as f64);
@@ -149,7 +150,7 @@ impl<'f> Picture<'f> {
     }
 }
 
-/// Median of value or luma.
+/// Median of the frames' value (RGB565) or luma.
 fn brightness(frames: &[Frame]) -> u8 {
     let values = frames.iter().flat_map(|frame| match frame.format() {
         PixelFormat::Rgb565 => {
@@ -162,7 +163,7 @@ fn brightness(frames: &[Frame]) -> u8 {
     Histogram::of(values).quantile(0.5)
 }
 
-/// The markers of every picture as the sensing finds them with a threshold.
+/// The markers in every picture, as the sensing finds them with a threshold.
 fn markers(
     pictures: &[Picture],
     device: &DeviceHello,
@@ -172,7 +173,7 @@ fn markers(
     pictures.iter().map(of_one).collect()
 }
 
-/// The longest row of limits with each of which the sensing finds four markers in every picture.
+/// The widest range of limits with which the sensing finds four markers in every picture.
 fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8; 2], String> {
     let mut best: Option<[u8; 2]> = None;
     let mut row: Option<[u8; 2]> = None;
@@ -184,7 +185,7 @@ fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8;
             Ok(_) => row = Some([row.map_or(level, |[from, _]| from), level]),
             Err(not_seen) => {
                 row = None;
-                // Below, the film passes, and blobs are none of dots.
+                // At lower limits the film passes, and its blobs are not dots.
                 if level > film {
                     misses.push(not_seen);
                 }
@@ -213,7 +214,7 @@ fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8;
     })
 }
 
-/// Of what limits show, what most of them do that show anything.
+/// The most frequent result among limits that show blobs; `None` if no result is frequent enough.
 fn usual(misses: &[NotSeen]) -> Option<&NotSeen> {
     let count = |blobs: usize| misses.iter().filter(|it| it.blobs == blobs).count();
     let is_seen = |it: &&NotSeen| it.blobs > 0 && count(it.blobs) >= FEWEST;
@@ -221,7 +222,7 @@ fn usual(misses: &[NotSeen]) -> Option<&NotSeen> {
     of_dots.max_by_key(|it| count(it.blobs))
 }
 
-/// Of the dots, and of the film within so many radii of a dot.
+/// Levels of the dots, and of the film within `within` radii of a dot.
 fn levels(pictures: &[Picture], spots: &[[Spot; 4]], within: f64) -> Levels {
     let of = |is_wanted: &dyn Fn(f64) -> bool| {
         let both = pictures.iter().zip(spots);
@@ -245,8 +246,8 @@ fn levels(pictures: &[Picture], spots: &[[Spot; 4]], within: f64) -> Levels {
     }
 }
 
-/// Half way between the medians of film and dots, where a pixel lies that a dot covers by half; as
-/// near to that as the margins allow.
+/// The limit half way between the medians of film and dots, or as near to it as the margins allow.
+/// At half way lies a pixel that a dot covers by half.
 pub fn limit(scale: Scale, levels: &Levels) -> Result<u8, String> {
     let least = levels.film_high.saturating_add(MARGIN);
     let most = levels.dots_low.saturating_sub(MARGIN);
@@ -263,7 +264,7 @@ pub fn limit(scale: Scale, levels: &Levels) -> Result<u8, String> {
     Ok(levels.film.midpoint(levels.dots).clamp(least, most))
 }
 
-/// Whether a threshold of the same format lies between film and dots with the margins.
+/// Whether a threshold of the same format lies between film and dots, with the margins.
 fn separates(threshold: &Threshold, levels: &Levels, colour: Option<&Colour>) -> bool {
     let limit = Scale::limit(threshold);
     let is_between =
@@ -300,7 +301,7 @@ fn colour(pictures: &[Picture], spots: &[[Spot; 4]]) -> Colour {
                 .collect::<Vec<_>>()
         })
         .collect();
-    // Counted from the hue opposite to red, so that reds lie side by side.
+    // Counted from the hue opposite to red, which keeps all reds together.
     let turned = Histogram::of(core.iter().map(|it| beside(it.hue, 90)));
     let hue = |part| beside(turned.quantile(part), 90);
     Colour {
@@ -309,13 +310,13 @@ fn colour(pictures: &[Picture], spots: &[[Spot; 4]]) -> Colour {
     }
 }
 
-/// The hue so far beside another one on their circle.
+/// The hue at distance `by` from a hue, on the circle of 180.
 fn beside(hue: u8, by: i16) -> u8 {
     (i16::from(hue) + by).rem_euclid(180) as u8
 }
 
-/// A box around a colour: its hues and some more, and half of its value, so that half of the light
-/// is enough.
+/// A box around a colour: its hues with a margin, and half of its value, which suffices in half of
+/// the light.
 fn narrowed(wide: HsvBox, colour: &Colour) -> HsvBox {
     HsvBox {
         hue_low: beside(colour.hues[0], -HUE_MARGIN),

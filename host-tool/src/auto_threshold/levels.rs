@@ -1,32 +1,32 @@
-//! How much each pixel looks like a dot: one number from 0 to 255, along which a threshold is laid.
+//! Measures how much each pixel looks like a dot, as one number from 0 to 255 for a threshold.
 
 use hivtac_host::frame::Frame;
 use hivtac_terms::hsv::Hsv;
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 
-/// Hues that may be a dot's: the sensing weighs pixels by their redness, so that none beyond 60°
-/// from red is worth looking for.
+/// First and last hue of a possible dot. The sensing weighs pixels by redness, which excludes hues
+/// beyond 60° from red.
 const RED_HUES: [u8; 2] = [150, 30];
 
 /// The number along which a threshold separates dots from film.
 #[derive(Clone, Copy, Debug)]
 pub enum Scale {
-    /// RGB565: the saturation of reddish pixels of at least this value; others have none.
+    /// RGB565: the saturation of reddish pixels of at least this value; all other pixels have 0.
     Saturation {
-        /// Lowest value of a pixel that is looked at: in the dark, noise has every colour.
+        /// Lowest value of a considered pixel; in the dark, noise has every colour.
         value_low: u8,
     },
     /// YUV422: Cr.
     Cr,
-    /// Mono: how far a pixel's luma lies below 255; dots are dark.
+    /// Mono: 255 less the pixel's luma; dots are dark.
     Darkness,
 }
 
 impl Scale {
-    /// That of frames of this format whose pixels have a median value of `brightness`.
+    /// The scale for frames of this format with a median value of `brightness`.
     pub fn of(format: PixelFormat, brightness: u8) -> Scale {
         match format {
-            // A dot in a quarter of the light is found.
+            // Finds a dot in a quarter of the light.
             PixelFormat::Rgb565 => Scale::Saturation {
                 value_low: (brightness / 4).max(1),
             },
@@ -35,7 +35,7 @@ impl Scale {
         }
     }
 
-    /// Its name for a person.
+    /// Its name, for a person.
     pub fn name(self) -> &'static str {
         match self {
             Scale::Saturation { .. } => "saturation",
@@ -44,7 +44,7 @@ impl Scale {
         }
     }
 
-    /// Each pixel's number, row after row; none beyond the picture.
+    /// The number of each pixel, row after row, without pixels outside the picture.
     pub fn levels(self, frame: &Frame) -> Vec<u8> {
         let pixels = frame.pixels();
         match self {
@@ -69,7 +69,7 @@ impl Scale {
         }
     }
 
-    /// Lets pixels pass from `level` up.
+    /// The threshold that passes pixels from `level` up.
     pub fn threshold(self, level: u8) -> Threshold {
         match self {
             Scale::Saturation { value_low } => Threshold::Rgb565(HsvBox {
@@ -88,7 +88,7 @@ impl Scale {
         }
     }
 
-    /// From which number up a threshold of the same format lets pixels pass.
+    /// The level from which a threshold of the same format passes pixels.
     pub fn limit(threshold: &Threshold) -> u8 {
         match threshold {
             Threshold::Rgb565(it) => it.saturation_low,
@@ -103,7 +103,7 @@ impl Scale {
 pub struct Histogram([u32; 256]);
 
 impl Histogram {
-    /// Of these numbers.
+    /// The histogram of these numbers.
     pub fn of(numbers: impl IntoIterator<Item = u8>) -> Histogram {
         let mut counts = [0; 256];
         numbers
@@ -112,7 +112,7 @@ impl Histogram {
         Histogram(counts)
     }
 
-    /// The smallest number that at least `part` (0 to 1) of all are not above; 0 of none.
+    /// The smallest number that at least `part` (0 to 1) of all numbers do not exceed; 0 if empty.
     pub fn quantile(&self, part: f64) -> u8 {
         let all: u32 = self.0.iter().sum();
         let wanted = f64::from(all) * part;
@@ -139,7 +139,7 @@ mod tests {
         assert_eq!(Histogram::of([]).quantile(0.5), 0);
     }
 
-    /// What passes a threshold of a level is what has at least that level, for every pixel.
+    /// A threshold at a level passes exactly the pixels of at least that level.
     #[test]
     fn a_level_is_what_a_threshold_lets_pass() {
         let every = |pixel: u16| pixel.to_be_bytes();

@@ -1,5 +1,5 @@
-//! `hivtac threshold auto`: the threshold that separates dots from film, found in the device's own
-//! pictures, and set.
+//! `hivtac threshold auto`: finds the threshold that separates dots from film in the device's own
+//! pictures, and sets it.
 
 mod find;
 mod levels;
@@ -21,7 +21,7 @@ use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_wire::message::DeviceHello;
 use serde_json::{Value, json};
 
-/// Pictures that are looked at: noise is in each another.
+/// Number of pictures; each has other noise.
 const PICTURES: usize = 3;
 
 /// Find the threshold that separates the dots from the film in the device's own pictures, show
@@ -46,10 +46,10 @@ pub struct AutoArguments {
     json: bool,
 }
 
-/// Finds the threshold, shows why, and sets it.
+/// Finds the threshold, prints why it was chosen, and sets it.
 ///
 /// # Errors
-/// [`Kind::NotRight`] when the pictures do not separate dots from film; what the device refuses.
+/// [`Kind::NotRight`] when the pictures do not separate dots from film; when the device refuses.
 pub fn run(arguments: &AutoArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
     let mut frames = Vec::new();
@@ -80,7 +80,7 @@ pub fn run(arguments: &AutoArguments) -> Result<(), Failure> {
     Ok(())
 }
 
-/// What was found, with what passes of the pictures.
+/// The threshold found, and how much of the pictures passes it.
 struct Report<'a> {
     found: Found,
     frame: [u16; 2],

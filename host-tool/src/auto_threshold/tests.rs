@@ -1,4 +1,4 @@
-//! Thresholds found in pictures of the simulated sensor, and pictures in which there is none.
+//! Tests on the simulated sensor's pictures, with and without a separating threshold.
 
 use super::find::{Levels, find, limit};
 use super::levels::Scale;
@@ -65,8 +65,7 @@ fn a_box_has_the_colours_of_the_dots() {
     assert_eq!(rgb.model, None, "this device has no model");
 }
 
-/// Of a model that was made for the usual threshold, and of one whose threshold lies beside the
-/// dots' saturation.
+/// With a model for the usual threshold, and with one whose threshold misses the dots' saturation.
 #[test]
 fn the_models_is_taken_when_it_separates() {
     let picture = frame(|_| ());
@@ -87,7 +86,7 @@ fn the_models_is_taken_when_it_separates() {
     assert_eq!(of_other.model, None);
 }
 
-/// Half of the light, warm light, and a press.
+/// With half of the light, with warm light, and under a press.
 #[test]
 fn it_follows_the_light() {
     for change in [
@@ -135,7 +134,7 @@ fn what_does_not_separate_is_refused_with_the_reason() {
     assert!(another.contains("something else"), "{another}");
 }
 
-/// As near to the middle of film and dots as the margins allow.
+/// A limit lies as near to the middle of film and dots as the margins allow.
 #[test]
 fn a_limit_keeps_its_margins() {
     let of = |[film, film_high, dots_low, dots]: [u8; 4]| {

@@ -1,4 +1,4 @@
-//! Board and camera: which they are, and whether the camera holds what was written to it.
+//! Checks board and camera: their identities, and whether the camera holds what was written to it.
 
 use super::complaints::hear;
 use super::device::reason;
@@ -10,19 +10,18 @@ use hivtac_wire::message::{DeviceMessage, Inspection, Request};
 use serde_json::{Value, json};
 use std::time::Duration;
 
-/// What reading all registers takes, at most; a camera that does not answer is tried again every
-/// half second.
+/// Longest time to read all registers. A camera that does not answer is tried every half second.
 const INSPECTION: Duration = Duration::from_secs(3);
-/// Exposure beyond this part of the longest, with gain beyond [`HIGH_GAIN`], is all that the camera
-/// can do.
+/// An exposure beyond this part of the longest, with a gain beyond [`HIGH_GAIN`], is the camera's
+/// limit.
 const LONG_EXPOSURE: f64 = 0.95;
 /// 3.9 of the 4 that the firmware allows.
 const HIGH_GAIN: Q<4, u16> = Q::from_bits(62);
 
-/// Has the camera's registers read back.
+/// Has the device read the camera's registers back.
 ///
 /// # Errors
-/// The connection breaks.
+/// When the connection breaks.
 pub fn step(link: &mut Link, patience: Duration) -> Result<(Step, Option<Inspection>), Failure> {
     let (mut complaints, mut inspection) = (Vec::new(), None);
     let answer = link.request(
@@ -52,7 +51,7 @@ fn silent(refused: Option<String>, complaint: Option<String>) -> Step {
     Step::new("camera", found, wrong, Value::Null)
 }
 
-/// What is wrong about an inspection.
+/// Judges an inspection.
 pub fn judge(it: &Inspection) -> Step {
     let mut wrong: Vec<_> = it.different.iter().map(different).collect();
     if !wrong.is_empty() {
@@ -87,7 +86,7 @@ fn different(register: &hivtac_wire::message::DifferentRegister) -> String {
     )
 }
 
-/// The letter of a revision of the STM32H743.
+/// The letter of an STM32H743 revision.
 fn revision(silicon: u16) -> String {
     match silicon {
         0x2001 => "X".to_owned(),

@@ -1,4 +1,4 @@
-//! Clocks: whether frames come at the rate that the camera was set to, and all of them are read.
+//! Checks the clocks: frames must have the camera's set rate, and all of them must be read.
 
 use super::report::Step;
 use super::samples::{Wanted, collect};
@@ -8,15 +8,15 @@ use hivtac_wire::message::{DeviceMessage, Request, Sample, Stats};
 use serde_json::json;
 use std::time::Duration;
 
-/// How long frames are watched.
+/// Time for which frames are watched.
 const WATCH: Duration = Duration::from_secs(3);
-/// Farthest rate from what it should be, in parts of it: crystals are a hundred times better.
+/// Largest relative error of the rate; crystals are a hundred times better.
 const RATE_PART: f64 = 0.01;
 
-/// Watches frames.
+/// Watches frames and judges their rate and losses.
 ///
 /// # Errors
-/// The connection breaks, or the device does not answer.
+/// When the connection breaks or the device does not answer.
 pub fn step(link: &mut Link, patience: Duration, frame_time_us: u32) -> Result<Step, Failure> {
     let mut complaints = Vec::new();
     let before = stats(link, patience)?;
@@ -71,8 +71,8 @@ fn losses((before, after): (Stats, Stats)) -> Vec<String> {
     causes.into_iter().flatten().collect()
 }
 
-/// The rate by the device's clock. USB works, so that its crystal is right within a quarter of a
-/// percent: the camera's clock comes from the same one.
+/// Judges the rate by the device's clock. Because USB works, the device's crystal is right within a
+/// quarter of a percent, and the camera's clock comes from the same crystal.
 pub fn judge(samples: &[Sample], frame_time_us: u32, mut complaints: Vec<String>) -> Step {
     let wanted_hz = 1e6 / f64::from(frame_time_us.max(1));
     let Some(rate_hz) = rate_hz(samples) else {
@@ -107,7 +107,7 @@ pub fn judge(samples: &[Sample], frame_time_us: u32, mut complaints: Vec<String>
     Step::new("clocks", found, wrong, figures)
 }
 
-/// Of the frames' numbers over their times; nothing for fewer than two.
+/// Frame numbers over time; `None` for fewer than two samples.
 fn rate_hz(samples: &[Sample]) -> Option<f64> {
     let [first, .., last] = samples else {
         return None;

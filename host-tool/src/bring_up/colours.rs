@@ -1,16 +1,17 @@
-//! Colours: what the camera makes of white.
+//! Checks the colours: the levels that the camera gives for white.
 
 use super::report::Step;
 use hivtac_host::frame::Frame;
 use hivtac_host::look;
 use serde_json::json;
 
-/// Largest saturation of white, of 255: half of what the usual threshold asks of a marker.
+/// Largest saturation of white, of 255: half of the usual threshold's for a marker.
 const LARGEST_SATURATION: f64 = 50.0;
-/// Brightness, of 255: below, white is too dark for markers to be seen; above, levels are no longer
-/// in proportion to light.
+/// Range of white's brightness, of 255. Below, markers are too dark; above, levels are not
+/// proportional to light.
 const BRIGHTNESS: [f64; 2] = [60.0, 247.0];
-/// The part of the picture's sides that is looked at, about its middle: between the markers.
+/// Part of each side of the picture, around its middle, that is measured; it lies between the
+/// markers.
 const MIDDLE: f64 = 0.2;
 
 /// Judges the middle of a picture that should be white.
@@ -42,7 +43,7 @@ pub fn step(frame: &Frame) -> Step {
     Step::new("white", found, wrong, figures)
 }
 
-/// Mean red, green and blue about the picture's middle, of 255.
+/// Mean red, green and blue around the picture's middle, of 255.
 fn middle(frame: &Frame) -> [f64; 3] {
     let levels = look::levels(frame);
     let (width, height) = (usize::from(frame.width), usize::from(frame.height));

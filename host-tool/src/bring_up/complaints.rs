@@ -1,11 +1,11 @@
-//! What the device complains about while it is asked.
+//! Collects warnings and errors that the device logs.
 
 use crate::output::note;
 use crate::request::show_log;
 use hivtac_host::link::log_text;
 use hivtac_wire::message::{DeviceMessage, LogLevel};
 
-/// Shows a line that the device logs, and keeps a complaint.
+/// Shows a line that the device logs, and keeps it if it is a warning or an error.
 pub fn hear(complaints: &mut Vec<String>, message: DeviceMessage) {
     match message {
         DeviceMessage::Log(line) if line.level != LogLevel::Info => {

@@ -1,4 +1,4 @@
-//! The first steps: whether there is a device, and whether its USB is steady.
+//! Checks whether there is a device, and whether its USB is steady.
 
 use super::complaints::hear;
 use super::report::Step;
@@ -9,10 +9,10 @@ use hivtac_wire::message::{DeviceHello, Request};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
-/// Questions that have to be answered.
+/// Questions that the device must answer.
 const QUESTIONS: u32 = 50;
 
-/// Nobody answers.
+/// The step for a device that does not answer.
 pub fn not_there(failure: &Failure) -> Step {
     let advice = [
         failure.to_string(),
@@ -28,10 +28,10 @@ pub fn not_there(failure: &Failure) -> Step {
     Step::new("usb", found, advice.to_vec(), Value::Null)
 }
 
-/// Questions, one after the other.
+/// Asks questions, one after the other, and judges the answers.
 ///
 /// # Errors
-/// The connection breaks.
+/// When the connection breaks.
 pub fn usb(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     let mut complaints = Vec::new();
     let (mut longest, mut failed) = (Duration::ZERO, 0);
@@ -68,7 +68,7 @@ pub fn usb(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     Ok(Step::new("usb", found, wrong, figures))
 }
 
-/// Whether the device refused a command, or did not answer it; other failures are passed on.
+/// Whether the device refused a command or did not answer it; returns other failures.
 pub fn refused(answer: Result<(), Failure>) -> Result<bool, Failure> {
     match reason(answer)? {
         Some(_) => Ok(true),
@@ -76,7 +76,7 @@ pub fn refused(answer: Result<(), Failure>) -> Result<bool, Failure> {
     }
 }
 
-/// Why the device refused a command, if it did; other failures are passed on.
+/// Why the device refused a command, if it did; returns other failures.
 pub fn reason(answer: Result<(), Failure>) -> Result<Option<String>, Failure> {
     use hivtac_host::failure::Kind;
     match answer {
@@ -86,7 +86,7 @@ pub fn reason(answer: Result<(), Failure>) -> Result<Option<String>, Failure> {
     }
 }
 
-/// What the device says about itself, as `hivtac info --json`.
+/// The device's state, as `hivtac info --json` prints it.
 pub fn told(link: &mut Link, patience: Duration, hello: DeviceHello) -> Result<Value, Failure> {
     let (hello, stats) = ask(link, patience, hello)?;
     Ok(json!(Info::new(&link.name, &hello, stats)))

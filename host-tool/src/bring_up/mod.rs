@@ -1,5 +1,4 @@
-//! `hivtac bring-up`: the first hour with a new board as one command, in the order in which things
-//! go wrong.
+//! `hivtac bring-up`: checks a new board in one command, in the order in which faults occur.
 
 mod camera;
 mod clocks;
@@ -48,11 +47,10 @@ pub struct BringUpArguments {
     json: bool,
 }
 
-/// Goes through all steps, and writes the report.
+/// Goes through all steps and writes the report.
 ///
 /// # Errors
-/// [`Kind::NotRight`] when something is not right; those of the link where that breaks, and of
-/// files.
+/// [`Kind::NotRight`] when a step finds a fault; those of the link when it breaks, and of files.
 pub fn run(arguments: &BringUpArguments) -> Result<(), Failure> {
     let address = arguments.device.address()?;
     let mut report = Report::new();
@@ -77,7 +75,7 @@ pub fn run(arguments: &BringUpArguments) -> Result<(), Failure> {
     }
 }
 
-/// What the steps share.
+/// The state that the steps share.
 struct BringUp<'a> {
     arguments: &'a BringUpArguments,
     link: Link,
@@ -111,8 +109,8 @@ impl<'a> BringUp<'a> {
         })
     }
 
-    /// Everything from the camera on. What cannot be judged without a step is left out when that is
-    /// not right.
+    /// Runs all steps from the camera on; a step is left out when another step that it depends on
+    /// failed.
     fn go(&mut self, report: &mut Report) -> Result<(), Failure> {
         if !report.is_right() {
             return Ok(());
@@ -166,7 +164,7 @@ impl<'a> BringUp<'a> {
 /// Keeps a step, and shows it.
 fn show(arguments: &BringUpArguments, report: &mut Report, step: Step) {
     if !arguments.json {
-        // A reader that has gone still wants the report's file.
+        // The report's file is written even if the reader of the output is gone.
         let _ = print(&step.text());
     }
     report.steps.push(step);

@@ -1,4 +1,4 @@
-//! The tare, and how still the markers then lie.
+//! Takes a tare, and measures how still the markers are afterwards.
 
 use super::complaints::hear;
 use super::device::reason;
@@ -15,17 +15,17 @@ use std::time::Duration;
 
 /// Frames of the tare.
 const TARE_FRAMES: u16 = 32;
-/// Fewest frames.
+/// Fewest frames for a judgement.
 const LEAST_FRAMES: usize = 16;
-/// How long frames are watched.
+/// Time for which frames are watched.
 const WATCH: Duration = Duration::from_secs(5);
-/// So many times that is pointed out.
+/// Times the simulated noise from which noise is reported.
 const MOST_TIMES: f64 = 3.0;
 
 /// Takes a tare, and measures how far the markers of single frames lie from their mean.
 ///
 /// # Errors
-/// The connection breaks.
+/// When the connection breaks.
 pub fn step(link: &mut Link, patience: Duration, format: PixelFormat) -> Result<Step, Failure> {
     let mut complaints = Vec::new();
     let frames = TARE_FRAMES;
@@ -51,7 +51,7 @@ pub fn step(link: &mut Link, patience: Duration, format: PixelFormat) -> Result<
     Ok(judge(&frames, format))
 }
 
-/// Of the markers of frames at rest.
+/// Judges the markers of frames at rest.
 pub fn judge(frames: &[[Marker; 4]], format: PixelFormat) -> Step {
     let simulated_px = simulated_px(format);
     let deviations = deviations_px(frames);
@@ -82,8 +82,8 @@ pub fn judge(frames: &[[Marker; 4]], format: PixelFormat) -> Step {
     Step::new("noise", found, wrong, figures)
 }
 
-/// Standard deviation of a resting marker's coordinates on the simulated sensor, px: root mean
-/// square of the eight, measured by this command on the emulated board.
+/// Standard deviation of a resting marker's coordinates on the simulated sensor, px. It is the root
+/// mean square of the eight, measured by this command on the emulated board.
 fn simulated_px(format: PixelFormat) -> f64 {
     match format {
         PixelFormat::Rgb565 => 0.009,

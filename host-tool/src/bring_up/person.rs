@@ -1,4 +1,4 @@
-//! The person at the bench: is asked to do something, and says when it is done.
+//! Asks the person at the bench to do something, and waits until it is done.
 
 use crate::output::note;
 use hivtac_host::failure::Failure;
@@ -7,16 +7,16 @@ use std::io::BufRead;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::time::Duration;
 
-/// How often is looked whether the program is to end.
+/// Time between two checks whether the program must end.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
-/// Who types at standard input. At its end nobody does, and nothing is waited for.
+/// The lines typed at standard input. After its end there is no wait.
 pub struct Person {
     lines: Receiver<()>,
 }
 
 impl Person {
-    /// Listens from now on.
+    /// Starts to read standard input.
     pub fn listen() -> Person {
         let (typed, lines) = channel();
         std::thread::spawn(move || {
@@ -29,10 +29,10 @@ impl Person {
         Person { lines }
     }
 
-    /// Asks for something, and waits for Enter.
+    /// Prints a request, and waits for Enter.
     ///
     /// # Errors
-    /// It was interrupted.
+    /// When the program was interrupted.
     pub fn ask(&self, what: &str) -> Result<(), Failure> {
         note(&format!("→ {what} Then press Enter."));
         loop {

@@ -1,4 +1,4 @@
-//! The press of a finger: whether right is right and below is below.
+//! Checks with a finger's presses that right is right and below is below.
 
 use super::report::Step;
 use crate::output::note;
@@ -9,20 +9,20 @@ use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use serde_json::json;
 use std::time::{Duration, Instant};
 
-/// Longest wait for a press and its end, of the computer's time.
+/// Longest wait for a press and its end, by the computer's clock.
 const PATIENCE: Duration = Duration::from_secs(60);
-/// Longest part of a press that is looked at, of the device's time, µs.
+/// Longest part of a press that is used, by the device's clock, µs.
 const LONGEST_PRESS_US: u64 = 1_000_000;
-/// Nearest to the middle that a press still says on which side it is, mm.
+/// Least distance from the middle at which a press has a side, mm.
 const BESIDE_MM: f64 = 0.7;
 
 /// A place on the film, mm: to the right and below in the picture.
 pub type Place = [f64; 2];
 
-/// Asks for two presses, and says whether they are seen where they are.
+/// Asks for two presses, and judges whether they are seen on the right sides.
 ///
 /// # Errors
-/// The connection breaks.
+/// When the connection breaks.
 pub fn step(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     link.request(Request::Start, patience, |_| ())?;
     let side = |name: &str| {
@@ -44,7 +44,7 @@ pub fn step(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     Ok(judge(right, below))
 }
 
-/// Where the next press was, on the mean; nothing when none came in time. One that is there already
+/// The mean place of the next press; `None` if there is none in time. A press that has begun before
 /// does not count.
 fn press(link: &mut Link) -> Result<Option<Place>, Failure> {
     let end = Instant::now() + PATIENCE;
@@ -72,7 +72,7 @@ fn press(link: &mut Link) -> Result<Option<Place>, Failure> {
     Ok(mean(&places))
 }
 
-/// Where a sample says that something touches the film.
+/// The place of a sample's contact; `None` without contact or place.
 fn place(sample: &Sample) -> Option<Place> {
     let place = sample.force?.place?;
     let touched = sample.status.contains(Status::CONTACT);
@@ -85,7 +85,7 @@ fn mean(places: &[Place]) -> Option<Place> {
     (!places.is_empty()).then(|| [sum(0) / count, sum(1) / count])
 }
 
-/// On which side of the middle a press is.
+/// The side of the middle on which a press is.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Side {
     Right,
@@ -105,7 +105,7 @@ fn side([x, y]: Place) -> Option<Side> {
     }
 }
 
-/// Of a press on the right and one below.
+/// Judges a press on the right and one below.
 pub fn judge(right: Option<Place>, below: Option<Place>) -> Step {
     use Side::{Above, Below, Left, Right};
     let wrong = match (right.map(side), below.map(side)) {

@@ -1,30 +1,30 @@
-//! What was found, step by step: for a person on the terminal, and in one file to pass on.
+//! Collects the steps' results, for a person on the terminal and in one file to pass on.
 
 use hivtac_host::failure::Failure;
 use serde::Serialize;
 use serde_json::Value;
 
-/// Every step, in the order in which things go wrong.
+/// The names of all steps, in the order in which faults occur.
 const STEPS: [&str; 7] = [
     "usb", "camera", "clocks", "white", "markers", "noise", "press",
 ];
 
-/// One step.
+/// The result of one step.
 #[derive(Debug, Serialize)]
 pub struct Step {
-    /// Its name, of [`STEPS`].
+    /// Its name, one of [`STEPS`].
     step: &'static str,
     right: bool,
     /// What was found.
     found: String,
-    /// What is wrong and what to do; empty when it is right.
+    /// What is wrong and what to do; empty if the step is right.
     wrong: Vec<String>,
-    /// What was measured.
+    /// The measured values.
     figures: Value,
 }
 
 impl Step {
-    /// A step that is right when nothing is `wrong`.
+    /// A step that is right if `wrong` is empty.
     pub fn new(step: &'static str, found: String, wrong: Vec<String>, figures: Value) -> Step {
         Step {
             step,
@@ -35,18 +35,18 @@ impl Step {
         }
     }
 
-    /// More things are wrong.
+    /// Adds faults.
     pub fn add(&mut self, wrong: Vec<String>) {
         self.wrong.extend(wrong);
         self.right = self.wrong.is_empty();
     }
 
-    /// Whether nothing is wrong.
+    /// Whether the step has no faults.
     pub fn is_right(&self) -> bool {
         self.right
     }
 
-    /// A line with what was found, and one for each thing that is wrong.
+    /// A line with what was found, and one for each fault.
     pub fn text(&self) -> String {
         let verdict = if self.right { "right" } else { "WRONG" };
         let mut lines = vec![format!("{:<8} {verdict}  {}", self.step, self.found)];
@@ -60,23 +60,23 @@ impl Step {
     }
 }
 
-/// All of it.
+/// The results of all steps.
 #[derive(Serialize)]
 pub struct Report {
-    /// This tool.
+    /// The tool's version.
     hivtac: &'static str,
-    /// As `hivtac info --json` has it; nothing when there is no device.
+    /// As in `hivtac info --json`; null without a device.
     pub device: Value,
-    /// Whether every step was gone through and is right.
+    /// Whether every step was done and is right.
     right: bool,
-    /// As far as it came.
+    /// The steps that were done.
     pub steps: Vec<Step>,
-    /// What was not looked at, as it rests on what is wrong.
+    /// Names of the steps that were not done, because they depend on one with a fault.
     not_done: Vec<&'static str>,
 }
 
 impl Report {
-    /// Before the first step.
+    /// An empty report.
     pub fn new() -> Report {
         Report {
             hivtac: env!("CARGO_PKG_VERSION"),
@@ -87,25 +87,25 @@ impl Report {
         }
     }
 
-    /// Whether all is right so far.
+    /// Whether all steps until now are right.
     pub fn is_right(&self) -> bool {
         self.steps.iter().all(Step::is_right)
     }
 
-    /// Names of what is wrong.
+    /// Names of the steps that have faults.
     pub fn wrong(&self) -> Vec<&'static str> {
         let wrong = self.steps.iter().filter(|step| !step.right);
         wrong.map(|step| step.step).collect()
     }
 
-    /// There are no more steps.
+    /// Notes that there are no more steps.
     pub fn finish(&mut self) {
         let done = |name: &&str| self.steps.iter().any(|step| step.step == *name);
         self.not_done = STEPS.into_iter().filter(|name| !done(name)).collect();
         self.right = self.is_right() && self.not_done.is_empty();
     }
 
-    /// As JSON, for people to read, too.
+    /// As indented JSON, which people can read.
     pub fn json(&self) -> String {
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
@@ -113,7 +113,7 @@ impl Report {
     /// Writes it to a file.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// When the file cannot be written.
     pub fn write(&self, path: &str) -> Result<(), Failure> {
         std::fs::write(path, self.json() + "\n")
             .map_err(|error| Failure::input(format!("cannot write the report {path}: {error}")))

@@ -1,4 +1,4 @@
-//! Samples for a while.
+//! Collects a device's samples for a time.
 
 use super::complaints::hear;
 use hivtac_host::failure::Failure;
@@ -6,22 +6,23 @@ use hivtac_host::link::Link;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use std::time::{Duration, Instant};
 
-/// How many samples are wanted, and how long they are waited for.
+/// The number of samples that are wanted, and the longest waits for them.
 pub struct Wanted {
-    /// As many are enough.
+    /// Number after which the collection ends.
     pub enough: usize,
-    /// Fewer are of no use.
+    /// Fewest useful samples.
     pub least: usize,
-    /// They are waited for so long,
+    /// Longest time if there are enough useful samples.
     pub watch: Duration,
-    /// and so long while there are too few: an emulated device is slow.
+    /// Longest time while there are too few: an emulated device is slow.
     pub patience: Duration,
 }
 
-/// Has them flow after `start`, and stop; what the device complains about is added to `complaints`.
+/// Starts the samples with `start`, collects them, and stops them. Adds the device's warnings and
+/// errors to `complaints`.
 ///
 /// # Errors
-/// The connection breaks, or the device does not answer.
+/// When the connection breaks or the device does not answer.
 pub fn collect(
     link: &mut Link,
     start: Request,

@@ -1,4 +1,4 @@
-//! What the steps say about what they measured.
+//! Tests of the steps' judgements.
 
 use super::report::{Report, Step};
 use super::{camera, clocks, colours, noise, press};
@@ -11,7 +11,7 @@ use hivtac_terms::units::Px;
 use hivtac_wire::message::{DifferentRegister, Inspection, Sample};
 use serde_json::{Value, json};
 
-/// What is wrong has these words; nothing is where there are none.
+/// The step's faults contain these words; without words it has no fault.
 fn says(step: &Step, words: &[&str]) {
     assert_eq!(step.is_right(), words.is_empty(), "{}", step.text());
     let wrong = step.wrong().join("\n");
@@ -64,7 +64,7 @@ fn light_that_asks_for_everything_the_camera_has_is_too_little() {
     says(&camera::judge(&at_low_gain), &[]);
 }
 
-/// Frames that take so long each.
+/// Samples of frames with this period.
 fn samples(frame_us: u64) -> Vec<Sample> {
     let sample = |frame: u32| Sample {
         sequence: frame,
@@ -112,7 +112,7 @@ fn white_is_neutral_and_neither_dark_nor_saturated() {
     says(&colours::step(&picture(0xB48C)), &["white is not white"]);
 }
 
-/// Frames whose first marker jumps by so many px.
+/// Frames whose first marker jumps by `jump_px`.
 fn jumping(jump_px: f64) -> Vec<[Marker; 4]> {
     let marker = |x: f64| Marker {
         x: Px((x * 65_536.0) as i32),

@@ -1,5 +1,5 @@
-//! What must be right about a picture before its forces are worth anything: each with its limit,
-//! the reason for that, and what to do.
+//! Checks a picture before its forces can be used: each check has a limit, the limit's reason, and
+//! advice.
 //!
 //! `docs/building-a-sensor.md` has the same limits for a builder.
 
@@ -8,52 +8,53 @@ use hivtac_host::frame::Frame;
 use hivtac_terms::threshold::Threshold;
 use serde::Serialize;
 
-/// Widest rim, px. A sharp lens makes one of 1.3, one that blurs every point by a pixel (standard
-/// deviation) one of 3, and by two pixels one of 5.3; of the hard cases of the simulated sensor,
-/// all frames are accepted at one pixel and most are refused at two (`docs/results/hard-cases.md`,
-/// blur-1 and blur-2).
+/// Widest rim, px. A sharp lens has a rim of 1.3. One that blurs every point by a pixel (standard
+/// deviation) has 3, by two pixels 5.3. Of the simulated sensor's hard cases, all frames are
+/// accepted at one pixel and most are refused at two (`docs/results/hard-cases.md`, blur-1 and
+/// blur-2).
 const RIM_PX: f64 = 3.5;
-/// In YUV422, where two pixels share a colour.
+/// Widest rim in YUV422, where two pixels share a colour, px.
 const RIM_OF_PAIRS_PX: f64 = 4.0;
-/// Farthest width from what the optics give, in parts of that: half of what the sensing takes as a
-/// marker; the other half is for threshold and light.
+/// Largest relative difference of a marker's width from the one that the optics give. It is half of
+/// what the sensing accepts; the other half is for threshold and light.
 const WIDTH_PART: f64 = 0.19;
-/// Steps of a colour that a marker must have beyond its threshold: eight standard deviations of the
-/// simulated camera's noise, 2.5 levels, so that no pixel inside it falls out.
+/// Least margin of a marker's colour above its threshold, in levels. It is eight standard
+/// deviations (2.5 levels each) of the simulated camera's noise, and no pixel inside a marker is
+/// lost.
 const COLOUR_MARGIN: f64 = 20.0;
-/// Darkest marker, in parts of the threshold's lowest value: at half of that light two thirds of
-/// its mask are lost, and with that its place, silently.
+/// Value of the darkest marker, as a multiple of the threshold's lowest value. At half of that
+/// light a marker loses two thirds of its mask and, without a warning, its place.
 pub const DARKEST_VALUES: f64 = 2.0;
-/// Brightest level: RGB565's last but one. Beyond it light is no longer in proportion to levels, by
-/// which rims are weighed.
+/// Brightest level: RGB565's last but one. Beyond it, levels are not proportional to light, and
+/// rims are weighed by levels.
 const BRIGHTEST: f64 = 247.0;
-/// Farthest of the pattern's middle from the picture's, px, and largest turn, degrees: three
-/// standard deviations of the units that the calibration was shown to make up for
+/// Largest distance of the pattern's middle from the picture's, px, and largest turn, degrees. They
+/// are three standard deviations of the units for which calibration compensates
 /// (`docs/results/units.md`).
 const SHIFT_PX: f64 = 9.0;
 /// See [`SHIFT_PX`].
 const TURN_DEG: f64 = 6.0;
-/// Farthest size of the pattern from the geometry's, in parts of it: a tare is refused beyond.
+/// Largest relative difference of the pattern's size from the geometry's; a tare is refused beyond.
 const SIZE_PART: f64 = 0.15;
 
-/// One thing that must be right.
+/// One condition of a good picture.
 #[derive(Clone, Debug, Serialize)]
 pub struct Check {
-    /// What: `rim`, `width`, `colour`, `brightness`, `film`, `centre`, `turn`, `size`.
+    /// Its name: `rim`, `width`, `colour`, `brightness`, `film`, `centre`, `turn`, `size`.
     pub what: &'static str,
-    /// Which marker's; of the pattern when it is none.
+    /// Its marker; `None` for the whole pattern.
     pub marker: Option<usize>,
-    /// What it is; nothing when there is nothing to measure.
+    /// Its value; `None` if it cannot be measured.
     pub value: Option<f64>,
     /// Its least value.
     pub least: Option<f64>,
     /// Its largest value.
     pub most: Option<f64>,
-    /// Of these three.
+    /// The unit of value, least and most.
     pub unit: &'static str,
-    /// Whether it is right.
+    /// Whether it is fulfilled.
     pub right: bool,
-    /// What to do; empty when it is right.
+    /// What to do; empty if it is fulfilled.
     pub advice: String,
 }
 
@@ -80,7 +81,7 @@ impl Check {
         }
     }
 
-    /// With what to do when it is too little and when it is too much.
+    /// Adds advice for a value that is too small, and for one that is too large.
     fn or(mut self, too_little: &str, too_much: &str) -> Check {
         let little = self
             .value
@@ -95,7 +96,7 @@ impl Check {
     }
 }
 
-/// All checks of a frame: four of each marker, one of the film beside it, three of the pattern.
+/// All checks of a frame: four of each marker, one of the film around it, three of the pattern.
 pub fn checks(frame: &Frame, seen: &Seen) -> Vec<Check> {
     let markers = (0..).zip(&seen.markers);
     let mut checks: Vec<Check> = markers
@@ -105,7 +106,7 @@ pub fn checks(frame: &Frame, seen: &Seen) -> Vec<Check> {
     checks
 }
 
-/// What to do about a picture that does not show four markers.
+/// Advice about a picture that does not show four markers.
 pub fn advice(not_seen: &NotSeen) -> String {
     let NotSeen { blobs, status } = not_seen;
     let why = status.join(" ");
@@ -152,7 +153,7 @@ fn of_marker(frame: &Frame, id: usize, marker: &Marker) -> [Check; 5] {
     ]
 }
 
-/// By what the threshold asks for: saturation, Cr or luma.
+/// Checks a marker's colour in the threshold's quantity: saturation, Cr or luma.
 fn of_colour(frame: &Frame, id: Option<usize>, marker: &Marker) -> Check {
     let [red, green, blue] = marker.colour;
     let high = red.max(green).max(blue);

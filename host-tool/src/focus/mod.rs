@@ -1,4 +1,4 @@
-//! `hivtac focus`: pictures again and again, until everything about them is right.
+//! `hivtac focus`: checks picture after picture, until everything about them is right.
 
 pub mod checks;
 mod rim;
@@ -33,7 +33,7 @@ pub struct FocusArguments {
     json: bool,
 }
 
-/// Shows what is right and wrong about each picture, until all is right or it is interrupted.
+/// Shows the checks of each picture, until all are right or the program is interrupted.
 pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
     loop {
@@ -46,7 +46,7 @@ pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
     }
 }
 
-/// In which order things are put right: nothing is sharp in the dark.
+/// The order in which faults must be corrected: in the dark nothing is sharp.
 const ORDER: [&str; 8] = [
     "brightness",
     "film",
@@ -58,20 +58,20 @@ const ORDER: [&str; 8] = [
     "turn",
 ];
 
-/// What is right and wrong about a picture.
+/// The checks of a picture.
 #[derive(Serialize)]
 pub struct Focus {
     frame: u32,
-    /// Whether everything is.
+    /// Whether everything is right.
     pub right: bool,
-    /// Each thing; none when no four markers are seen.
+    /// The checks; empty if the picture does not show four markers.
     pub checks: Vec<Check>,
-    /// What is wrong and what to do about it, in the order in which to do it.
+    /// Faults with advice, in the order in which to correct them.
     pub wrong: Vec<String>,
 }
 
 impl Focus {
-    /// Of a frame of this device.
+    /// The checks of a frame of this device.
     pub fn of(frame: &Frame, device: &DeviceHello) -> Focus {
         let (checks, wrong) = match look(frame, device) {
             Ok(seen) => {
@@ -90,7 +90,7 @@ impl Focus {
         }
     }
 
-    /// A table of the markers with the limits, a line of the pattern, and what to do.
+    /// A table of the markers with the limits, a line about the pattern, and the advice.
     pub fn text(&self) -> String {
         let mut lines = vec![format!("frame {}", self.frame)];
         if !self.checks.is_empty() {
@@ -126,7 +126,7 @@ impl Focus {
         )
     }
 
-    /// Those of the first marker: only the widths differ a little.
+    /// The limits of the first marker: those of the others differ a little in width only.
     fn limits_row(&self) -> String {
         row("right", self.of_marker(0).map(limits))
     }
@@ -140,12 +140,12 @@ fn row(name: &str, cells: impl IntoIterator<Item = impl ToString>) -> String {
     format!("  {name:<7}{}", cells.collect::<String>())
 }
 
-/// One decimal, which is what its limits have.
+/// A number with one decimal, as its limits have; a dash if it is missing.
 fn number(value: Option<f64>) -> String {
     value.map_or("–".into(), |value| format!("{value:.1}"))
 }
 
-/// "centre 2.3 px (≤ 9)".
+/// Text of a pattern's check, such as "centre 2.3 px (≤ 9)".
 fn of_pattern(check: &Check) -> String {
     let places = if check.what == "size" { 2 } else { 1 };
     let value = check.value.unwrap_or(f64::NAN);
@@ -177,7 +177,7 @@ fn limits(check: &Check) -> String {
     }
 }
 
-/// "rim of marker 0, 2: 4.1, 4.3 px (≤ 3.5): turn the lens"; nothing when none is wrong.
+/// Text such as "rim of marker 0, 2: 4.1, 4.3 px (≤ 3.5): turn the lens"; `None` if all are right.
 fn said(checks: &[Check], what: &str) -> Option<String> {
     let wrong = checks
         .iter()

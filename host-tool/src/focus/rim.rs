@@ -1,15 +1,15 @@
-//! How sharp a marker's rim is, and how wide the marker: the mean profile of its edge.
+//! Measures the sharpness of a marker's rim and the marker's width, from the mean profile of its
+//! edge.
 
 use std::f64::consts::TAU;
 
-/// Rays from a marker's centre.
+/// Number of rays from a marker's centre.
 const RAYS: usize = 64;
-/// Between two samples of a ray, px.
+/// Distance between two samples of a ray, px.
 const STEP_PX: f64 = 0.1;
-/// Where rays end, in parts of the radius.
+/// Length of a ray, in radii.
 const REACH: f64 = 2.0;
-/// The marker's own level is taken inside of this, the film's outside of [`FILM`], in parts of the
-/// radius.
+/// The marker's level is measured inside this distance, the film's outside [`FILM`], in radii.
 const CORE: f64 = 0.4;
 /// See [`CORE`].
 const FILM: f64 = 1.7;
@@ -21,7 +21,7 @@ pub struct Field {
 }
 
 impl Field {
-    /// Of rows of `width` numbers.
+    /// A field with rows of `width` numbers.
     pub fn new(width: u16, values: Vec<f64>) -> Field {
         Field {
             width: width.into(),
@@ -29,7 +29,7 @@ impl Field {
         }
     }
 
-    /// Between the four pixels around a point; those of the border go on beyond it.
+    /// The number at a point, interpolated between four pixels; the border's continue beyond it.
     fn at(&self, x: f64, y: f64) -> f64 {
         let rows = self.values.len() / self.width;
         let clamped = |at: f64, end: usize| at.clamp(0.0, (end - 1) as f64);
@@ -47,14 +47,14 @@ impl Field {
 /// The edge of a marker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// From 90 to 10 % of the way between the film's level and the marker's, px.
+    /// Distance between 90 and 10 % of the way from the film's level to the marker's, px.
     pub rim_px: f64,
-    /// Of the disc of the same area inside the half-way line, px.
+    /// Diameter of a disc with the area inside the half-way line, px.
     pub diameter_px: f64,
 }
 
-/// The edge of the marker around `centre`, whose mask has about `radius_px`. `None` when there is
-/// no edge: a ray does not come half-way to the film's level.
+/// The edge of the marker at `centre`, whose mask has a radius of about `radius_px`. `None` if a
+/// ray does not come half-way to the film's level.
 pub fn edge(field: &Field, centre: [f64; 2], radius_px: f64) -> Option<Edge> {
     let rays: Vec<Vec<f64>> = (0..RAYS)
         .map(|ray| sample(field, centre, radius_px, ray))
@@ -82,7 +82,7 @@ fn sample(field: &Field, [x, y]: [f64; 2], radius_px: f64, ray: usize) -> Vec<f6
         .collect()
 }
 
-/// Of marker and film.
+/// The levels of marker and film.
 struct Levels {
     marker: f64,
     film: f64,
@@ -104,7 +104,7 @@ impl Levels {
         (marker != film).then_some(Levels { marker, film })
     }
 
-    /// How far each is from the film's level, in parts of the way to the marker's.
+    /// Each number's distance from the film's level, as a part of the way to the marker's.
     fn parts(&self, ray: &[f64]) -> Vec<f64> {
         let part = |level: &f64| (level - self.film) / (self.marker - self.film);
         ray.iter().map(part).collect()
@@ -115,7 +115,7 @@ fn first_below(ray: &[f64], part: f64) -> Option<usize> {
     ray.iter().position(|value| *value < part)
 }
 
-/// The mean over the rays, each moved so that its half-way point lies in the middle.
+/// The mean of the rays, each shifted to have its half-way point in the middle.
 fn mean_profile(rays: &[Vec<f64>], halves: &[usize]) -> Option<Vec<f64>> {
     let inside = *halves.iter().min()?;
     let outside = rays
@@ -133,7 +133,7 @@ fn mean_profile(rays: &[Vec<f64>], halves: &[usize]) -> Option<Vec<f64>> {
     Some((0..inside + outside).map(mean).collect())
 }
 
-/// Where a profile falls below a part for the first time, in steps.
+/// The first point where a profile falls below a part, in steps.
 fn crossing(profile: &[f64], part: f64) -> Option<f64> {
     let after = first_below(profile, part)?;
     let before = after.checked_sub(1)?;
@@ -145,7 +145,7 @@ fn crossing(profile: &[f64], part: f64) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A disc of radius 6.5 px whose edge is a normal distribution's, σ = `blur_px`.
+    /// A disc of radius 6.5 px with an edge like a normal distribution's, σ = `blur_px`.
     fn disc(blur_px: f64) -> Field {
         let level = |x: usize, y: usize| {
             let distance = (x as f64 - 30.3).hypot(y as f64 - 24.6) - 6.5;
@@ -156,7 +156,7 @@ mod tests {
         Field::new(60, pixels.collect())
     }
 
-    /// Taking it between pixels blurs it by a triangle of two pixels, of variance 1/6.
+    /// Interpolation between pixels blurs the edge by a triangle of two pixels, of variance 1/6.
     #[test]
     fn the_rim_is_as_wide_as_it_was_drawn() {
         for blur_px in [0.6, 0.8, 1.2, 1.6] {
@@ -173,7 +173,7 @@ mod tests {
         assert_eq!(edge(&even, [30.0, 25.0], 7.0), None);
     }
 
-    /// A blob at the border, or of no size, is no reason to stop.
+    /// A blob at the border or of no size does not cause a panic.
     #[test]
     fn any_centre_and_radius_is_taken() {
         for centre in [[0.0, 0.0], [59.0, 49.0], [-5.0, 70.0], [30.3, 24.6]] {

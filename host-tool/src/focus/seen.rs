@@ -1,4 +1,4 @@
-//! What a frame shows of the four markers: their edges, colours and pattern.
+//! Measures the four markers in a frame: their edges, colours and pattern.
 
 use super::rim::{Edge, Field, edge};
 use hivtac_host::frame::Frame;
@@ -14,19 +14,19 @@ use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// A marker's colour is that of the pixels within this part of its radius.
 const CORE: f64 = 0.5;
-/// The film's colour beside it is that of the pixels between these, in parts of its radius.
+/// The film's colour around a marker is that of the pixels between these distances, in radii.
 const AROUND: [f64; 2] = [1.6, 2.0];
 
 /// One marker.
 #[derive(Clone, Copy, Debug)]
 pub struct Marker {
-    /// Its rim and diameter; nothing where there is no edge.
+    /// Its rim and diameter; `None` if it has no edge.
     pub edge: Option<Edge>,
-    /// Diameter that the optics give it where it is, px.
+    /// Diameter that the optics give a marker at this place, px.
     pub expected_px: f64,
     /// Its mean colour: red, green, blue, of 255.
     pub colour: [f64; 3],
-    /// The film's around it.
+    /// The mean colour of the film around it, of 255.
     pub film: [f64; 3],
 }
 
@@ -35,27 +35,27 @@ pub struct Marker {
 pub struct Seen {
     /// Each.
     pub markers: [Marker; 4],
-    /// Of their mean from the picture's middle, to the right and down, px.
+    /// Shift of the markers' mean from the picture's middle, to the right and down, px.
     pub shift_px: [f64; 2],
-    /// How far they are turned, from x towards y, degrees, −45 to 45.
+    /// Turn of the pattern, from x towards y, degrees, −45 to 45.
     pub turn_deg: f64,
-    /// Their mean distance from their mean, in parts of what the geometry has at rest.
+    /// Mean distance of the markers from their mean, relative to the geometry's at rest.
     pub size: f64,
 }
 
-/// Why a frame shows no four markers.
+/// Why four markers cannot be seen in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotSeen {
-    /// Red things in it.
+    /// Number of blobs of the markers' colour.
     pub blobs: usize,
-    /// What the sensing says.
+    /// Names of the sensing's status bits.
     pub status: Vec<&'static str>,
 }
 
-/// What a frame of this device shows.
+/// Measures the markers in a frame of this device.
 ///
 /// # Errors
-/// There are no four blobs around the picture's middle.
+/// When there are not four blobs around the picture's middle.
 pub fn look(frame: &Frame, device: &DeviceHello) -> Result<Seen, NotSeen> {
     let geometry = geometry(frame, device);
     let spots = spots(frame, device, geometry)?;
@@ -79,7 +79,7 @@ pub fn look(frame: &Frame, device: &DeviceHello) -> Result<Seen, NotSeen> {
     })
 }
 
-/// The device's lens with this frame's size; the usual one when its name is not known here.
+/// The device's lens at this frame's size; the usual lens if its name is unknown.
 fn geometry(frame: &Frame, device: &DeviceHello) -> Geometry {
     let preset = Preset::from_name(&device.preset).unwrap_or(Preset::Ov7725);
     Geometry::preset(preset, frame.width, frame.height)
@@ -90,7 +90,7 @@ fn geometry(frame: &Frame, device: &DeviceHello) -> Geometry {
 pub struct Spot {
     /// Its centre, (x, y).
     pub centre: [f64; 2],
-    /// That of a disc of its area.
+    /// Radius of a disc with the blob's area.
     pub radius: f64,
 }
 
@@ -103,8 +103,8 @@ impl Spot {
     }
 }
 
-/// The markers as the sensing finds them, or else the four largest blobs when they lie around their
-/// own middle: those of a picture that is to be mended.
+/// The markers as the sensing finds them, or else the four largest blobs if they lie around their
+/// own middle. The latter serve for a picture that must be corrected.
 fn spots(frame: &Frame, device: &DeviceHello, geometry: Geometry) -> Result<[Spot; 4], NotSeen> {
     let mut sensor = Box::default();
     let not_seen = match sensed(&mut sensor, frame, device, geometry, frame.threshold) {
@@ -124,7 +124,7 @@ fn spots(frame: &Frame, device: &DeviceHello, geometry: Geometry) -> Result<[Spo
 /// The markers as the sensing finds them with a threshold of the frame's format.
 ///
 /// # Errors
-/// It finds no four.
+/// When the sensing does not find four markers.
 pub fn found_by_sensing(
     frame: &Frame,
     device: &DeviceHello,
@@ -162,7 +162,7 @@ fn sensed(
     })
 }
 
-/// From the upper left clockwise; nothing unless one is on each side of their middle.
+/// The spots from the upper left clockwise; `None` unless one is on each side of their middle.
 fn clockwise(mut spots: [Spot; 4]) -> Option<[Spot; 4]> {
     let middle = mean(spots.map(|spot| spot.centre));
     spots.sort_by(|one, other| angle(one, middle).total_cmp(&angle(other, middle)));
@@ -174,18 +174,18 @@ fn clockwise(mut spots: [Spot; 4]) -> Option<[Spot; 4]> {
     even.then_some(spots)
 }
 
-/// Of a spot around the middle, x towards y.
+/// Angle of a spot around the middle, from x towards y.
 fn angle(spot: &Spot, middle: [f64; 2]) -> f64 {
     (spot.centre[1] - middle[1]).atan2(spot.centre[0] - middle[0])
 }
 
-/// The mean of how far each is from its diagonal.
+/// The mean angle of the spots from their diagonals.
 fn turn(spots: &[Spot; 4], middle: [f64; 2]) -> f64 {
     let off = |spot: &Spot| angle(spot, middle).rem_euclid(FRAC_PI_2) - FRAC_PI_4;
     spots.iter().map(off).sum::<f64>() / 4.0
 }
 
-/// What the optics make of a marker at a distance from the middle, px.
+/// Diameter that the optics give a marker at a distance from the middle, px.
 fn expected_px(geometry: &Geometry, distance: f64) -> f64 {
     let distance = Px((distance * 65_536.0) as i32);
     let [across, along] = [geometry.across(distance), geometry.along_flat(distance)];
@@ -196,7 +196,8 @@ fn mean(points: [[f64; 2]; 4]) -> [f64; 2] {
     [0, 1].map(|i| points.iter().map(|point| point[i]).sum::<f64>() / 4.0)
 }
 
-/// What tells a marker from the film, in proportion to light: Cr of red markers, luma of others.
+/// The quantity that distinguishes a marker from the film, proportional to light: Cr for red
+/// markers, luma for others.
 fn contrast(format: PixelFormat, colours: &[u8]) -> Vec<f64> {
     let weights = match format {
         PixelFormat::Rgb565 | PixelFormat::Yuv422 => [0.5, -0.419, -0.081],
@@ -214,7 +215,7 @@ fn contrast(format: PixelFormat, colours: &[u8]) -> Vec<f64> {
         .collect()
 }
 
-/// Of the pixels between two distances from a spot's centre, in parts of its radius.
+/// Mean colour of the pixels between two distances from a spot's centre, in radii.
 fn mean_colour(colours: &[u8], width: u16, spot: &Spot, [from, to]: [f64; 2]) -> [f64; 3] {
     let inside = |index: usize| {
         let (x, y) = (index % usize::from(width), index / usize::from(width));

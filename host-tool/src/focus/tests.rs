@@ -1,4 +1,4 @@
-//! Pictures of the simulated sensor, right and wrong, and what is said of them.
+//! Tests on good and bad pictures of the simulated sensor.
 
 use super::*;
 use hivtac_terms::conditions::CentroidEstimator;
@@ -7,7 +7,7 @@ use hivtac_twin::{Format, Load, Options, Preset, Scene};
 
 const RED: [u8; 6] = [170, 10, 100, 255, 45, 255];
 
-/// A device that makes frames such as these.
+/// A device that sends frames such as these.
 pub fn device() -> DeviceHello {
     DeviceHello {
         protocol: 2,
@@ -56,7 +56,7 @@ pub fn frame(change: impl Fn(&mut Options)) -> Frame {
     }
 }
 
-/// What is wrong with it, in the order in which it is said.
+/// The faults of a frame, in the order in which they are shown.
 fn wrong(frame: &Frame) -> Vec<String> {
     let focus = Focus::of(frame, &device());
     let checks = focus.checks.iter();
@@ -66,7 +66,7 @@ fn wrong(frame: &Frame) -> Vec<String> {
     focus.wrong
 }
 
-/// Asserts that just one thing is wrong, and what is said of it.
+/// Asserts that there is exactly one fault, whose text has these words.
 fn assert_wrong(frame: &Frame, words: &[&str]) {
     let wrong = wrong(frame);
     assert_eq!(wrong.len(), 1, "{wrong:?}");
@@ -83,7 +83,7 @@ fn the_nominal_sensor_is_right_in_both_formats() {
     }
 }
 
-/// A blur that costs no frame is right, and one that costs most of them is not.
+/// A blur that loses no frame is right; one that loses most frames is a fault.
 #[test]
 fn a_blurred_picture_is_told_by_its_rims() {
     for format in [Format::Rgb565, Format::Yuv422] {
@@ -148,7 +148,7 @@ fn too_little_and_too_much_light_are_told() {
     assert!(bright[0].starts_with("brightness of"), "{bright:?}");
     assert!(bright[0].contains("less light"), "{bright:?}");
     assert_eq!(wrong(&frame(|options| options.gain = 0.7)), [""; 0]);
-    // On one side only.
+    // Light from one side only.
     let aslant = frame(|options| {
         options.gain = 0.8;
         options.gradient = [1.0, 0.0];
@@ -168,7 +168,7 @@ fn washed_out_colours_are_told() {
     );
 }
 
-/// As a film 13 mm away, everything is smaller.
+/// With a film 13 mm away, everything is smaller.
 #[test]
 fn a_film_too_far_away_is_told() {
     let small = wrong(&frame(|options| options.lens.pitch_um = Some(15.0)));

@@ -1,4 +1,4 @@
-//! Server-Sent Events: samples and states as they come, for as long as the browser reads.
+//! Sends samples and states as Server-Sent Events for as long as the browser reads.
 
 use super::feed::{Cursor, Feed, News};
 use super::lights;
@@ -14,13 +14,13 @@ use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Time between two looks for news: thirty times a second, which a screen shows as motion.
+/// Time between two checks for news: thirty a second look like motion on a screen.
 const LOOK_EVERY: Duration = Duration::from_millis(33);
-/// Time after which a silent stream says that it is there, which finds out whether its reader is.
+/// Silence after which a comment is sent, which shows whether the reader is still there.
 const SAY_SOMETHING_EVERY: Duration = Duration::from_secs(5);
 
-/// Sends events until the reader is gone or too slow, or the program is to end. Says whether the
-/// sensors obey the page.
+/// Sends events until the reader is gone or too slow, or the program must end. `obeys` says whether
+/// the sensors take orders from the page.
 pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>], obeys: bool) -> io::Result<()> {
     begin(out, EVENTS)?;
     let mut readers: Vec<(&Feed, Cursor)> =
@@ -50,7 +50,7 @@ pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>], obeys: bool) -> io::Res
             said = Instant::now();
             text.clear();
         }
-        // With what came meanwhile, a reader of the past is soon in the present.
+        // Faster while samples wait, until a reader of the past has come to the present.
         if all_read {
             std::thread::sleep(LOOK_EVERY);
         } else {
@@ -60,7 +60,7 @@ pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>], obeys: bool) -> io::Res
     Ok(())
 }
 
-/// An event as the stream has it. JSON has no line ends.
+/// An event in the stream's format; JSON has no line ends.
 fn event(name: &str, data: &impl Serialize) -> String {
     format!("event: {name}\ndata: {}\n\n", to_json(data))
 }
@@ -85,7 +85,7 @@ fn told(sensor: usize, news: &News) -> String {
     text
 }
 
-/// The first event.
+/// The stream's first event.
 #[derive(Serialize)]
 struct Hello {
     sensors: usize,
@@ -100,7 +100,7 @@ struct Samples {
     samples: Vec<Row>,
 }
 
-/// A sample: sequence number, frame, device time in µs, status; then its force or `null`.
+/// A sample: sequence number, frame, device time (µs), status; then its force or `null`.
 #[derive(Serialize)]
 struct Row(u32, u32, u64, u32, Option<Value>);
 
@@ -116,8 +116,8 @@ impl From<&Sample> for Row {
     }
 }
 
-/// Fx, Fy, Fz, |F| and its standard uncertainty; α, β and the direction's; then the place or `null`:
-/// integers as on the wire.
+/// Fx, Fy, Fz, |F| and its standard uncertainty; α, β and the direction's standard uncertainty;
+/// then the place or `null`. Integers as in the wire format.
 fn force_row(force: &Force) -> Value {
     let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.integer(force));
     let place = force.place.as_ref();

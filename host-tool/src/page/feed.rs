@@ -1,6 +1,7 @@
-//! What the thread of a device tells those that show it: the last half minute of samples, and how
-//! it stands. Telling never waits for a reader; a reader that is too slow misses samples, and
-//! learns how many.
+//! Passes the last half minute of samples and the state of a device to the threads that show it.
+//!
+//! The device's thread never waits for a reader. A reader that is too slow misses samples, and gets
+//! their number.
 
 use hivtac_wire::message::Sample;
 use std::collections::VecDeque;
@@ -8,22 +9,22 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Most samples that are kept: half a minute at 270 a second.
 const KEPT: usize = 8192;
-/// How much of the past a new reader is given, µs of the device's clock.
+/// Length of the past that a new reader gets, µs of the device's clock.
 const PAST_US: u64 = 30_000_000;
-/// Most samples of one [`News`], so that the lock is held for a moment.
+/// Most samples of one [`News`], which limits the time for which the lock is held.
 const AT_ONCE: usize = 512;
 
-/// Written by one thread, read by many.
+/// Samples and state of a device, written by one thread, read by many.
 #[derive(Default)]
 pub struct Feed(Mutex<Contents>);
 
 #[derive(Default)]
 struct Contents {
     samples: VecDeque<Sample>,
-    /// Samples that were kept before the first of these.
+    /// Number of samples before the first one that is kept.
     before: u64,
     state: Arc<str>,
-    /// States that were told.
+    /// Number of states that were set.
     states: u64,
 }
 
@@ -34,14 +35,14 @@ pub struct Cursor {
     state: u64,
 }
 
-/// What a reader has not read yet.
+/// The samples and the state that a reader has not read yet.
 #[derive(Debug, Default)]
 pub struct News {
     /// Samples, the oldest first.
     pub samples: Vec<Sample>,
-    /// Samples before them that this reader was too slow for.
+    /// Number of samples before them that this reader missed.
     pub skipped: u64,
-    /// The newest state, as JSON, when it is another one.
+    /// The newest state, as JSON; `None` if it has not changed.
     pub state: Option<Arc<str>>,
 }
 
@@ -50,7 +51,7 @@ impl Feed {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// A sample came.
+    /// Adds a sample.
     pub fn sample(&self, sample: Sample) {
         let mut contents = self.contents();
         if contents.samples.len() == KEPT {
@@ -60,14 +61,14 @@ impl Feed {
         contents.samples.push_back(sample);
     }
 
-    /// How the device stands now, as JSON.
+    /// Sets the device's state, as JSON.
     pub fn state(&self, state: String) {
         let mut contents = self.contents();
         contents.state = state.into();
         contents.states += 1;
     }
 
-    /// Where a reader begins: half a minute ago, and with the newest state.
+    /// The cursor of a new reader: half a minute ago, with the newest state unread.
     pub fn begin(&self) -> Cursor {
         let contents = self.contents();
         let newest = contents.samples.back().map_or(0, |sample| sample.time_us);
@@ -76,7 +77,7 @@ impl Feed {
                 .checked_sub(sample.time_us)
                 .is_some_and(|age_us| age_us <= PAST_US)
         };
-        // Backwards, up to where a device that started anew had other times.
+        // Backwards, to where a restarted device had other times.
         let past = contents.samples.iter().rev().take_while(is_new).count();
         let end = contents.before + contents.samples.len() as u64;
         Cursor {
@@ -85,7 +86,7 @@ impl Feed {
         }
     }
 
-    /// What came since, at most so much at once that nobody waits long; goes on there next time.
+    /// The news since the cursor, at most [`AT_ONCE`] samples; moves the cursor.
     pub fn news(&self, cursor: &mut Cursor) -> News {
         let contents = self.contents();
         let skipped = contents.before.saturating_sub(cursor.sample);
@@ -168,7 +169,7 @@ mod tests {
         let feed = Feed::default();
         (0..100).for_each(|second| feed.sample(sample(second, u64::from(second) * 1_000_000)));
         assert_eq!(numbers(&feed.news(&mut feed.begin()))[0], 69);
-        // The device starts anew: what was before has another clock.
+        // The device restarts: earlier samples have another clock.
         feed.sample(sample(100, 5));
         assert_eq!(numbers(&feed.news(&mut feed.begin())), [100]);
     }

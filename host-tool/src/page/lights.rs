@@ -1,15 +1,15 @@
-//! What a status bit means to a person, and what to do about it.
+//! The meaning of each status bit for a person, and what to do about it.
 
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
-/// How bad it is.
+/// The severity of a status bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// As it should be.
     Good,
-    /// There is a force; it is worth less than it could be.
+    /// There is a force, but less certain.
     Warning,
     /// There is no force.
     Bad,
@@ -20,17 +20,17 @@ pub enum Level {
 pub struct Light {
     /// The bit's value.
     bit: u32,
-    /// Its name, as in all output.
+    /// Its name, as in all outputs.
     pub name: &'static str,
-    /// How bad it is.
+    /// Its severity.
     pub level: Level,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
-    /// What to do; empty when nothing has to be done.
+    /// What to do; empty if nothing is necessary.
     pub advice: &'static str,
 }
 
-/// Every bit that a status can have, lowest first.
+/// Every bit of all possible statuses, lowest first.
 pub fn all() -> Vec<Light> {
     of(Status(u32::MAX))
 }
@@ -159,7 +159,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
 mod tests {
     use super::*;
 
-    /// The words for what is not known are nobody's.
+    /// No known bit has the words for an unknown one.
     #[test]
     fn every_bit_has_words_of_its_own() {
         let unknown = words(Status(1 << 31)).0;

@@ -1,5 +1,5 @@
-//! A live page in a browser of this computer: its files, its server, and what it is told. Who has
-//! the sensor's port fills the feeds: `hivtac view`, and `hivtac-calibrate` while it records.
+//! A live page in a browser of this computer: its files, its server and its data. The owner of the
+//! sensor's port fills the feeds: `hivtac view`, or `hivtac-calibrate` while it records.
 
 mod events;
 mod feed;

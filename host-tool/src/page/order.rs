@@ -1,10 +1,10 @@
-//! What the page asks of a device: read from JSON, carried to the device's thread, and answered.
+//! Orders from the page to a device: read from JSON, passed to the device's thread, and answered.
 
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use serde::Deserialize;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
-/// What to do with a device.
+/// What a device must do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// Take the rest position.
@@ -13,23 +13,23 @@ pub enum Order {
     Expose,
     /// Set the threshold.
     Threshold(Threshold),
-    /// Set that of the model.
+    /// Set the model's threshold.
     ModelThreshold,
     /// Begin a recording.
     Record,
-    /// End it.
+    /// End the recording.
     StopRecording,
     /// Take a frame.
     Picture,
 }
 
-/// How it went.
+/// The result of an order.
 pub enum Answer {
     /// Done, in words for a person.
     Done(String),
     /// Not done, and why.
     Failed(String),
-    /// The frame, as bytes for the page once they are asked for: making them takes long.
+    /// The frame, as a function that makes its bytes for the page: that takes long.
     Picture(Box<dyn FnOnce() -> Vec<u8> + Send>),
 }
 
@@ -41,13 +41,13 @@ pub struct Posted {
 }
 
 impl Posted {
-    /// An order, and where its answer will be.
+    /// An order, and the receiver of its answer.
     pub fn new(order: Order) -> (Posted, Receiver<Answer>) {
         let (answer, answers) = sync_channel(1);
         (Posted { order, answer }, answers)
     }
 
-    /// Answers it; whoever asked may have stopped waiting.
+    /// Answers it; the sender may have stopped waiting.
     pub fn answer(self, answer: Answer) {
         let _ = self.answer.try_send(answer);
     }
@@ -63,10 +63,10 @@ struct Written {
     limits: Option<[u8; 6]>,
 }
 
-/// Which of the sensors is to do what.
+/// Reads an order and the index of its sensor.
 ///
 /// # Errors
-/// Says what cannot be understood.
+/// The text says what is invalid.
 pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
     let written: Written = serde_json::from_slice(body).map_err(|error| error.to_string())?;
     let order = match written.order.as_str() {

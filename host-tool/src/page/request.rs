@@ -1,4 +1,4 @@
-//! A request of a browser: read with bounds of time and length, and only as much of HTTP/1.1 as
+//! Reads a browser's request, with limits of time and length. It supports the part of HTTP/1.1 that
 //! the page needs.
 
 use super::response::Status;
@@ -13,35 +13,35 @@ pub const LONGEST_BODY: usize = 1 << 10;
 /// Most header fields; browsers send twenty.
 const MOST_FIELDS: usize = 64;
 
-/// What is asked for.
+/// The method of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Method {
-    /// To be shown something.
+    /// Shows something.
     Get,
-    /// To do something.
+    /// Does something.
     Post,
 }
 
 /// A whole request.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Request {
-    /// What is asked for.
+    /// Its method.
     pub method: Method,
-    /// As sent, without decoding.
+    /// The path as sent, without decoding.
     pub path: String,
-    /// The one host that it names.
+    /// The host that it names; exactly one.
     pub host: String,
-    /// The page that it comes from, where a browser tells.
+    /// The page that it comes from, if the browser says so.
     pub origin: Option<String>,
     /// At most [`LONGEST_BODY`] bytes.
     pub body: Vec<u8>,
 }
 
-/// Reads that end with an error at a deadline, however slowly bytes drip.
+/// A stream whose reads end with an error at a deadline, however slowly bytes arrive.
 pub struct Timed<'s> {
     /// Where bytes come from.
     pub stream: &'s TcpStream,
-    /// When the last of them must have come.
+    /// The deadline.
     pub end: Instant,
 }
 
@@ -59,8 +59,8 @@ impl Read for Timed<'_> {
 /// Reads a request.
 ///
 /// # Errors
-/// Which status it is refused with: 400 when it is none, 405 for another method, 408 when it does
-/// not come in time, 413 and 431 when body or head are too long.
+/// The status of the refusal: 400 for an invalid request, 405 for another method, 408 after too
+/// long a time, 413 and 431 for too long a body or head.
 pub fn read(stream: &mut impl Read) -> Result<Request, Status> {
     let mut bytes = Vec::new();
     let (mut request, length, head) = loop {
@@ -77,7 +77,7 @@ pub fn read(stream: &mut impl Read) -> Result<Request, Status> {
     Ok(request)
 }
 
-/// Reads what there is, up to `most` bytes in all.
+/// Reads the bytes that are there, up to `most` in all.
 fn more(
     stream: &mut impl Read,
     bytes: &mut Vec<u8>,
@@ -100,7 +100,7 @@ fn more(
     }
 }
 
-/// The request without its body, the body's length, and where it begins; `None` of a part.
+/// The request without its body, the body's length and its start; `None` if the head is incomplete.
 fn parse(bytes: &[u8]) -> Result<Option<(Request, usize, usize)>, Status> {
     let mut fields = [httparse::EMPTY_HEADER; MOST_FIELDS];
     let mut parsed = httparse::Request::new(&mut fields);
@@ -139,7 +139,7 @@ fn parse(bytes: &[u8]) -> Result<Option<(Request, usize, usize)>, Status> {
     Ok(Some((request, length, head)))
 }
 
-/// A header field; refused when it is there twice, for two readers may take another one each.
+/// A header field; refused if it is there twice, because readers may differ in which they take.
 fn one(fields: &[httparse::Header], name: &str) -> Result<Option<String>, Status> {
     let mut own = fields
         .iter()
@@ -158,7 +158,7 @@ fn one(fields: &[httparse::Header], name: &str) -> Result<Option<String>, Status
 mod tests {
     use super::*;
 
-    /// Gives its bytes one at a time, as a slow browser may.
+    /// Returns its bytes one at a time, as a slow browser may.
     struct Dripping<'b>(&'b [u8]);
 
     impl Read for Dripping<'_> {

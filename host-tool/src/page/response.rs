@@ -1,19 +1,19 @@
-//! Answers to a browser: each ends its connection, is kept nowhere, and lets no other page in.
+//! Writes answers to a browser. Each ends its connection, is not cached, and admits no other page.
 
 use std::io::{self, Write};
 
-/// How a request ends.
+/// The result of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// Done.
     Ok,
-    /// No request that this server understands.
+    /// The request is invalid.
     Bad,
-    /// Another token, host or page.
+    /// The token, host or page is wrong.
     Forbidden,
-    /// The token is right, the rest of the path is not.
+    /// The token is right, but the rest of the path is unknown.
     NotFound,
-    /// Neither GET nor POST, or not for this path.
+    /// Neither GET nor POST, or not allowed for this path.
     Method,
     /// The request did not come in time.
     TooSlow,
@@ -21,7 +21,7 @@ pub enum Status {
     BodyTooLong,
     /// The head is too long.
     HeadTooLong,
-    /// Too many at once.
+    /// Too many requests at once.
     Busy,
 }
 
@@ -41,7 +41,7 @@ impl Status {
         }
     }
 
-    /// What a person is told who sees it.
+    /// The text that a person sees.
     fn text(self) -> &'static str {
         match self {
             Status::Forbidden => "Open the whole address that `hivtac view` printed.\n",
@@ -51,7 +51,7 @@ impl Status {
     }
 }
 
-/// Kinds of bodies.
+/// Content types of bodies.
 pub const HTML: &str = "text/html; charset=utf-8";
 /// See [`HTML`].
 pub const CSS: &str = "text/css; charset=utf-8";
@@ -66,8 +66,8 @@ pub const EVENTS: &str = "text/event-stream";
 /// See [`HTML`].
 const TEXT: &str = "text/plain; charset=utf-8";
 
-/// What every answer says: nothing from elsewhere is loaded or run, nobody frames the page or
-/// learns its address, nothing is stored.
+/// Header fields of every answer. They forbid to load or run anything from elsewhere, to frame the
+/// page, to learn its address, and to store anything.
 const RULES: &str = "\
     Content-Security-Policy: default-src 'none'; script-src 'self'; style-src 'self'; \
     connect-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; \
@@ -78,14 +78,14 @@ const RULES: &str = "\
     Cache-Control: no-store\r\n\
     Connection: close\r\n";
 
-/// Begins an answer whose length is not known.
+/// Begins an answer of unknown length.
 pub fn begin(stream: &mut impl Write, kind: &str) -> io::Result<()> {
     let line = Status::Ok.line();
     let head = format!("HTTP/1.1 {line}\r\n{RULES}Content-Type: {kind}\r\n\r\n");
     stream.write_all(head.as_bytes())
 }
 
-/// A whole answer.
+/// Sends a whole answer.
 pub fn send(stream: &mut impl Write, status: Status, kind: &str, body: &[u8]) -> io::Result<()> {
     let (line, length) = (status.line(), body.len());
     let head = format!(
@@ -94,7 +94,7 @@ pub fn send(stream: &mut impl Write, status: Status, kind: &str, body: &[u8]) ->
     stream.write_all(&[head.as_bytes(), body].concat())
 }
 
-/// Says why a request is refused.
+/// Sends a refusal with its reason.
 pub fn refuse(stream: &mut impl Write, status: Status) -> io::Result<()> {
     send(stream, status, TEXT, status.text().as_bytes())
 }

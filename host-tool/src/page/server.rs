@@ -1,4 +1,4 @@
-//! The page's server: on this computer's own address alone, for those who know the token.
+//! Serves the page, on this computer's own address only, to browsers that have the token.
 
 use super::events;
 use super::feed::Feed;
@@ -18,12 +18,12 @@ use std::time::{Duration, Instant};
 
 /// Most connections at once; each has a thread.
 const MOST_CONNECTIONS: usize = 32;
-/// Longest time that a request may take to come.
+/// Longest time for a request to arrive.
 const REQUEST_PATIENCE: Duration = Duration::from_secs(5);
-/// Longest wait for what a device is ordered to do, on top of its own patience: a tare.
+/// Longest wait for an order, such as a tare, in addition to the device's patience.
 const ORDER_PATIENCE: Duration = Duration::from_secs(15);
 
-/// The page's files: path, kind and text.
+/// The page's files: path, content type and text.
 const FILES: [(&str, &str, &str); 9] = [
     ("/", HTML, include_str!("files/index.html")),
     ("/style.css", CSS, include_str!("files/style.css")),
@@ -36,15 +36,15 @@ const FILES: [(&str, &str, &str); 9] = [
     ("/threshold.js", SCRIPT, include_str!("files/threshold.js")),
 ];
 
-/// A device as its visitors see it.
+/// A device as the page shows it.
 pub struct Sensor {
-    /// What it tells.
+    /// Its samples and state.
     pub feed: Arc<Feed>,
-    /// Where its orders go; nowhere when it is shown and no more.
+    /// The queue of its orders; `None` if the page only shows it.
     pub orders: Option<SyncSender<Posted>>,
 }
 
-/// A server that listens.
+/// A server on an open port.
 pub struct Server {
     listener: TcpListener,
     port: u16,
@@ -55,10 +55,10 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens at a port of 127.0.0.1, 0 for any.
+    /// Opens a port of 127.0.0.1, 0 for any.
     ///
     /// # Errors
-    /// When the port is taken, or there are no random numbers.
+    /// When the port is taken, or when there are no random numbers.
     pub fn new(port: u16, sensors: Vec<Sensor>, patience: Duration) -> Result<Server, Failure> {
         let failed = |error: io::Error| {
             Failure::input(format!(
@@ -78,16 +78,16 @@ impl Server {
         })
     }
 
-    /// What to open in a browser.
+    /// The address to open in a browser.
     pub fn address(&self) -> String {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token.text())
     }
 
-    /// Answers as long as the program runs.
+    /// Answers requests while the program runs.
     pub fn run(self: Arc<Server>) {
         for stream in self.listener.incoming() {
             let Ok(stream) = stream else {
-                // Too many open files, say: later there may be fewer.
+                // Too many open files, for example: later there may be fewer.
                 std::thread::sleep(Duration::from_millis(50));
                 continue;
             };
@@ -98,7 +98,8 @@ impl Server {
         }
     }
 
-    /// Whether a request may be answered at all.
+    /// The path behind the token if the request may be answered; `None` if host, origin or token is
+    /// wrong.
     fn is_own<'r>(&self, request: &'r Request) -> Option<&'r str> {
         let hosts = ["127.0.0.1", "localhost"].map(|name| format!("{name}:{}", self.port));
         let origin = request.origin.as_deref();
@@ -130,7 +131,7 @@ impl Visit {
         }
     }
 
-    /// A browser that goes away or stalls is nobody's failure.
+    /// Answers the request; ignores a browser that goes away or stalls.
     fn answer(self, stream: &TcpStream) {
         let _ = self.try_to_answer(stream);
     }
@@ -197,7 +198,7 @@ impl Visit {
         }
     }
 
-    /// Has a device do something, and waits for it.
+    /// Sends an order to a device, and waits for its answer.
     fn ask(&self, sensor: usize, order: Order) -> Result<Answer, Status> {
         let sensor = self.server.sensors.get(sensor).ok_or(Status::NotFound)?;
         let Some(orders) = &sensor.orders else {
@@ -215,14 +216,14 @@ impl Visit {
     }
 }
 
-/// An answer in words.
+/// Sends an answer in words.
 fn said(out: &mut Unstalled<'_>, done: bool, text: &str) -> io::Result<()> {
     let body = json!({ "done": done, "text": text }).to_string();
     response::send(out, Status::Ok, JSON, body.as_bytes())
 }
 
-/// Refuses a request of which bytes may still come: a connection that is closed on them resets, and
-/// the browser may never see the answer.
+/// Refuses a request before all its bytes have come. A connection closed on unread bytes resets,
+/// and the browser might never see the answer: therefore the rest is read first.
 fn refuse_unread(stream: &TcpStream, status: Status) -> io::Result<()> {
     response::refuse(&mut Unstalled::new(stream)?, status)?;
     stream.shutdown(std::net::Shutdown::Write)?;

@@ -1,4 +1,4 @@
-//! The secret in the address of the page: who does not know it gets nothing.
+//! The secret in the page's address, without which no request is answered.
 
 use crate::failure::Failure;
 use std::fmt::Write;
@@ -6,15 +6,15 @@ use std::fmt::Write;
 /// Random bytes of a token.
 const BYTES: usize = 16;
 
-/// 32 hexadecimal digits that nobody can guess.
+/// A secret of 32 hexadecimal digits.
 #[derive(Clone, Debug)]
 pub struct Token(String);
 
 impl Token {
-    /// A new one, of the system's random numbers.
+    /// A new token from the system's random numbers.
     ///
     /// # Errors
-    /// When the system has none.
+    /// When the system has no random numbers.
     pub fn random() -> Result<Token, Failure> {
         let mut bytes = [0; BYTES];
         getrandom::fill(&mut bytes)
@@ -32,8 +32,8 @@ impl Token {
         &self.0
     }
 
-    /// What follows `/TOKEN` in a path; `None` when the path has another token or none. Takes as
-    /// long for any of the right length, so that time tells nothing.
+    /// The rest of a path behind `/TOKEN`; `None` if the token is missing or wrong. Takes equally
+    /// long for every token of the right length, and the time reveals nothing about it.
     pub fn rest<'p>(&self, path: &'p str) -> Option<&'p str> {
         let (digits, rest) = path.strip_prefix('/')?.split_at_checked(self.0.len())?;
         let differences = digits.bytes().zip(self.0.bytes());

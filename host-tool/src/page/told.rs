@@ -1,4 +1,4 @@
-//! What the page is told of a sensor beside its samples.
+//! The state of a sensor that the page shows in addition to its samples.
 
 use crate::shown::{shown, to_json, unit_number};
 use crate::threshold;
@@ -7,14 +7,14 @@ use hivtac_wire::message::DeviceHello;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// How a sensor stands, as the page reads it.
+/// A sensor's state, as the page reads it.
 #[derive(Debug, Serialize)]
 pub struct Told {
     /// The port's name.
     pub port: String,
-    /// Why there are no samples; nothing while they come.
+    /// Why samples are missing; `None` while they come.
     pub trouble: Option<String>,
-    /// What its user calls it; empty when nothing.
+    /// The name that its user set; empty if not set.
     pub name: String,
     /// Its microcontroller's number.
     pub unit: String,
@@ -24,40 +24,40 @@ pub struct Told {
     pub firmware: String,
     /// Its model's name.
     pub model: Option<String>,
-    /// Whether that is of a simulated sensor.
+    /// Whether the model is of a simulated sensor.
     pub simulated: bool,
-    /// Which pixels are markers.
+    /// The threshold in use.
     pub threshold: Limits,
-    /// Those that the model was made for.
+    /// The threshold that the model was made for.
     pub model_threshold: Option<Limits>,
     /// Samples a second.
     pub rate_hz: Option<f64>,
-    /// Frames and samples that are missing.
+    /// Number of missing frames and samples.
     pub lost: u64,
-    /// The same by cause.
+    /// Number of missing frames and samples, by cause.
     pub causes: BTreeMap<&'static str, u64>,
     /// From the exposure to the force, µs.
     pub latency_us: Option<u32>,
     /// From the frame's end to the force, µs.
     pub processing_us: Option<u32>,
-    /// How a recording stands.
+    /// The state of a recording.
     pub recording: Recording,
-    /// The device's newest lines.
+    /// The newest lines that the device logged.
     pub lines: Vec<String>,
-    /// What presses anywhere cover, while they are recorded.
+    /// The coverage of free presses, while these are recorded.
     pub coverage: Option<Coverage>,
 }
 
-/// How a recording stands.
+/// The state of a recording.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Recording {
-    /// Whether a file is under way.
+    /// Whether a file is being written.
     pub on: bool,
-    /// Which, and what came; or what became of the last one.
+    /// The file and what it holds; or the result of the last file.
     pub text: String,
 }
 
-/// A threshold as the page reads and writes it.
+/// A threshold, as the page reads and writes it.
 #[derive(Debug, Serialize)]
 pub struct Limits {
     format: &'static str,
@@ -65,29 +65,29 @@ pub struct Limits {
     text: String,
 }
 
-/// What presses anywhere cover of the film.
+/// The part of the film that free presses cover.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Coverage {
     /// One for each range of forces.
     pub maps: Vec<Map>,
-    /// What is pressed now, for a person.
+    /// The present press, for a person.
     pub now: String,
-    /// How much is covered, and what to do next, for a person.
+    /// The coverage, and what to do next, for a person.
     pub line: String,
 }
 
-/// What is covered in a range of forces.
+/// The coverage in a range of forces.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Map {
     /// The range.
     pub name: String,
-    /// Places in rows, as the camera sees the film.
+    /// The places, row by row, as the camera sees the film.
     pub places: Vec<Vec<Covered>>,
-    /// Row and column of what is pressed now, if it is in this range.
+    /// Row and column of the present press; `None` if it is not in this range.
     pub pressed: Option<[usize; 2]>,
 }
 
-/// How far a place is covered.
+/// The coverage of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Covered {
@@ -97,12 +97,12 @@ pub enum Covered {
     Begun,
     /// Not pressed yet.
     Missing,
-    /// Not pressed, and not asked for.
+    /// Not pressed, and not necessary.
     Unneeded,
 }
 
 impl Told {
-    /// Who it is; nothing has come of it yet.
+    /// The identity of a device, before it has sent anything else.
     pub fn of(port: &str, hello: &DeviceHello) -> Told {
         let model = hello.model.as_ref();
         Told {
@@ -134,7 +134,7 @@ impl Told {
 }
 
 impl Limits {
-    /// Of a threshold.
+    /// The limits of a threshold.
     pub fn of(wanted: &Threshold) -> Limits {
         Limits {
             format: wanted.format().name(),

@@ -1,18 +1,18 @@
-//! Writing to browsers that read, and to no other.
+//! Writes to a browser, and ends the connection if the browser does not read.
 
 use std::io::{self, ErrorKind, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Longest time that a browser may take for one write.
+/// Longest time of one write.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// Writes to a browser that reads: one that lets a single write last as long as it may, even if
-/// some of it went through, is cut off.
+/// A writer that fails with a timeout when a single write takes [`PATIENCE`], even if part of it
+/// succeeded.
 pub struct Unstalled<'s>(&'s TcpStream);
 
 impl Unstalled<'_> {
-    /// Of a connection.
+    /// A writer to a connection.
     pub fn new(stream: &TcpStream) -> io::Result<Unstalled<'_>> {
         stream.set_write_timeout(Some(PATIENCE))?;
         Ok(Unstalled(stream))
@@ -23,7 +23,7 @@ impl Write for Unstalled<'_> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let begun = Instant::now();
         let written = match self.0.write(bytes) {
-            // How Unix calls a timeout.
+            // Unix reports a timeout with this kind.
             Err(error) if error.kind() == ErrorKind::WouldBlock => {
                 return Err(ErrorKind::TimedOut.into());
             }
@@ -47,10 +47,10 @@ mod tests {
     use std::net::TcpListener;
     use std::thread;
 
-    /// How much longer than what is read at once.
+    /// Much more than one read takes.
     const MUCH: usize = 64 << 20;
 
-    /// Writes to a reader that does this, and says how that ended after how long.
+    /// Writes to a reader that runs `read`; returns the result and the time it took.
     fn write_to(read: impl FnOnce(TcpStream) + Send + 'static) -> (io::Result<()>, Duration) {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let reader = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
