@@ -1,5 +1,5 @@
-//! A recording as MCAP in ROS 2's profile: what `ros2 bag play`, Foxglove and `PlotJuggler` read,
-//! and beside it every message of the device as it came, which `hivtac replay` reads.
+//! Writes a recording as MCAP in ROS 2's profile, which `ros2 bag play`, Foxglove and `PlotJuggler`
+//! read. It also holds every message of the device as received, for `hivtac replay`.
 
 use crate::clock::Clock;
 use crate::ros::channel::{Channel, Frames, messages, topic_of};
@@ -14,14 +14,14 @@ use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 
-/// Bytes of a chunk at most: what a full disk costs at the end.
+/// Most bytes of a chunk; a full disk loses at most one chunk at the end.
 const CHUNK: u64 = 1 << 18;
-/// How many topics a sensor has: its channels, and its messages as they came.
+/// Topics of a sensor: its channels, and its messages as received.
 const TOPICS: usize = Channel::ALL.len() + 1;
-/// Place of the topic of the messages as they came.
+/// Index of the topic with the messages as received.
 const AS_THEY_CAME: usize = Channel::ALL.len();
 
-/// The file under way.
+/// The file that is being written.
 pub struct Bag {
     writer: Writer<BufWriter<File>>,
     frames: Frames,
@@ -36,7 +36,7 @@ struct Topics {
 }
 
 impl Topics {
-    /// Those of a device: one for each [`Channel`], and that of its messages as they came.
+    /// The topics of a device: one for each [`Channel`], and that of its messages as received.
     fn create(writer: &mut Writer<BufWriter<File>>, hello: &DeviceHello) -> McapResult<Topics> {
         let unit = unit_number(&hello.device_id);
         let channels = Channel::ALL.iter();
@@ -59,7 +59,7 @@ impl Topics {
     }
 }
 
-/// When a message came, and when what it tells was, ns since 1970; and of which sensor it is.
+/// A message's sensor, its receive time and its measurement time, ns since 1970.
 #[derive(Clone, Copy)]
 struct When {
     sensor: usize,
@@ -90,7 +90,7 @@ impl Bag {
         Ok(bag)
     }
 
-    /// Keeps a message of a sensor that came at a time, ns since 1970.
+    /// Writes a sensor's message that was received at `now_ns`, ns since 1970.
     pub fn message(
         &mut self,
         sensor: usize,
@@ -134,13 +134,13 @@ impl Bag {
         self.writer.write_to_known_channel(&header, data)
     }
 
-    /// Brings to the disk what came so far.
+    /// Writes all messages received until now to the disk.
     pub fn flush(&mut self) -> McapResult<()> {
         self.writer.flush()
     }
 
-    /// Ends the file, with what came of each sensor inside: metadata `hivtac` of one, and
-    /// `hivtac/unit_NUMBER` of several.
+    /// Ends the file with a summary of each sensor: metadata `hivtac` for one sensor,
+    /// `hivtac/unit_NUMBER` for several.
     pub fn finish(mut self, summaries: Vec<BTreeMap<String, String>>) -> McapResult<File> {
         let is_one = summaries.len() == 1;
         for metadata in summaries {

@@ -1,4 +1,5 @@
-//! Listening to several sensors at once: a thread for each, so that none waits for another.
+//! Receives from several sensors at once, with a thread for each, so that they do not wait for each
+//! other.
 
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
@@ -7,30 +8,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Sender;
 use std::time::{Duration, Instant};
 
-/// Longest wait for a message before it is looked whether all is over.
+/// Longest wait for a message between two checks whether the recording is over.
 const LOOK_EVERY: Duration = Duration::from_millis(100);
-/// A device that sends nothing for so long is gone.
+/// Silence after which a device counts as gone.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// What a sensor said.
+/// A message of a sensor.
 pub struct Heard {
-    /// Which of the sensors, from 0.
+    /// The sensor's index, from 0.
     pub sensor: usize,
-    /// When it came.
+    /// The receive time.
     pub at: Instant,
-    /// What came.
+    /// The message.
     pub message: DeviceMessage,
 }
 
-/// How long is listened.
+/// The end of a recording.
 pub struct Until<'f> {
-    /// How long samples flow; none: until something ends it.
+    /// Time for which samples flow; `None` for no limit.
     pub duration: Option<Duration>,
-    /// True when something went wrong: nothing more is kept.
+    /// True after a failure: no more messages are kept.
     pub is_over: &'f AtomicBool,
 }
 
-/// Has a sensor stream until the end, and hands over all that it says, its last counters too.
+/// Has a sensor stream until the end; passes on all its messages, including its last counters.
 pub fn listen(
     link: &mut Link,
     sensor: usize,
@@ -40,7 +41,7 @@ pub fn listen(
 ) -> Result<(), Failure> {
     let hand_over = |message| {
         let at = Instant::now();
-        // Nobody takes it any more when the file cannot be written.
+        // The receiver is gone when the file could not be written.
         let _ = heard.send(Heard {
             sensor,
             at,

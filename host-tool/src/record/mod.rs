@@ -1,4 +1,4 @@
-//! `hivtac record`: everything that one or several devices say, into a file.
+//! `hivtac record`: writes every message of one or several devices into a file.
 
 mod bag;
 mod listen;
@@ -28,7 +28,7 @@ use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use table::Table;
 
-/// Time between two flushes, and two lines of progress.
+/// Time between two flushes and between two lines of progress.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
 /// Record everything that one or several devices say, with both clocks, until Ctrl-C
@@ -53,7 +53,7 @@ pub struct RecordArguments {
     json: bool,
 }
 
-/// Records until the time is over, Ctrl-C, or a device is gone.
+/// Records until the time is over, Ctrl-C, or the loss of a device.
 pub fn run(arguments: &RecordArguments) -> Result<(), Failure> {
     let addresses = arguments.devices.addresses()?;
     check(&arguments.file, addresses.len())?;
@@ -71,7 +71,7 @@ pub fn run(arguments: &RecordArguments) -> Result<(), Failure> {
     ended
 }
 
-/// What became of a recording, as one JSON object: of one sensor with its counts, of several with
+/// The result of a recording as one JSON object: the counts of a single sensor, or a list with
 /// those of each.
 fn summary(file: &Path, mut counts: Vec<Value>, ended: &Result<(), Failure>) -> Value {
     let is_whole = is_clean(ended);
@@ -89,13 +89,13 @@ fn summary(file: &Path, mut counts: Vec<Value>, ended: &Result<(), Failure>) -> 
     summary
 }
 
-/// Whether nothing is missing of a recording that ended so.
+/// Whether a recording with this end is complete.
 fn is_clean(ended: &Result<(), Failure>) -> bool {
     let asked = |failure: &Failure| failure.kind == Kind::Interrupted;
     ended.as_ref().err().is_none_or(asked)
 }
 
-/// Says whether a file can be made of so many sensors.
+/// The format of a file for this number of sensors; an error if it cannot hold them.
 fn check(file: &Path, sensors: usize) -> Result<Format, Failure> {
     let format = Format::of(file)?;
     if matches!(format, Format::Csv) && sensors > 1 {
@@ -111,7 +111,7 @@ fn check(file: &Path, sensors: usize) -> Result<Format, Failure> {
     }
 }
 
-/// The kind of a file, by the end of its name.
+/// The format of a file, by the end of its name.
 #[derive(Clone, Copy)]
 enum Format {
     Mcap,
@@ -136,7 +136,7 @@ enum Sink {
     Table(Table),
 }
 
-/// A sensor, and what came of it.
+/// A sensor, and the counts of its messages.
 struct Sensor {
     hello: DeviceHello,
     tally: Tally,
@@ -154,7 +154,7 @@ impl Sensor {
         unit_number(&self.hello.device_id)
     }
 
-    /// Says what was recorded of it, one of so many.
+    /// Prints what was recorded of it, with its name if there are several sensors.
     fn tell(&self, of: usize) {
         if of > 1 {
             note(&format!("{} {}:", self.unit(), shown(&self.hello.name)));
@@ -170,7 +170,7 @@ impl Sensor {
         counts
     }
 
-    /// What the file says of it at its end.
+    /// The summary that the file holds about it.
     fn summary(&self, ended: &str, lasted: Duration) -> BTreeMap<String, String> {
         let counts = self.tally.counts().into_iter();
         let counts = counts.map(|(name, count)| (name, count.to_string()));
@@ -192,22 +192,23 @@ impl Sensor {
     }
 }
 
-/// A file under way.
+/// A recording that is being written.
 pub struct Recording {
     file: PathBuf,
     partial: PathBuf,
     sink: Sink,
-    /// This program's clock, which never jumps, and what time it was when it began, ns since 1970.
+    /// The start by this program's clock, which never jumps, and the time of the start, ns since
+    /// 1970.
     begun: Instant,
     begun_ns: u64,
     sensors: Vec<Sensor>,
 }
 
 impl Recording {
-    /// Begins `….mcap` or `….csv` with the devices' hellos, as `….partial`.
+    /// Begins `….mcap` or `….csv`, as `….partial`, with the devices' hellos.
     ///
     /// # Errors
-    /// When there is such a file already, it cannot be made, or two devices are the same.
+    /// When the file exists already or cannot be made, or when two devices are the same.
     pub fn create(file: &Path, hellos: &[DeviceHello]) -> Result<Recording, Failure> {
         let kind = check(file, hellos.len())?;
         let sensors: Vec<Sensor> = hellos.iter().map(Sensor::new).collect();
@@ -240,7 +241,7 @@ impl Recording {
         })
     }
 
-    /// Keeps what comes until the end; what goes wrong with one device ends it for all.
+    /// Keeps all messages until the end; a failure of one device ends the recording.
     fn follow(&mut self, links: &mut [Link], arguments: &RecordArguments) -> Result<(), Failure> {
         let is_over = AtomicBool::new(false);
         let until = &Until {
@@ -273,7 +274,7 @@ impl Recording {
         })
     }
 
-    /// Keeps what is heard until nobody listens any more.
+    /// Keeps the messages until all senders are gone.
     fn keep_all(&mut self, heard: &Receiver<Heard>) -> Result<(), Failure> {
         let mut flushed = Instant::now();
         loop {
@@ -290,10 +291,10 @@ impl Recording {
         }
     }
 
-    /// Keeps what a device said.
+    /// Keeps a device's message.
     ///
     /// # Errors
-    /// When the disk is full, or gone.
+    /// When the disk is full or gone.
     pub fn keep(&mut self, heard: &Heard) -> Result<(), Failure> {
         let Heard {
             sensor,
@@ -305,7 +306,7 @@ impl Recording {
             DeviceMessage::Sample(sample) => drop(tally.sample(sample)),
             DeviceMessage::Stats(stats) => tally.stats(stats),
             DeviceMessage::Log(line) => note(&log_text(line)),
-            // An answer to this program: no part of what the device measured.
+            // A reply to this program is not a measurement.
             _ => return Ok(()),
         }
         let since = at.saturating_duration_since(self.begun);
@@ -317,10 +318,10 @@ impl Recording {
         kept.map_err(|error| input(&self.partial, error))
     }
 
-    /// Brings to the disk what came so far.
+    /// Writes all messages kept until now to the disk.
     ///
     /// # Errors
-    /// When it is full, or gone.
+    /// When the disk is full or gone.
     pub fn flush(&mut self) -> Result<(), Failure> {
         let flushed = match &mut self.sink {
             Sink::Bag(bag) => bag.flush(),
@@ -329,7 +330,7 @@ impl Recording {
         flushed.map_err(|error| input(&self.partial, error))
     }
 
-    /// For a person, how long it lasts and what came.
+    /// The duration and the counts, for a person.
     pub fn progress(&self) -> String {
         let seconds = self.begun.elapsed().as_secs();
         let lines = self
@@ -346,10 +347,10 @@ impl Recording {
         }
     }
 
-    /// Ends the file, whatever ended the recording, and names it when nothing is missing.
+    /// Ends the file and, if it is complete, gives it its final name.
     ///
     /// # Errors
-    /// What ended it, or that it could not be ended.
+    /// The failure that ended the recording, or that of ending the file.
     pub fn end(self, result: Result<(), Failure>) -> Result<(), Failure> {
         let Recording {
             file,
@@ -364,7 +365,8 @@ impl Recording {
         if let Err(failure) = &result
             && failure.kind == Kind::Input
         {
-            // The disk is full, or gone: nothing more can be written. What was flushed can be read.
+            // The disk is full or gone, and nothing more can be written. What was flushed can be
+            // read.
             drop(sink);
             tell_counts();
             return result;

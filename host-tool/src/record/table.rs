@@ -1,23 +1,23 @@
-//! A recording as CSV: a row a sample, units in the names of its columns.
+//! Writes a recording as CSV: a row for each sample, units in the names of the columns.
 
 use crate::lines::{Format, Row};
 use hivtac_wire::message::{DeviceMessage, Sample};
 use std::fs::File;
 use std::io;
 
-/// The file under way.
+/// The file that is being written.
 pub struct Table {
     file: File,
     /// Whole rows that are not on the disk yet.
     rows: String,
 }
 
-/// Columns and rows of the markers, and their areas.
+/// Column, row and area of each marker.
 const MARKERS: &str = "x0_px,y0_px,area0_px,x1_px,y1_px,area1_px,\
                        x2_px,y2_px,area2_px,x3_px,y3_px,area3_px";
 
 impl Table {
-    /// Begins a file.
+    /// Begins a file with its header.
     pub fn create(file: File) -> io::Result<Table> {
         let header = Format::Csv.header(false).unwrap_or_default();
         let rows = format!("host_time_s,{header},{MARKERS}\n");
@@ -26,7 +26,7 @@ impl Table {
         Ok(table)
     }
 
-    /// Keeps a sample that came at a time, ns since 1970; nothing else.
+    /// Keeps a sample that was received at `now_ns`, ns since 1970; ignores other messages.
     pub fn message(&mut self, message: &DeviceMessage, now_ns: u64) -> io::Result<()> {
         if let DeviceMessage::Sample(sample) = message {
             let (s, us) = (now_ns / 1_000_000_000, now_ns / 1_000 % 1_000_000);
@@ -39,7 +39,7 @@ impl Table {
         Ok(())
     }
 
-    /// Brings to the disk what came so far: whole rows.
+    /// Writes all rows kept until now to the disk.
     pub fn flush(&mut self) -> io::Result<()> {
         crate::output::write_whole(&mut self.file, self.rows.as_bytes())?;
         self.rows.clear();

@@ -1,4 +1,4 @@
-//! What a sample is in ROS 2: the channels of a sensor, and the message of each.
+//! Converts a sample to messages of ROS 2: the channels of a sensor, and the message of each.
 
 use super::{Definition, bool, point, polygon, string, wrench};
 use hivtac_terms::status::Status;
@@ -9,7 +9,7 @@ use hivtac_wire::message::Sample;
 pub enum Channel {
     /// Force and torque.
     Wrench,
-    /// Where the tip touches.
+    /// The place where the tip touches.
     Place,
     /// The four markers.
     Markers,
@@ -22,7 +22,7 @@ pub enum Channel {
 }
 
 impl Channel {
-    /// All, in the order of their numbers.
+    /// All channels, in the order of their numbers.
     pub const ALL: [Channel; 6] = [
         Channel::Wrench,
         Channel::Place,
@@ -32,7 +32,7 @@ impl Channel {
         Channel::Status,
     ];
 
-    /// Its name below that of the sensor.
+    /// Its name below the sensor's.
     pub fn name(self) -> &'static str {
         match self {
             Channel::Wrench => "wrench",
@@ -44,7 +44,7 @@ impl Channel {
         }
     }
 
-    /// The kind of its messages.
+    /// The definition of its messages.
     pub fn definition(self) -> &'static Definition {
         match self {
             Channel::Wrench => &super::WRENCH,
@@ -56,28 +56,28 @@ impl Channel {
     }
 }
 
-/// What the topics of a sensor with this serial number begin with, in recordings and for Foxglove.
+/// The beginning of the topics of a sensor with this serial number, in recordings and for Foxglove.
 pub fn topic_of(unit: &str) -> String {
     format!("/hivtac/unit_{unit}")
 }
 
-/// The frames that coordinates of a sensor are in.
+/// The coordinate frames of a sensor.
 #[derive(Clone, Debug)]
 pub struct Frames {
-    /// Of forces and places: x to the right in the image, y down; a press has z < 0.
+    /// Frame of forces and places: x to the right in the image, y down; a press has z < 0.
     film: String,
-    /// Of the markers.
+    /// Frame of the markers.
     image: String,
 }
 
 impl Frames {
-    /// That of forces and places.
+    /// The frame of forces and places.
     #[cfg(feature = "ros2")]
     pub fn film(&self) -> &str {
         &self.film
     }
 
-    /// `NAME_film` and `NAME_image`.
+    /// The frames `NAME_film` and `NAME_image`.
     pub fn of(name: &str) -> Frames {
         Frames {
             film: format!("{name}_film"),
@@ -86,8 +86,8 @@ impl Frames {
     }
 }
 
-/// The messages of a sample whose frame was exposed at a time since 1970, ns, each as CDR: wrench,
-/// contact and slip where there is a force, and a place or markers where they are known.
+/// The messages of a sample, each as CDR. `stamp_ns` is the time of the frame's exposure, ns since
+/// 1970. Wrench, contact and slip need a force; place and markers must be known.
 pub fn messages(sample: &Sample, stamp_ns: u64, frames: &Frames) -> Vec<(Channel, Vec<u8>)> {
     let Sample {
         force,

@@ -1,19 +1,19 @@
-//! Messages as ROS 2 has them: their definitions, and CDR, which is how they are coded.
+//! Messages of ROS 2: their definitions, and their encoding as CDR.
 
 pub mod channel;
 
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 
-/// A kind of message: name and definition, with those of the messages in it.
+/// A type of message: name and definition, with those of the types it uses.
 pub struct Definition {
-    /// Such as `std_msgs/msg/Bool`.
+    /// Its name, such as `std_msgs/msg/Bool`.
     pub name: &'static str,
-    /// In ROS's own language.
+    /// Its definition in ROS's interface language.
     pub text: &'static str,
 }
 
-/// What the definition of a message with a header has behind its own fields.
+/// The part of a definition that follows the own fields of a message with a header.
 macro_rules! header {
     () => {
         "\
@@ -29,7 +29,7 @@ uint32 nanosec
     };
 }
 
-/// |F| along x, y and z, N, and about the film's middle, N·m.
+/// F along x, y and z, N, and torque around the film's middle, N·m.
 pub const WRENCH: Definition = Definition {
     name: "geometry_msgs/msg/WrenchStamped",
     text: concat!(
@@ -52,7 +52,7 @@ float64 z
     ),
 };
 
-/// Where the tip touches the film, m from its middle.
+/// The place where the tip touches the film, m from its middle.
 pub const POINT: Definition = Definition {
     name: "geometry_msgs/msg/PointStamped",
     text: concat!(
@@ -71,7 +71,7 @@ float64 z
     ),
 };
 
-/// Markers 0–3: column and row of each, px, and its area, px, as z.
+/// Markers 0–3: column and row of each, px, and its area as z, px.
 pub const POLYGON: Definition = Definition {
     name: "geometry_msgs/msg/PolygonStamped",
     text: concat!(
@@ -123,7 +123,7 @@ uint32 stride
 ",
 };
 
-/// How devices stand.
+/// The state of devices.
 #[cfg(any(feature = "ros2", feature = "foxglove"))]
 pub const DIAGNOSTICS: Definition = Definition {
     name: "diagnostic_msgs/msg/DiagnosticArray",
@@ -153,37 +153,37 @@ string value
     ),
 };
 
-/// How bad something is.
+/// The severity of a state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[repr(u8)]
 pub enum Level {
     /// As it should be.
     Ok = 0,
-    /// There are forces; something about them is not as it should be.
+    /// There are forces, with a warning.
     Warn = 1,
     /// There are no forces.
     Error = 2,
-    /// Nothing came so far.
+    /// No samples have come.
     Stale = 3,
 }
 
-/// How a device stands.
+/// The state of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnosis {
-    /// How bad it is.
+    /// Its severity.
     pub level: Level,
-    /// Which device.
+    /// The device's name.
     pub name: String,
-    /// What is, and what to do.
+    /// Its state, and what to do.
     pub message: String,
     /// The device's serial number.
     pub hardware_id: String,
-    /// Everything else that is known.
+    /// All other known values.
     pub values: Vec<(&'static str, String)>,
 }
 
-/// Little-endian CDR: numbers lie at multiples of their size, counted from behind its first four
-/// bytes.
+/// A buffer of little-endian CDR. Numbers lie at multiples of their size, counted from behind the
+/// first four bytes.
 struct Cdr(Vec<u8>);
 
 impl Cdr {
@@ -203,7 +203,7 @@ impl Cdr {
         self.0.push(0);
     }
 
-    /// A time since 1970, ns, and the frame that coordinates are in.
+    /// Adds a header: a time, ns since 1970, and the frame of the coordinates.
     fn header(&mut self, stamp_ns: u64, frame: &str) {
         self.number(((stamp_ns / 1_000_000_000) as i32).to_le_bytes());
         self.number(((stamp_ns % 1_000_000_000) as u32).to_le_bytes());
@@ -217,7 +217,7 @@ impl Cdr {
     }
 }
 
-/// A [`WRENCH`]. The torque is that of the force where it touches, none where that is not known.
+/// A [`WRENCH`]. The torque is that of the force at its place, or zero if the place is unknown.
 pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
     let [fx, fy, fz] = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let [x, y] = force.place.map_or([0.0; 2], place_m);
@@ -228,7 +228,7 @@ pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
     cdr.0
 }
 
-/// A [`POINT`], when the force has a place.
+/// A [`POINT`]; `None` if the force has no place.
 pub fn point(stamp_ns: u64, frame: &str, force: &Force) -> Option<Vec<u8>> {
     let place = force.place?;
     let mut cdr = Cdr::new();
@@ -238,7 +238,7 @@ pub fn point(stamp_ns: u64, frame: &str, force: &Force) -> Option<Vec<u8>> {
     Some(cdr.0)
 }
 
-/// Along x and y from the film's middle, m.
+/// A place along x and y from the film's middle, m.
 fn place_m(place: Place) -> [f64; 2] {
     [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
 }
@@ -261,8 +261,8 @@ pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker; 4]) -> Vec<u8> {
     cdr.0
 }
 
-/// The frame and the vector of a `geometry_msgs/msg/Vector3Stamped`, as CDR behind its encoding;
-/// `None` of other bytes. Little-endian, as all that runs ROS 2.
+/// The frame and the vector of a `geometry_msgs/msg/Vector3Stamped`, from CDR behind its encoding.
+/// `None` for other bytes. Little-endian, as on all platforms of ROS 2.
 #[cfg(any(test, feature = "ros2"))]
 pub fn vector_stamped(body: &[u8]) -> Option<(&str, [f64; 3])> {
     const STAMP: usize = 8;
@@ -276,7 +276,7 @@ pub fn vector_stamped(body: &[u8]) -> Option<(&str, [f64; 3])> {
     Some((std::str::from_utf8(frame).ok()?, vector))
 }
 
-/// What a service of the type `std_srvs/srv/Trigger` answers.
+/// The reply of a service of type `std_srvs/srv/Trigger`.
 #[cfg(feature = "ros2")]
 pub fn trigger_reply(success: bool, message: &str) -> Vec<u8> {
     let mut cdr = Cdr::new();
@@ -285,7 +285,7 @@ pub fn trigger_reply(success: bool, message: &str) -> Vec<u8> {
     cdr.0
 }
 
-/// [`DIAGNOSTICS`] of one device.
+/// A [`DIAGNOSTICS`] of one device.
 pub fn diagnostics(stamp_ns: u64, diagnosis: &Diagnosis) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, "");
@@ -316,7 +316,7 @@ pub fn string(text: &str) -> Vec<u8> {
     cdr.0
 }
 
-/// [`BYTES`].
+/// A [`BYTES`].
 pub fn bytes(bytes: &[u8]) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.number(0u32.to_le_bytes());

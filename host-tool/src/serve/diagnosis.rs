@@ -1,4 +1,4 @@
-//! How a device stands, for `/diagnostics`.
+//! Diagnoses a device, for `/diagnostics`.
 
 use crate::ros::{Diagnosis, Level};
 use crate::view::state::State;
@@ -6,8 +6,8 @@ use hivtac_host::page::lights::{self, Light};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::status::Status;
 
-/// Of a device, by what is known of it and the status bits of the samples since the last time;
-/// nothing when there were none.
+/// The diagnosis of a device from its state and the status bits of the samples since the last
+/// diagnosis. `since` is `None` if there were no samples.
 pub fn diagnose(state: &State, since: Option<Status>, not_published: u64) -> Diagnosis {
     let hello = &state.hello;
     let name = match hello.name.as_str() {
@@ -24,7 +24,7 @@ pub fn diagnose(state: &State, since: Option<Status>, not_published: u64) -> Dia
     }
 }
 
-/// The worst of it, and what to do.
+/// The worst severity, and what to do.
 fn verdict(trouble: Option<&str>, since: Option<Status>) -> (Level, String) {
     if let Some(trouble) = trouble {
         return (Level::Error, shown(trouble));
@@ -33,7 +33,7 @@ fn verdict(trouble: Option<&str>, since: Option<Status>) -> (Level, String) {
         return (Level::Stale, "no sample came so far".to_owned());
     };
     let lights = lights::of(status).into_iter();
-    // Where there is nothing to do, nothing is wrong: a light touch has no direction, say.
+    // A bit without advice is not a fault: a light touch has no direction, for example.
     let faults: Vec<Light> = lights.filter(|light| !light.advice.is_empty()).collect();
     let Some(worst) = faults.iter().map(|light| light.level).max() else {
         return (Level::Ok, "good".to_owned());

@@ -1,5 +1,5 @@
-//! For Foxglove, over its WebSocket: the channels and schemas of a recording, live. Whoever can
-//! reach the port can read them, and nothing else.
+//! Serves Foxglove over its WebSocket: the channels and schemas of a recording, live. Anyone who
+//! can reach the port can read them, but nothing else.
 
 use super::outlet::{Outlet, Served};
 use crate::ros::channel::{Channel, topic_of};
@@ -10,18 +10,18 @@ use hivtac_host::shown::unit_number;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
-/// A server that listens.
+/// A server on an open port.
 pub struct Server {
-    // Channels live as long as it does.
+    // The channels exist as long as it does.
     _context: Arc<Context>,
     address: SocketAddr,
-    /// Of each sensor, in the order of [`Channel::ALL`].
+    /// The channels of each sensor, in the order of [`Channel::ALL`].
     sensors: Vec<Vec<Arc<RawChannel>>>,
     diagnostics: Arc<RawChannel>,
 }
 
 impl Server {
-    /// Listens, port 0 for any that is free, with the devices' channels.
+    /// Opens a port, 0 for any free one, with the devices' channels.
     ///
     /// # Errors
     /// When the port is taken.

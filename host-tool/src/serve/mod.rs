@@ -1,4 +1,4 @@
-//! `hivtac serve`: the forces for other programs, as a node of ROS 2 or for Foxglove.
+//! `hivtac serve`: serves the forces to other programs, as a node of ROS 2 or for Foxglove.
 
 mod diagnosis;
 #[cfg(feature = "foxglove")]
@@ -29,15 +29,15 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Events that wait for the outlets: some seconds of one device.
+/// Most events that wait for the outlets: some seconds of one device.
 const EVENTS: usize = 1024;
-/// Tares that wait for a device; whoever asks for more is told that it is busy.
+/// Most tares that wait for a device; a further request gets the answer that it is busy.
 const ORDERS: usize = 4;
-/// Time between two turns of the outlets.
+/// Time between two calls of [`Outlet::turn`].
 const TURN_EVERY: Duration = Duration::from_millis(20);
-/// The environment variable by which all of ROS 2 knows its domain.
+/// The environment variable with ROS 2's domain.
 const DOMAIN: &str = "ROS_DOMAIN_ID";
-/// The largest domain: a larger one would need a UDP port above the last.
+/// The largest domain; a larger one would need a UDP port above the last.
 const LAST_DOMAIN: u16 = 232;
 
 /// Serve forces to other programs, as a node of ROS 2 or for Foxglove, until Ctrl-C
@@ -92,11 +92,11 @@ struct Outlets {
     foxglove: bool,
 }
 
-/// Serves until it is interrupted. Prints `ready` and where.
+/// Serves until the program is interrupted. Prints `ready` and the addresses.
 ///
 /// # Errors
-/// When this program was built without what is asked for, a device is not there to begin with, or
-/// an outlet cannot be opened. A device that is lost later is waited for.
+/// When this build lacks an outlet, a device is missing at the start, or an outlet cannot be
+/// opened. A device that is lost later is waited for.
 pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
     let addresses = arguments.devices.addresses()?;
     built_with(&arguments.outlets)?;
@@ -139,7 +139,7 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
     stop::check()
 }
 
-/// Says when this program cannot do what is asked for.
+/// An error if this build lacks a wanted outlet.
 fn built_with(outlets: &Outlets) -> Result<(), Failure> {
     for (is_wanted, is_there, what, feature) in [
         (outlets.ros2, cfg!(feature = "ros2"), "ROS 2", "ros2"),
@@ -164,7 +164,7 @@ fn usage(message: &str) -> Failure {
     Failure::new(Kind::Usage, message)
 }
 
-/// The domain of the environment; the first one when there is none.
+/// The domain from the environment; 0 if it is not set.
 fn domain() -> Result<u16, Failure> {
     let Some(text) = std::env::var_os(DOMAIN).filter(|text| !text.is_empty()) else {
         return Ok(0);
@@ -180,7 +180,7 @@ fn domain() -> Result<u16, Failure> {
     })
 }
 
-/// The devices by their names, each with where its orders arrive.
+/// The devices with their names, each with the receiver of its orders.
 fn served(node: &str, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<TareOrder>)> {
     let names = names::of_devices(&hellos);
     let each = hellos.into_iter().zip(names).map(|(hello, name)| {
@@ -202,7 +202,7 @@ fn served(node: &str, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<TareOrd
     each.collect()
 }
 
-/// Opens what is asked for.
+/// Opens the wanted outlets.
 #[cfg_attr(
     not(all(feature = "ros2", feature = "foxglove")),
     allow(
@@ -228,7 +228,7 @@ fn outlets(
     Ok(outlets)
 }
 
-/// Prints where everything is.
+/// Prints the address of each outlet.
 fn tell(json: bool, outlets: &[Box<dyn Outlet>]) -> Result<Reader, Failure> {
     let told = outlets.iter().flat_map(|outlet| outlet.told());
     print(&match json {
@@ -245,7 +245,7 @@ fn tell(json: bool, outlets: &[Box<dyn Outlet>]) -> Result<Reader, Failure> {
     })
 }
 
-/// Publishes what the devices tell, until nobody tells anything any more.
+/// Publishes the devices' events until all their threads have ended.
 fn publish(told: &Receiver<Event>, served: &[Served], outlets: &mut [Box<dyn Outlet>]) {
     let mut turned = Instant::now();
     loop {

@@ -1,11 +1,11 @@
-//! Names that ROS 2 allows.
+//! Checks names and converts them to those that ROS 2 allows.
 
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_wire::message::DeviceHello;
 
-/// Whether a name can be that of a node, or a part of a topic's: letters, digits and single
-/// underscores, a letter first.
+/// Whether a name can be a node's or a part of a topic's: letters, digits and single underscores, a
+/// letter first.
 fn is_legal(name: &str) -> bool {
     let of_it = |c: char| c.is_ascii_alphanumeric() || c == '_';
     name.starts_with(|c: char| c.is_ascii_alphabetic())
@@ -14,10 +14,10 @@ fn is_legal(name: &str) -> bool {
         && !name.ends_with('_')
 }
 
-/// Checks the name that a user gives the node.
+/// Checks the user's name of the node.
 ///
 /// # Errors
-/// [`Kind::Usage`] when ROS 2 allows no such name.
+/// [`Kind::Usage`] when ROS 2 does not allow the name.
 pub fn check(name: &str) -> Result<(), Failure> {
     match is_legal(name) {
         true => Ok(()),
@@ -32,8 +32,8 @@ pub fn check(name: &str) -> Result<(), Failure> {
     }
 }
 
-/// A device's own name as ROS 2 allows it: whatever else is in it becomes an underscore. Nothing
-/// when no letter is left to begin with.
+/// A device's own name as ROS 2 allows it, with underscores for other characters. `None` if there
+/// is no letter to begin with.
 fn of_device(name: &str) -> Option<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let plain: String = name.chars().map(plain).collect();
@@ -41,8 +41,8 @@ fn of_device(name: &str) -> Option<String> {
     Some(parts.join("_")).filter(|name| is_legal(name))
 }
 
-/// Names of the devices' topics, in their order: nothing of one alone; of several the name of each,
-/// or `unit_NUMBER` where it has none that ROS 2 allows, or another one has it, too.
+/// Names of the devices' topics, in the devices' order. `None` for a single device; otherwise each
+/// device's name. It is `unit_NUMBER` if ROS 2 does not allow the name or two devices share it.
 pub fn of_devices(hellos: &[DeviceHello]) -> Vec<Option<String>> {
     if hellos.len() == 1 {
         return vec![None];

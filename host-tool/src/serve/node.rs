@@ -1,8 +1,8 @@
-//! A node of ROS 2: topics, diagnostics, a service that takes a tare, and a topic by which it is
-//! told which way the sensor is held.
+//! A node of ROS 2: topics, diagnostics, a service that takes a tare, and a topic that receives the
+//! direction of gravity.
 //!
-//! Writers are reliable, so that reliable and best-effort subscriptions both get what is written;
-//! one that does not keep up loses the oldest of the last ten messages of a topic.
+//! Writers are reliable, and therefore reach reliable and best-effort subscriptions. A slow
+//! subscription loses the oldest of the last ten messages of a topic.
 
 use super::outlet::{Outlet, Served};
 use super::sensor::{Answer, TareOrder, Told};
@@ -27,24 +27,24 @@ use std::sync::PoisonError;
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::{Duration, Instant};
 
-/// Messages of a topic that are kept for those that lost them.
+/// Messages of a topic that are kept for subscriptions that missed them.
 const KEPT: usize = 10;
-/// Bytes of CDR before a message: its encoding, which the writer puts there.
+/// Bytes of CDR before a message: its encoding, which the writer adds.
 const ENCODING: usize = 4;
-/// Bytes in front of a request and its reply, by which Cyclone DDS's clients know which reply is
-/// theirs; other clients are told beside the message.
+/// Bytes before a request and its reply, by which Cyclone DDS's clients match them. Other clients
+/// get these data outside the message.
 const CYCLONES_HEADER: usize = 16;
-/// What is received has no more bytes than this: a vector with the name of its frame.
+/// Most bytes of a received message: a vector with the name of its frame.
 const LONGEST_RECEIVED: usize = 512;
-/// Time between two looks for another node of this name.
+/// Time between two checks for another node of this name.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
 
-/// A message as CDR, without its encoding: what is written and read is what is in here.
+/// A message as CDR, without its encoding; it is written and read unchanged.
 #[derive(Clone)]
 struct Body(Vec<u8>);
 
 impl Body {
-    /// Of CDR with its encoding.
+    /// The body of CDR with its encoding.
     fn of(data: &[u8]) -> Body {
         Body(data.get(ENCODING..).unwrap_or_default().to_vec())
     }
@@ -68,7 +68,7 @@ impl<'de> Deserialize<'de> for Body {
     }
 }
 
-/// Reads bytes until there are no more.
+/// Reads bytes to their end.
 struct ToTheEnd;
 
 impl<'de> Visitor<'de> for ToTheEnd {
@@ -90,12 +90,12 @@ impl<'de> Visitor<'de> for ToTheEnd {
 /// A request that waits for its device.
 struct Waiting {
     request: RmwRequestId,
-    /// What Cyclone DDS's clients want back.
+    /// The header that Cyclone DDS's clients expect in the reply.
     header: Vec<u8>,
     answer: Receiver<Answer>,
 }
 
-/// What there is of a device.
+/// The topics and the service of a device.
 struct Sensor {
     /// In the order of [`Channel::ALL`].
     publishers: Vec<Publisher<Body>>,
@@ -103,10 +103,10 @@ struct Sensor {
     orders: SyncSender<TareOrder>,
     waiting: Vec<Waiting>,
     gravity: Subscription<Body>,
-    /// The frame that vectors of gravity are in.
+    /// The frame of vectors of gravity.
     frame: String,
     down: Told,
-    /// A vector that cannot be used was told of.
+    /// Whether an unusable vector was reported.
     is_told: bool,
 }
 
@@ -115,21 +115,20 @@ pub struct Ros2 {
     sensors: Vec<Sensor>,
     diagnostics: Publisher<Body>,
     looked: Instant,
-    /// Another node of this name was told of.
+    /// Whether another node of this name was reported.
     is_told: bool,
     node: Node,
     context: Context,
-    /// What only this node should write, as DDS calls it.
+    /// The topic that only this node should write, by its DDS name.
     own_topic: String,
     domain: u16,
 }
 
 impl Ros2 {
-    /// Takes part in a domain as a node with this name, and the devices' topics and services below
-    /// it.
+    /// Joins a domain as a node with this name, with the devices' topics and services below it.
     ///
     /// # Errors
-    /// When there is no network to take part in, not even this computer's own.
+    /// When there is no network to join, not even this computer's own.
     pub fn open(name: &str, domain: u16, served: &[Served]) -> Result<Ros2, Failure> {
         Ros2::try_to_open(name, domain, served).map_err(|error| {
             Failure::input(format!(
@@ -171,7 +170,7 @@ impl Ros2 {
         })
     }
 
-    /// Says so, once, when another node has this one's name: their messages would be mixed.
+    /// Reports once when another node has this name, because their messages would mix.
     fn look_for_another(&mut self) {
         let participant = self.context.domain_participant();
         let own = participant.guid().prefix;
@@ -192,13 +191,13 @@ impl Ros2 {
     }
 }
 
-/// Whether the environment says, as to all of ROS 2, that nothing may leave this computer.
+/// Whether the environment, as for all of ROS 2, restricts traffic to this computer.
 fn stays_here() -> bool {
     let is = |name: &str, value: &str| std::env::var_os(name).is_some_and(|it| it == value);
     is("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST") || is("ROS_LOCALHOST_ONLY", "1")
 }
 
-/// Where a device's names are.
+/// The prefix of a device's names.
 fn folder(name: &str, sensor: Option<&str>) -> String {
     match sensor {
         None => format!("/{name}"),
@@ -212,7 +211,7 @@ fn qos() -> QosProfile {
         .history(History::KeepLast { depth: KEPT })
 }
 
-/// Of what is told as often as it changes: writers of either kind are heard.
+/// Quality of service for data that change often: it matches writers of either kind.
 fn best_effort() -> QosProfile {
     QosProfile::subscription_default().reliability_best_effort()
 }
@@ -261,7 +260,7 @@ impl Sensor {
         })
     }
 
-    /// Passes on the newest of what was told of gravity.
+    /// Passes on the newest direction of gravity.
     fn hear_gravity(&mut self) {
         while let Ok(Some((body, _))) = self.gravity.take() {
             match self.down_of(&body.0) {
@@ -286,13 +285,13 @@ impl Sensor {
         direction(vector).map(Down::Told)
     }
 
-    /// Passes on what was asked for.
+    /// Passes on the requests for a tare.
     fn pass_on(&mut self) {
         while let Ok(Some((request, body))) = self.tare.receive_request() {
             let is_cyclones = body.0.len() > CYCLONES_HEADER;
             let header = if is_cyclones { CYCLONES_HEADER } else { 0 };
             let (answering, answer) = sync_channel(1);
-            // One too many is dropped, and answered when that is found out.
+            // A request beyond the queue is dropped; its reply comes when that is noticed.
             let _ = self.orders.try_send(TareOrder(answering));
             self.waiting.push(Waiting {
                 request,
@@ -302,7 +301,7 @@ impl Sensor {
         }
     }
 
-    /// Answers what is done.
+    /// Replies to the requests that are done.
     fn answer(&mut self) {
         let tare = &self.tare;
         self.waiting.retain(|waiting| {
@@ -346,7 +345,7 @@ impl Outlet for Ros2 {
     }
 
     fn diagnostics(&mut self, data: &[u8], _: u64) {
-        // The next one comes in a second.
+        // An error is ignored: the next message comes in a second.
         let _ = self.diagnostics.publish(Body::of(data));
     }
 

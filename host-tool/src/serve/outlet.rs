@@ -1,4 +1,4 @@
-//! Where messages go: what ROS 2 and Foxglove have in common.
+//! The interface to a program's outlet, which ROS 2 and Foxglove share.
 
 use super::sensor::{TareOrder, Told};
 use crate::ros::channel::{Channel, Frames};
@@ -7,34 +7,34 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::SyncSender;
 
-/// Where messages go.
+/// An outlet for messages.
 pub trait Outlet {
-    /// Where it is: a word and its value, for the line that says so.
+    /// Its addresses: a word and its value each, for the line that begins with `ready`.
     fn told(&self) -> Vec<(&'static str, String)>;
 
-    /// Publishes a device's message, CDR, that came at a time, ns since 1970; false when it could
-    /// not.
+    /// Publishes a device's message, as CDR, that was received at `came_ns`, ns since 1970. False
+    /// if it could not be published.
     fn publish(&mut self, sensor: usize, channel: Channel, data: &[u8], came_ns: u64) -> bool;
 
-    /// Publishes how a device stands.
+    /// Publishes the state of devices.
     fn diagnostics(&mut self, data: &[u8], came_ns: u64);
 
-    /// Does what there is to do besides.
+    /// Does the outlet's own work.
     fn turn(&mut self) {}
 }
 
 /// A device, for the outlets.
 pub struct Served {
-    /// As the device said it first.
+    /// The device's first hello.
     pub hello: DeviceHello,
-    /// Its own part of names, when it is one of several.
+    /// Its part of names; `None` for a single device.
     pub name: Option<String>,
-    /// The frames of its coordinates.
+    /// Its coordinate frames.
     pub frames: Frames,
-    /// Where its orders go.
+    /// The queue of its orders.
     pub orders: SyncSender<TareOrder>,
-    /// Which way it is held, when it was told.
+    /// The last direction of gravity that was not passed on yet.
     pub down: Told,
-    /// Samples that an outlet did not take.
+    /// Number of samples that an outlet did not take.
     pub not_published: Arc<AtomicU64>,
 }

@@ -1,5 +1,4 @@
-//! The thread of a device that is served: what it says goes to the outlets, and it takes a tare
-//! when that is asked for.
+//! The thread of a served device: it passes messages to the outlets, and takes a tare when asked.
 
 use super::diagnosis::diagnose;
 use crate::clock::{Clock, now_ns};
@@ -22,31 +21,31 @@ use std::time::{Duration, Instant};
 /// Time between two diagnoses.
 const DIAGNOSE_EVERY: Duration = Duration::from_secs(1);
 
-/// What a device has to tell.
+/// The content of an event.
 pub enum What {
-    /// A sample, whose frame was exposed at a time, ns since 1970.
+    /// A sample, with the time of its exposure, ns since 1970.
     Sample(Box<Sample>, u64),
-    /// How it stands.
+    /// The device's state.
     Diagnosis(Diagnosis),
 }
 
 /// Something to publish.
 pub struct Event {
-    /// Of which device, from 0.
+    /// The device's index, from 0.
     pub sensor: usize,
-    /// When it came, ns since 1970.
+    /// Receive time, ns since 1970.
     pub came_ns: u64,
-    /// What it is.
+    /// The content.
     pub what: What,
 }
 
-/// That a tare was taken, in words for a person, or why not.
+/// Text for a person: that a tare was taken, or why not.
 pub type Answer = Result<String, String>;
 
-/// Takes a tare; whoever asked gets the answer here.
+/// An order to take a tare, with the sender of its answer.
 pub struct TareOrder(pub SyncSender<Answer>);
 
-/// What was told last of gravity on a device and is not passed on yet.
+/// The last direction of gravity for a device that was not passed on yet; `None` if there is none.
 pub type Told = Arc<Mutex<Option<Down>>>;
 
 /// A device that is served.
@@ -55,7 +54,7 @@ pub struct Sensor {
     patience: Duration,
     state: State,
     clock: Clock,
-    /// Bits of the samples since the last diagnosis, and whether there were any.
+    /// Bits of the samples since the last diagnosis; `None` if there were no samples.
     since: Option<Status>,
     diagnosed: Instant,
     lost: Option<Instant>,
@@ -66,7 +65,7 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// The device with this number, connected at a port. `not_published` counts samples that an
+    /// The device with this number, connected at a port. `not_published` counts the samples that an
     /// outlet did not take.
     pub fn new(
         number: usize,
@@ -91,7 +90,7 @@ impl Sensor {
         }
     }
 
-    /// Takes in what the device said at a time, ns since 1970.
+    /// Handles a message that was received at `came_ns`, ns since 1970.
     fn take(&mut self, message: DeviceMessage, came_ns: u64) {
         self.state.take(&message);
         match message {
@@ -106,7 +105,7 @@ impl Sensor {
         }
     }
 
-    /// Hands something over; it is counted when the outlets are too slow for it.
+    /// Hands an event to the outlets, and counts a sample that they are too slow for.
     fn tell(&mut self, came_ns: u64, what: What) {
         let is_sample = matches!(what, What::Sample(..));
         let event = Event {
@@ -132,11 +131,11 @@ impl Sensor {
         Ok(done)
     }
 
-    /// Does what is ordered; a refusal is an answer, a lost connection an end, too.
+    /// Carries out an order. A refusal is only an answer; a lost connection is returned, too.
     fn obey(&mut self, link: &mut Link, order: &TareOrder) -> Result<(), Failure> {
         let done = self.tare(link);
         let answer = done.as_ref().map_err(ToString::to_string).cloned();
-        // Whoever asked may be gone.
+        // The sender of the order may be gone.
         let _ = order.0.try_send(answer);
         match done {
             Err(failure) if failure.kind != Kind::Refused => Err(failure),

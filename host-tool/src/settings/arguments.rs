@@ -1,4 +1,4 @@
-//! The command line of `hivtac settings`.
+//! Command-line arguments of `hivtac settings`.
 
 use super::camera::{self, Wanted};
 use super::conversation::Conversation;
@@ -251,10 +251,10 @@ pub enum RezeroCommand {
 }
 
 impl SettingsCommand {
-    /// Does it.
+    /// Runs the command.
     ///
     /// # Errors
-    /// A file that has no settings, before anything is asked of the device; what the device
+    /// When a file has no settings, which is checked before anything is sent; when the device
     /// refuses; those of [`Link::connect`](hivtac_host::link::Link::connect).
     pub fn run(self) -> Result<(), Failure> {
         match self {

@@ -1,5 +1,4 @@
-//! Exposure, gain and rate of the camera, as JSON, as lines, and as what `settings set` changes of
-//! them.
+//! Exposure, gain and rate of the camera as JSON, as lines, and as changes by `settings set`.
 
 use super::temporal::thousandths;
 use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
@@ -7,8 +6,7 @@ use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
 use serde::{Deserialize, Serialize};
 
-/// In whole numbers of the units that the device keeps; null where the camera finds what the light
-/// needs.
+/// In whole numbers of the device's units; null where the camera adapts to the light.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraJson {
@@ -25,7 +23,7 @@ enum RateJson {
     Quarter,
 }
 
-/// What the camera is set to, and found.
+/// The camera's values in use.
 #[derive(Serialize)]
 pub struct InUse {
     exposure_us: u32,
@@ -34,7 +32,7 @@ pub struct InUse {
 }
 
 impl CameraJson {
-    /// Of a device's settings.
+    /// From a device's settings.
     pub fn new(settings: &CameraSettings) -> CameraJson {
         CameraJson {
             exposure_us: settings.exposure.map(|exposure| exposure.0),
@@ -47,7 +45,7 @@ impl CameraJson {
         }
     }
 
-    /// A device's settings; whether its camera can be set so is not looked at.
+    /// As a device's settings, without a check whether its camera supports them.
     pub fn settings(&self) -> CameraSettings {
         CameraSettings {
             exposure: self.exposure_us.map(Microseconds),
@@ -62,7 +60,7 @@ impl CameraJson {
 }
 
 impl InUse {
-    /// Of what a device reports.
+    /// From a device's report.
     pub fn new(report: &CameraReport) -> InUse {
         InUse {
             exposure_us: report.exposure.0,
@@ -76,7 +74,7 @@ fn frames_per_second(report: &CameraReport) -> u16 {
     report.limits.at(report.settings.rate).frames_per_second
 }
 
-/// What they are, for a person: name and text of each.
+/// Name and text of each setting, for a person.
 pub fn texts(report: &CameraReport) -> [(&'static str, String); 3] {
     let automatic = |is_automatic| {
         if is_automatic {
@@ -101,10 +99,10 @@ pub fn texts(report: &CameraReport) -> [(&'static str, String); 3] {
     [("exposure", exposed), ("gain", amplified), ("rate", rate)]
 }
 
-/// What to change; the rest stays.
+/// A change of one setting.
 #[derive(Clone, Copy, Debug)]
 pub enum Change {
-    /// How long each row is exposed.
+    /// The exposure of each row.
     Exposure(Wanted<Microseconds>),
     /// The gain.
     Gain(Wanted<Sixteenths>),
@@ -112,15 +110,15 @@ pub enum Change {
     Rate(u16),
 }
 
-/// A value, or none for what the light needs.
+/// A value; `None` to adapt to the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wanted<T>(Option<T>);
 
 impl Change {
-    /// The settings of a device with it.
+    /// The device's settings with this change.
     ///
     /// # Errors
-    /// Why its camera cannot be set so.
+    /// Why the camera does not support it.
     pub fn of(self, report: &CameraReport) -> Result<CameraSettings, String> {
         let mut settings = report.settings;
         match self {
@@ -141,7 +139,7 @@ impl Change {
         Ok(settings)
     }
 
-    /// What it is about, by [`texts`].
+    /// The name of the changed setting, as in [`texts`].
     pub fn name(self) -> &'static str {
         match self {
             Change::Exposure(_) => "exposure",
@@ -153,10 +151,10 @@ impl Change {
 
 const AUTOMATIC: &str = "auto";
 
-/// An exposure, ms, or `auto`.
+/// Reads an exposure, ms, or `auto`.
 ///
 /// # Errors
-/// When it is neither.
+/// When it is neither of them.
 pub fn exposure(text: &str) -> Result<Wanted<Microseconds>, String> {
     match text {
         AUTOMATIC => Ok(Wanted(None)),
@@ -164,10 +162,10 @@ pub fn exposure(text: &str) -> Result<Wanted<Microseconds>, String> {
     }
 }
 
-/// A gain, or `auto`; taken to the next sixteenth.
+/// Reads a gain, or `auto`; rounds it to the nearest sixteenth.
 ///
 /// # Errors
-/// When it is neither, or out of its range.
+/// When it is neither of them, or out of range.
 pub fn gain(text: &str) -> Result<Wanted<Sixteenths>, String> {
     if text == AUTOMATIC {
         return Ok(Wanted(None));
@@ -228,7 +226,7 @@ mod tests {
         assert_eq!(half.rate, Rate::Half);
         let set = long.of(&report(half)).unwrap();
         assert_eq!(set.exposure, Some(Microseconds(12_000)));
-        // Which the full rate has no time for.
+        // The full rate has no time for this exposure.
         assert!(Change::Rate(156).of(&report(set)).is_err());
         let automatic = Change::Exposure(exposure("auto").unwrap());
         assert_eq!(automatic.of(&report(set)).unwrap().exposure, None);

@@ -1,4 +1,4 @@
-//! A device whose settings are shown or changed.
+//! Shows or changes the settings of a device.
 
 use super::camera;
 use super::file::{self, File, Kept};
@@ -21,10 +21,10 @@ use hivtac_wire::settings::{Found, Name, RestPosition, Selection, SettingsReport
 use serde_json::{Value, json};
 use std::time::Duration;
 
-/// A device's settings.
+/// Asks a device for its settings.
 ///
 /// # Errors
-/// What the device refuses.
+/// When the device refuses or does not answer.
 pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failure> {
     let mut report = None;
     link.request(Request::GetSettings, patience, |message| match message {
@@ -34,7 +34,7 @@ pub fn ask(link: &mut Link, patience: Duration) -> Result<SettingsReport, Failur
     report.ok_or_else(|| link.lost("its settings did not come"))
 }
 
-/// A device whose settings are shown or changed.
+/// A connection to a device whose settings are shown or changed.
 pub struct Conversation {
     link: Link,
     hello: DeviceHello,
@@ -43,12 +43,12 @@ pub struct Conversation {
 }
 
 impl Conversation {
-    /// With a device.
+    /// Connects to the target's device.
     pub fn begin(target: &Target) -> Result<Conversation, Failure> {
         Conversation::begin_at(&target.device.address()?, target)
     }
 
-    /// With the device at an address.
+    /// Connects to the device at an address.
     pub fn begin_at(address: &Address, target: &Target) -> Result<Conversation, Failure> {
         let patience = target.device.timeout;
         let (link, hello) = Link::connect(address, patience)?;
@@ -72,14 +72,14 @@ impl Conversation {
         output::tell(self.json, line, &object)
     }
 
-    /// Shows them.
+    /// Shows the settings.
     pub fn show(&mut self) -> Result<(), Failure> {
         let report = self.settings()?;
         let kept = Kept::new(&self.hello.device_id, &report);
         output::report(self.json, &kept, || lines(&report).join("\n")).map(|_| ())
     }
 
-    /// Gives it a name and keeps that.
+    /// Sets the device's name, and keeps it.
     pub fn set_name(&mut self, name: &Name) -> Result<(), Failure> {
         self.send(Request::SetName(name.clone()))?;
         let selection = Selection {
@@ -126,7 +126,7 @@ impl Conversation {
         self.tell_set(name, &text)
     }
 
-    /// Says where gravity pulls, and keeps that.
+    /// Sets the direction of gravity, and keeps it.
     pub fn set_down(&mut self, down: Down) -> Result<(), Failure> {
         self.link.set_down(down)?;
         let selection = Selection {
@@ -145,7 +145,7 @@ impl Conversation {
         self.tell_set("down", &text_of_down(report.down))
     }
 
-    /// What was set and kept.
+    /// Prints what was set and kept.
     fn tell_set(&self, name: &str, text: &str) -> Result<(), Failure> {
         let line = format!("{name} set and kept: {text}");
         self.tell(
@@ -154,7 +154,7 @@ impl Conversation {
         )
     }
 
-    /// Saves them in a file.
+    /// Saves the settings in a file.
     pub fn export(&mut self, path: &str) -> Result<(), Failure> {
         let report = self.settings()?;
         file::write(path, &File::new(&self.hello.device_id, &report))?;
@@ -162,7 +162,7 @@ impl Conversation {
         self.tell(&line, json!({ "file": path }))
     }
 
-    /// Sets and keeps those of a file.
+    /// Sets and keeps the settings of a file.
     pub fn import(&mut self, path: &str, file: &File) -> Result<(), Failure> {
         let is_own = file.is_of(&self.hello.device_id);
         if !is_own && file.tare.is_some() {
@@ -182,14 +182,14 @@ impl Conversation {
         self.tell(&line, parts)
     }
 
-    /// Forgets all that was kept.
+    /// Has the device forget all that it keeps.
     pub fn reset(&mut self) -> Result<(), Failure> {
         send(&mut self.link, Request::Reset, KEEP_PATIENCE)?;
         let line = "everything that was kept is forgotten; take a tare";
         self.tell(line, json!({ "kept": false }))
     }
 
-    /// Sets and keeps all, with this rest position; the camera is set so before.
+    /// Sets and keeps all settings with this rest position, after the camera was set.
     fn set(
         &mut self,
         file: &File,
@@ -202,7 +202,7 @@ impl Conversation {
             let what = "nothing was kept: a restart brings back the settings from before";
             Failure::new(failure.kind, format!("{failure}; {what}"))
         };
-        // Another pixel format forgets the rest position.
+        // A change of pixel format forgets the rest position.
         if threshold != self.hello.threshold {
             self.send(Request::SetThreshold(threshold))
                 .map_err(unkept)?;
@@ -220,8 +220,8 @@ impl Conversation {
     }
 }
 
-/// What became of a rest position since it was taken, to stand behind that: how far re-zeroing
-/// moved it, and how far from it the untouched film was seen last, px.
+/// Text about a rest position since it was taken: its motion by re-zeroing, and the last distance
+/// of the untouched film from it, px. It is appended to a text about the position.
 pub fn rest_text(rezeroed_px: f64, seen_px: Option<f64>) -> String {
     let mut text = String::new();
     if rezeroed_px != 0.0 {

@@ -1,4 +1,4 @@
-//! Settings as JSON: what `export` writes and `import` reads.
+//! Settings as JSON, which `export` writes and `import` reads.
 
 use super::camera::{CameraJson, InUse};
 use super::name::name;
@@ -17,9 +17,9 @@ use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::settings::{Found, RestPosition, Selection, SettingsReport};
 use serde::{Deserialize, Serialize};
 
-/// What these files are; another layout has another number.
+/// Version of the files' layout.
 const VERSION: u32 = 1;
-/// Most bytes of such a file.
+/// Most bytes of a file.
 const LONGEST_FILE: u64 = 64 << 10;
 
 /// The settings of a device.
@@ -27,12 +27,12 @@ const LONGEST_FILE: u64 = 64 << 10;
 #[serde(deny_unknown_fields)]
 pub struct File {
     hivtac_settings: u32,
-    /// The unit's number, for its rest position is that of no other.
+    /// The unit's number; its rest position is not valid for other units.
     pub device_id: String,
-    /// Empty when it has none.
+    /// The name; empty if it has none.
     pub name: String,
     threshold: Limits,
-    /// The rest position, when one was taken.
+    /// The rest position, if one was taken.
     pub tare: Option<Rest>,
     temporal: TemporalJson,
     camera: CameraJson,
@@ -40,7 +40,7 @@ pub struct File {
     down: DownJson,
 }
 
-/// What is known of gravity; a direction in thousandths of a length of one.
+/// The direction of gravity, if known, in thousandths of a unit vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 enum DownJson {
@@ -50,7 +50,7 @@ enum DownJson {
     Told([i16; 3]),
 }
 
-/// A threshold as everywhere in the tool's JSON.
+/// A threshold, as in all JSON of the tool.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "format", rename_all = "lowercase", deny_unknown_fields)]
 enum Limits {
@@ -81,7 +81,7 @@ pub struct Rest {
     markers: [Seen; 4],
     rect_center_q16: [Px; 2],
     rect_area_q16: Q<16, i64>,
-    /// Where gravity pulled then, thousandths.
+    /// The direction of gravity at that time, in thousandths.
     #[serde(default)]
     down: Option<[i16; 3]>,
 }
@@ -99,9 +99,9 @@ struct Seen {
 pub struct Kept {
     #[serde(flatten)]
     file: File,
-    /// px.
+    /// Distance in px.
     rezeroed_px: f64,
-    /// px.
+    /// Distance in px.
     seen_px: Option<f64>,
     kept: KeptParts,
     found: &'static str,
@@ -122,7 +122,7 @@ struct KeptParts {
 }
 
 impl Kept {
-    /// Of what a device reports.
+    /// From a device's report.
     pub fn new(device_id: &[u8; 12], report: &SettingsReport) -> Kept {
         let Selection {
             name,
@@ -158,7 +158,7 @@ impl Kept {
 }
 
 impl File {
-    /// Of what a device reports.
+    /// From a device's report.
     pub fn new(device_id: &[u8; 12], report: &SettingsReport) -> File {
         File {
             hivtac_settings: VERSION,
@@ -176,7 +176,7 @@ impl File {
         }
     }
 
-    /// Whether it was made of this device.
+    /// Whether the file was made from this device.
     pub fn is_of(&self, device_id: &[u8; 12]) -> bool {
         self.device_id == unit_number(device_id)
     }
@@ -215,12 +215,12 @@ impl File {
         self.temporal.settings()
     }
 
-    /// How the camera is set.
+    /// The camera's settings.
     pub fn camera(&self) -> CameraSettings {
         self.camera.settings()
     }
 
-    /// What is known of gravity.
+    /// The direction of gravity, if known.
     pub fn down(&self) -> Down {
         match self.down {
             DownJson::Fixed => Down::Fixed,
@@ -294,7 +294,7 @@ impl Rest {
     }
 }
 
-/// Reads such a file.
+/// Reads a file of settings.
 ///
 /// # Errors
 /// What is wrong with it, and where.
@@ -334,7 +334,7 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
     Ok(file)
 }
 
-/// Writes such a file.
+/// Writes a file of settings.
 ///
 /// # Errors
 /// When it cannot be written.

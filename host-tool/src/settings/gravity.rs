@@ -1,13 +1,13 @@
-//! Where gravity pulls, as a user writes it.
+//! Reads the direction of gravity from the command line.
 
 use hivtac_host::down::direction;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_terms::down::Down;
 
-/// What is known of gravity: three numbers, `none` or `fixed`.
+/// Reads a direction of three numbers, `none` or `fixed`.
 ///
 /// # Errors
-/// Why it is none of them.
+/// When it is none of these forms.
 pub fn down(words: &[String]) -> Result<Down, Failure> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let parsed = match words.as_slice() {

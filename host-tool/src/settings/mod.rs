@@ -1,5 +1,4 @@
-//! `hivtac settings`: what a device keeps through restarts, shown, named, saved, given back and
-//! forgotten.
+//! `hivtac settings`: shows, changes, exports, imports and resets what a device keeps.
 
 mod arguments;
 mod camera;

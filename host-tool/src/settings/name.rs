@@ -1,12 +1,12 @@
-//! A name that a user gives a device.
+//! Reads the user's name for a device.
 
 use hivtac_host::shown::shown;
 use hivtac_wire::settings::{NAME_BYTES, Name};
 
-/// A name for a device: 1 to 24 bytes that can be read.
+/// Reads a name of 1 to 24 bytes with visible characters only.
 ///
 /// # Errors
-/// Why it is none.
+/// Why it is not a name.
 pub fn name(text: &str) -> Result<Name, String> {
     if text.is_empty() {
         return Err("it is empty; `hivtac settings reset` takes a name away".to_owned());

@@ -1,5 +1,5 @@
-//! How forces are followed from frame to frame: contact, slip, filter, re-zeroing and creep, as
-//! JSON, as lines, and as what `settings set` changes of them.
+//! Contact, slip, filter, re-zeroing and creep as JSON, as lines, and as changes by `settings set`.
+//! They decide how forces are followed from frame to frame.
 
 use hivtac_host::decimal::Decimal;
 use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
@@ -8,7 +8,7 @@ use hivtac_terms::units::{
 };
 use serde::{Deserialize, Serialize};
 
-/// In whole numbers of the units that the device keeps.
+/// In whole numbers of the device's units.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TemporalJson {
@@ -34,7 +34,7 @@ struct SlipJson {
     ratio_permille: u16,
 }
 
-/// As in the settings and in what `info` says.
+/// A filter, as in the settings and in the output of `info`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FilterJson {
@@ -64,7 +64,7 @@ struct CreepJson {
 }
 
 impl TemporalJson {
-    /// Of a device's settings.
+    /// From a device's settings.
     pub fn new(settings: &TemporalSettings) -> TemporalJson {
         let TemporalSettings {
             contact,
@@ -95,7 +95,7 @@ impl TemporalJson {
         }
     }
 
-    /// A device's settings; whether they are in their ranges is not looked at.
+    /// As a device's settings, without a check of their ranges.
     pub fn settings(&self) -> TemporalSettings {
         TemporalSettings {
             contact: ContactLimits {
@@ -127,7 +127,7 @@ impl TemporalJson {
 }
 
 impl FilterJson {
-    /// Of a device's filter.
+    /// From a device's filter.
     pub fn new(filter: Filter) -> FilterJson {
         match filter {
             Filter::None => FilterJson::None,
@@ -138,7 +138,7 @@ impl FilterJson {
         }
     }
 
-    /// What it is and how late it makes forces, for a person.
+    /// The filter and the delay it causes, for a person.
     pub fn text(self) -> String {
         match self {
             FilterJson::None => "none: each frame's own force".to_owned(),
@@ -152,7 +152,7 @@ impl FilterJson {
     }
 }
 
-/// What they are, for a person: name and text of each.
+/// Name and text of each setting, for a person.
 pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
     let TemporalSettings {
         contact,
@@ -203,46 +203,46 @@ fn creep_text(creep: &Creep) -> String {
     format!("{first} of a force within {short} s, {second} within {long} s")
 }
 
-/// What to change; what is not given stays.
+/// A change; `None` keeps a value.
 #[derive(Clone, Copy, Debug)]
 pub enum Change {
-    /// Of [`ContactLimits`].
+    /// A change of [`ContactLimits`].
     Contact {
-        /// Where it begins.
+        /// The force with which a contact begins.
         begins: Option<UnsignedMicroNewtons>,
-        /// Where it ends.
+        /// The force below which it ends.
         ends: Option<UnsignedMicroNewtons>,
     },
-    /// Of [`SlipLimits`].
+    /// A change of [`SlipLimits`].
     Slip {
-        /// How far the place moves.
+        /// Distance that the place moves.
         distance: Option<Micrometres>,
-        /// In what time.
+        /// Longest time for it.
         within: Option<Milliseconds>,
-        /// From what ratio on.
+        /// Least ratio of forces.
         ratio: Option<Permille>,
     },
-    /// Another filter.
+    /// The new filter.
     Filter(Filter),
-    /// No re-zeroing, or this, with what is not given as it is, or as it is by default.
+    /// The new re-zeroing; `None` switches it off. A missing value stays, or gets its default.
     Rezero(Option<RezeroChange>),
-    /// Of [`Creep`].
+    /// The new [`Creep`].
     Creep(Creep),
 }
 
-/// What to change of [`Rezero`].
+/// A change of [`Rezero`].
 #[derive(Clone, Copy, Debug)]
 pub struct RezeroChange {
-    /// How long nothing touched.
+    /// Time without a touch.
     pub after: Option<Milliseconds>,
-    /// How far in a second.
+    /// Distance in a second.
     pub rate: Option<MilliPx>,
-    /// How far in all.
+    /// Distance in total.
     pub total: Option<MilliPx>,
 }
 
 impl Change {
-    /// The settings with it.
+    /// The settings with this change.
     pub fn of(self, mut settings: TemporalSettings) -> TemporalSettings {
         let TemporalSettings { contact, slip, .. } = &mut settings;
         match self {
@@ -273,7 +273,7 @@ impl Change {
         settings
     }
 
-    /// What it is about, by [`texts`].
+    /// The name of the changed setting, as in [`texts`].
     pub fn name(self) -> &'static str {
         match self {
             Change::Contact { .. } => "contact",
@@ -285,14 +285,14 @@ impl Change {
     }
 }
 
-/// A number with up to three decimals, in thousandths.
+/// Reads a number with up to three decimals, in thousandths.
 ///
 /// # Errors
-/// When it is none, below 0, or too large.
+/// When it is not a number, below 0, or too large.
 pub fn thousandths(text: &str) -> Result<u32, String> {
     let number: f64 = text.parse().map_err(|_| "it is no number".to_owned())?;
     let scaled = number * 1e3;
-    // The margin is that of decimals in binary numbers.
+    // The margin covers decimals that binary numbers cannot represent.
     if (scaled - scaled.round()).abs() > 1e-6 * scaled.abs().max(1.0) {
         return Err("it has more than three decimals".to_owned());
     }
@@ -302,7 +302,7 @@ pub fn thousandths(text: &str) -> Result<u32, String> {
     }
 }
 
-/// The same of small numbers.
+/// Reads a small number with up to three decimals, in thousandths.
 ///
 /// # Errors
 /// As [`thousandths`].
@@ -310,10 +310,10 @@ pub fn small_thousandths(text: &str) -> Result<u16, String> {
     u16::try_from(thousandths(text)?).map_err(|_| "it is out of range".to_owned())
 }
 
-/// Two numbers with a comma between them, each in thousandths.
+/// Reads two numbers with a comma between them, each in thousandths.
 ///
 /// # Errors
-/// As [`thousandths`], or when they are not two.
+/// As [`thousandths`], or when there are not exactly two.
 pub fn two_thousandths(text: &str) -> Result<[u8; 2], String> {
     let (one, other) = text
         .split_once(',')

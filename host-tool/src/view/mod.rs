@@ -1,4 +1,4 @@
-//! `hivtac view`: a live page in a browser of this computer.
+//! `hivtac view`: shows a live page in a browser of this computer.
 
 mod owner;
 mod picture;
@@ -22,9 +22,9 @@ use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-/// Orders that wait for a device; whoever gives more is told that it is busy.
+/// Most orders that wait for a device; a further order gets the answer that it is busy.
 const ORDERS: usize = 4;
-/// How often is looked whether to end.
+/// Time between two checks whether the program must end.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 /// Show a live page in a browser of this computer: forces, picture, threshold, status
@@ -53,10 +53,10 @@ pub struct ViewArguments {
     json: bool,
 }
 
-/// Serves the page until it is interrupted. Prints `ready` and its address.
+/// Serves the page until the program is interrupted. Prints `ready` and the address.
 ///
 /// # Errors
-/// When a device is not there to begin with; a lost one is waited for.
+/// When a device is missing at the start; one that is lost later is waited for.
 pub fn run(arguments: &ViewArguments) -> Result<(), Failure> {
     let addresses = match arguments.port.as_slice() {
         [] => vec![Address::Find],
@@ -88,7 +88,7 @@ pub fn run(arguments: &ViewArguments) -> Result<(), Failure> {
     stop::check()
 }
 
-/// A device that is connected, for its thread.
+/// A connected device, for its thread.
 type Opened = (Owner, Link);
 
 fn open(address: &Address, arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure> {

@@ -1,4 +1,4 @@
-//! The one thread that talks to a device for the page: keeps what it sends, and does what the page
+//! The thread that communicates with a device for the page: keeps its messages and carries out
 //! orders.
 
 use super::picture;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
-/// Time between two tellings of the state.
+/// Time between two updates of the state.
 const TELL_EVERY: Duration = Duration::from_millis(250);
 
 /// A device and what is known of it.
@@ -28,13 +28,13 @@ pub struct Owner {
     watched: Watched,
 }
 
-/// What every message of the device goes to.
+/// The receivers of a device's messages.
 struct Watched {
     feed: Arc<Feed>,
     state: State,
     recorder: Recorder,
     told: Instant,
-    /// Something came since.
+    /// Whether a message has come since the last update.
     is_new: bool,
 }
 
@@ -68,7 +68,7 @@ impl Watched {
 }
 
 impl Owner {
-    /// Of a device that is connected already.
+    /// The owner of a connected device.
     pub fn new(
         address: Address,
         patience: Duration,
@@ -93,7 +93,7 @@ impl Owner {
         }
     }
 
-    /// Until it is interrupted.
+    /// Runs until the program is interrupted.
     pub fn run(mut self, link: Link) {
         let address = self.address.clone();
         follow(&address, self.patience, link, &mut self);
@@ -109,7 +109,7 @@ impl Owner {
         link.request(request, patience, |message| watched.message(message))
     }
 
-    /// Does what is ordered; a refusal is an answer, a lost connection an end.
+    /// Carries out an order. A refusal is only an answer; a lost connection is returned.
     fn obey(&mut self, link: &mut Link, posted: Posted) -> Result<(), Failure> {
         match self.try_to(link, posted.order) {
             Ok(answer) => posted.answer(answer),
@@ -150,12 +150,12 @@ impl Owner {
             }
         };
         self.request(link, request, patience)?;
-        // What holds now, as the device has it.
+        // The values now in use, from the device.
         self.request(link, Request::GetInfo, self.patience)?;
         Ok(Answer::Done(done))
     }
 
-    /// Begins a file, with the device's counters in front.
+    /// Begins a file with the device's counters.
     fn record(&mut self, link: &mut Link) -> Result<Answer, Failure> {
         let Watched {
             recorder, state, ..

@@ -1,4 +1,4 @@
-//! A frame for the page: a line of JSON, then its pixels, then its mask.
+//! Encodes a frame for the page: a line of JSON, then its pixels, then its mask.
 
 use crate::finding::MarkerJson;
 use crate::focus::Focus;
@@ -10,24 +10,24 @@ use hivtac_terms::status::Status;
 use hivtac_wire::message::DeviceHello;
 use serde::Serialize;
 
-/// What the page is told of a frame.
+/// The data about a frame in the line of JSON.
 #[derive(Serialize)]
 struct Told {
     frame: u32,
     width: u16,
     height: u16,
-    /// What it was read with.
+    /// The threshold it was read with.
     threshold: Limits,
-    /// Pixels that pass, without those that dilation adds.
+    /// Number of pixels that pass, without those that dilation adds.
     passed: usize,
-    /// As the device found them; none when it did not.
+    /// The device's markers; `None` if it found none.
     markers: Option<Vec<MarkerJson>>,
-    /// What is wrong with the picture, and what to do; nothing while something presses the film,
-    /// which moves and changes the markers.
+    /// Faults of the picture with advice. Empty while something presses the film, which moves and
+    /// changes the markers.
     wrong: Vec<String>,
 }
 
-/// The line with its end, three levels a pixel, and the mask, a byte a pixel.
+/// The line with its end, three levels a pixel, and the mask with a byte a pixel.
 pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
     let frame = &taken.frame;
     let pixels = usize::from(frame.width) * usize::from(frame.height);

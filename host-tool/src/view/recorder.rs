@@ -1,4 +1,4 @@
-//! The page's record button: a file at a time, beside what the page shows.
+//! The page's record button: writes one file at a time while the page is shown.
 
 use crate::record::{Heard, Recording};
 use hivtac_host::failure::Failure;
@@ -8,14 +8,14 @@ use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// Time between two flushes: what a power cut costs.
+/// Time between two flushes, and therefore the most that a power cut loses.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
-/// What is recorded of a device, if anything.
+/// The recording of a device, if one is running.
 pub struct Recorder {
     folder: PathBuf,
     under_way: Option<UnderWay>,
-    /// What became of the last file.
+    /// The result of the last file.
     last: String,
 }
 
@@ -26,7 +26,7 @@ struct UnderWay {
 }
 
 impl Recorder {
-    /// Into files of this folder.
+    /// Records into files of this folder.
     pub fn new(folder: &Path) -> Recorder {
         Recorder {
             folder: folder.to_owned(),
@@ -35,10 +35,10 @@ impl Recorder {
         }
     }
 
-    /// Begins a file; says which. While one is under way, that goes on.
+    /// Begins a file and returns its name. A running file goes on.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When the file cannot be made.
     pub fn begin(&mut self, hello: &DeviceHello) -> Result<String, Failure> {
         if self.under_way.is_none() {
             let file = free_name(&self.folder, &unit_number(&hello.device_id));
@@ -51,7 +51,7 @@ impl Recorder {
         Ok(self.told().text)
     }
 
-    /// Keeps what the device says. A disk that is full ends the file, and nothing else.
+    /// Keeps a device's message. A full disk only ends the file.
     pub fn message(&mut self, message: &DeviceMessage) {
         let Some(under_way) = &mut self.under_way else {
             return;
@@ -70,7 +70,7 @@ impl Recorder {
         }
     }
 
-    /// Ends the file that is under way, if any, whatever the reason; says what became of it.
+    /// Ends the running file, if there is one, and returns its result; `why` is the reason.
     pub fn end(&mut self, why: Result<(), Failure>) -> String {
         if let Some(under_way) = self.under_way.take() {
             let UnderWay {
@@ -85,7 +85,7 @@ impl Recorder {
         self.last.clone()
     }
 
-    /// How it stands.
+    /// The recording's state, for the page.
     pub fn told(&self) -> page::Recording {
         match &self.under_way {
             Some(UnderWay {
@@ -102,7 +102,7 @@ impl Recorder {
     }
 }
 
-/// `hivtac-UNIT-N.mcap` with the first number that is not taken.
+/// `hivtac-UNIT-N.mcap` with the first free number.
 fn free_name(folder: &Path, unit: &str) -> PathBuf {
     let name = |number: u32| folder.join(format!("hivtac-{unit}-{number}.mcap"));
     let is_free = |file: &PathBuf| !file.exists() && !file.with_extension("mcap.partial").exists();

@@ -1,4 +1,4 @@
-//! How a device stands: who it is, whether it is there, its rate, losses and latency.
+//! The state of a device: identity, connection, rate, losses and latency.
 
 use crate::tally::Tally;
 use hivtac_host::link::log_text;
@@ -6,20 +6,20 @@ use hivtac_host::page::{Recording, Told};
 use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLine, Sample, Stats};
 use std::collections::VecDeque;
 
-/// Samples that the rate is taken from.
+/// Number of samples from which the rate is computed.
 const RATE_OF: usize = 256;
-/// The device's lines that are shown.
+/// Number of the device's lines that are shown.
 const LINES: usize = 8;
 
-/// Everything about a device but its samples.
+/// All data about a device except its samples.
 pub struct State {
     /// The port's name.
     pub port: String,
-    /// As the device said it last.
+    /// The device's last hello.
     pub hello: DeviceHello,
-    /// Why there are no samples; nothing while they come.
+    /// Why samples are missing; `None` while they come.
     pub trouble: Option<String>,
-    /// Losses since the program was started.
+    /// Losses since the start of the program.
     pub tally: Tally,
     times_us: VecDeque<u64>,
     /// The device's newest counters.
@@ -28,7 +28,7 @@ pub struct State {
 }
 
 impl State {
-    /// Of a device that is connected.
+    /// The state of a connected device.
     pub fn new(port: String, hello: DeviceHello) -> State {
         State {
             port,
@@ -41,7 +41,7 @@ impl State {
         }
     }
 
-    /// Takes in what the device says.
+    /// Handles a device's message.
     pub fn take(&mut self, message: &DeviceMessage) {
         match message {
             DeviceMessage::Sample(sample) => self.sample(sample),
@@ -60,7 +60,7 @@ impl State {
         self.trouble = None;
         let newest = self.times_us.back().copied().unwrap_or(0);
         if sample.time_us < newest {
-            // It started anew, and its clock with it.
+            // The device restarted, and so did its clock.
             self.times_us.clear();
         }
         if self.times_us.len() == RATE_OF {
@@ -76,13 +76,13 @@ impl State {
         self.lines.push_back(log_text(line));
     }
 
-    /// The connection is lost, or the device silent.
+    /// Notes that the connection is lost or the device is silent.
     pub fn trouble(&mut self, why: String) {
         self.trouble = Some(why);
         self.times_us.clear();
     }
 
-    /// The device is there again.
+    /// Notes that the device is connected again.
     pub fn connected_again(&mut self, hello: DeviceHello) {
         self.tally.connected_again();
         self.hello = hello;
@@ -95,7 +95,7 @@ impl State {
         (last > first).then(|| steps as f64 * 1e6 / (last - first) as f64)
     }
 
-    /// One JSON object; `recording` is how that stands.
+    /// One JSON object; `recording` is the state of the page's recording.
     pub fn json(&self, recording: Recording) -> String {
         let told = Told {
             trouble: self.trouble.clone(),
@@ -161,7 +161,7 @@ mod tests {
         let frames = 0..600_u32;
         frames.for_each(|n| state.take(&sample(n, 5_000 * u64::from(n))));
         assert_eq!(json(&state)["rate_hz"], 200.0);
-        // It starts anew, at another rate.
+        // The device restarts, at another rate.
         (0..3).for_each(|n| state.take(&sample(n, 10_000 * u64::from(n))));
         assert_eq!(json(&state)["rate_hz"], 100.0);
     }
