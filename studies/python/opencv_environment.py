@@ -1,5 +1,4 @@
-"""Prints the path of a Python that has OpenCV, in a virtual environment of its own; makes it when
-it is not there.
+"""Prints the path of a Python with OpenCV in its own virtual environment, which is made if missing.
 
     python3 opencv_environment.py FOLDER
 """

@@ -1,8 +1,8 @@
 """The paper's image processing (Section 5) in OpenCV: HSV, threshold, dilation, contours, moments.
 
-As a program it reads frames of RGB565, little-endian, from standard input,
-`python paper_pipeline.py COLUMNS ROWS`, and for each writes a line of JSON: [[x, y, area], …] of
-the four largest contours, in px. Without OpenCV it ends with an error.
+`python paper_pipeline.py COLUMNS ROWS` reads frames of little-endian RGB565 from standard input.
+For each it writes a line of JSON with the four largest contours, in px: [[x, y, area], …]. Without
+OpenCV it ends with an error.
 """
 
 import json
@@ -15,20 +15,20 @@ import numpy as np
 LOW = (np.array([0, 100, 45]), np.array([10, 255, 255]))
 HIGH = (np.array([170, 100, 45]), np.array([179, 255, 255]))
 SQUARE = np.ones((3, 3), np.uint8)
-# Of thousands of contours only the longest can be markers: moments of the others would measure
-# Python.
+# Among thousands of contours only the longest can be markers. The moments of all others would cost
+# time in Python that says nothing about the pipeline.
 CANDIDATES = 8
 
 
 def bgr(pixels):
-    """RGB565 with its bits replicated to 8, as cameras and OpenCV's own conversion do it."""
+    """Converts RGB565 to 8 bits by repeating bits, as cameras and OpenCV's own conversion do."""
     red, green, blue = pixels >> 11, pixels >> 5 & 63, pixels & 31
     channels = (blue << 3 | blue >> 2, green << 2 | green >> 4, red << 3 | red >> 2)
     return np.dstack(channels).astype(np.uint8)
 
 
 def contours(image):
-    """Moments of the four largest contours, as the paper finds them, the largest first."""
+    """The moments of the four largest contours by the paper's method, the largest first."""
     hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
     mask = cv2.bitwise_or(cv2.inRange(hsv, *LOW), cv2.inRange(hsv, *HIGH))
     mask = cv2.dilate(mask, SQUARE)

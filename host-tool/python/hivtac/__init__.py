@@ -1,4 +1,4 @@
-"""Forces, tare, pictures and recordings of a HiVTac sensor, by the code of the tool `hivtac`.
+"""Reads forces, pictures and recordings of a HiVTac sensor, with the code of the tool `hivtac`.
 
     import hivtac
 
@@ -11,8 +11,8 @@ Numbers are in SI units (N, m, rad, s), positions in the image in pixels: the ce
 is the origin, x right, y down. The film frame is right-handed: x right and y down in the image, z
 out of the film, away from the camera; a press has a negative force along z.
 
-What goes wrong raises `Error` or a class of it, with the text that the tool would print. Ctrl-C
-works while anything waits. Lines that a sensor logs go to the logger `hivtac`.
+A failure raises `Error` or a subclass, with the text that the tool would print. Ctrl-C works during
+every wait. Lines that a sensor logs go to the logger `hivtac`.
 """
 
 from __future__ import annotations
@@ -61,18 +61,18 @@ _log = logging.getLogger("hivtac")
 
 @dataclass(frozen=True)
 class Device:
-    """A sensor, as it says of itself."""
+    """The identity of a sensor."""
 
     serial: str
     """Serial number: 24 hexadecimal digits."""
     name: str
-    """What its user calls it; empty when nothing."""
+    """The name that its user set; empty if not set."""
     board: str
     """Board and camera."""
     firmware: str
     """Firmware and its version."""
     model: str | None
-    """The model in use; `None` when there is no usable one."""
+    """The model in use; `None` if no model is usable."""
     width: int
     """Columns of a frame, px."""
     height: int
@@ -81,22 +81,22 @@ class Device:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One frame's force, or why there is none."""
+    """One frame's force, or the reason why it is missing."""
 
     sequence: int
-    """Counts the samples that were produced; a gap is one lost on the way."""
+    """Running number of the samples produced; a gap shows samples lost on the way."""
     frame: int
-    """Counts the frames that were exposed; a gap is one that was not processed."""
+    """Running number of the frames exposed; a gap shows frames that were not processed."""
     time: float
     """Device time of the middle of the frame's exposure, s since its start."""
     host_time: float
-    """When it came to the computer that read it, s since 1970."""
+    """Receive time at the computer that read it, s since 1970."""
     status: tuple[str, ...]
-    """Why there is no force, or how far to trust it: names of `docs/wire.md`."""
+    """Why the force is missing, or how reliable it is: names of `docs/wire.md`."""
     status_bits: int
-    """The same as bits, also those that this release has no name for."""
+    """The status as bits, including those without a name in this release."""
     force: Floats | None
-    """(3,): force on the film, N; `None` when the status says why there is none."""
+    """(3,): force on the film, N; `None` if it is missing, for which `status` has the reason."""
     alpha: float | None
     """Direction α, rad: force = magnitude · (sin α cos β, sin β, −cos α cos β)."""
     beta: float | None
@@ -108,13 +108,13 @@ class Sample:
     magnitude_sigma: float | None
     """Standard uncertainty of the magnitude, N: 95 of 100 are within 1.960 times this."""
     place: Floats | None
-    """(2,): where the tip touches, m from the film's middle; `None` when it is not told."""
+    """(2,): place where the tip touches, m from the film's middle; `None` if unknown."""
     place_sigma: float | None
     """Standard uncertainty of each coordinate of the place, m."""
     markers: Floats | None
-    """(4, 2): column and row of the markers 0–3, px; `None` when they were not found."""
+    """(4, 2): column and row of the markers 0–3, px; `None` if they were not found."""
     marker_areas: npt.NDArray[np.int64] | None
-    """(4,): pixels of each marker."""
+    """(4,): area of each marker, px."""
 
     @property
     def contact(self) -> bool:
@@ -129,46 +129,46 @@ class Sample:
 
 @dataclass(frozen=True, eq=False)
 class Moved:
-    """How far a rest position is from the one before, and what a camera's motion explains of it."""
+    """Motion from the rest position before, and the part that a motion of the camera explains."""
 
     farthest: float
-    """How far the marker moved that moved most, px."""
+    """Largest motion of a marker, px."""
     shift: Floats
-    """(2,): how far the markers' middle moved, px."""
+    """(2,): motion of the markers' middle, px."""
     turn: float
-    """How far they turned about it, x towards y, rad."""
+    """Turn of the pattern about its middle, x towards y, rad."""
     larger: float
-    """How much larger their pattern is, in parts of it."""
+    """Relative growth of the pattern."""
     beside: float
-    """How far beside that they are: the coordinate that is farthest, px."""
+    """Largest coordinate of the motion that shift, turn and growth do not explain, px."""
 
 
 @dataclass(frozen=True)
 class Rest:
-    """The rest position in use, and what became of it since it was taken."""
+    """The rest position in use, and its changes since it was taken."""
 
     taken: bool
-    """Whether one was taken; the model's own is in use otherwise."""
+    """Whether one was taken; otherwise the model's own is in use."""
     kept: bool
-    """Whether it is the same after a restart."""
+    """Whether it is kept through restarts."""
     rezeroed: float
-    """How far re-zeroing moved it, px."""
+    """Distance that re-zeroing moved it, px."""
     seen: float | None
-    """How far from it the untouched film was seen last, px; `None` until it was seen."""
+    """Last distance of the untouched film from it, px; `None` until that was seen."""
     from_kept: float | None
-    """How far it is from the kept one, px; `None` unless there are both."""
+    """Distance from the kept one, px; `None` unless both exist."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tare:
-    """What a tare gave."""
+    """The result of a tare."""
 
     markers: Floats
     """(4, 2): column and row of the markers at rest, px."""
     spread: float
-    """How far the markers moved meanwhile, px."""
+    """Motion of the markers during the tare, px."""
     moved: Moved | None
-    """How far the rest position moved from the one before; `None` of the first one."""
+    """Motion from the rest position before; `None` for the first tare."""
 
 
 def open(
@@ -178,23 +178,23 @@ def open(
     `tcp:HOST:PORT`), or to the `device` with a name or serial number. `timeout`: longest wait for
     its answers, s.
 
-    Raises `NoDeviceError` when there is none or nobody answers, `VersionError` when it speaks
-    another version.
+    Raises `NoDeviceError` when the sensor is missing or does not answer, `VersionError` when its
+    protocol has another version.
     """
     return Sensor(Connection(port, device, timeout))
 
 
 def recording(path: str | os.PathLike[str], *, device: str | None = None) -> Recording:
-    """Opens an MCAP file of `hivtac record`, also one that was cut. `device`: the name or serial
-    number of one of its sensors, where it has several.
+    """Opens an MCAP file of `hivtac record`; it may have been cut. `device`: the name or serial
+    number of one of its sensors, necessary if it has several.
 
-    Raises `Error` when it is none, or has no such sensor.
+    Raises `Error` when the file is not a recording, or does not have the sensor.
     """
     return Recording(Reader(os.fspath(path), device))
 
 
 class Sensor:
-    """A connection to a sensor: iterates over its samples as they come, without an end. Close it,
+    """A connection to a sensor: iterates over its samples as they arrive, without an end. Close it,
     or use it in a `with` statement."""
 
     def __init__(self, connection: Connection) -> None:
@@ -216,10 +216,10 @@ class Sensor:
         return self
 
     def __next__(self) -> Sample:
-        """Waits for the next sample. Samples are kept while a tare or a snapshot is taken, and
-        those that the program is too slow for are lost and leave a gap in `Sample.sequence`.
+        """Waits for the next sample. Samples that arrive during a tare or a snapshot are kept. A
+        program that is too slow loses samples, which leaves a gap in `Sample.sequence`.
 
-        Raises `LostError` when the connection is lost; `StopIteration` once it was closed.
+        Raises `LostError` when the connection is lost, `StopIteration` after it was closed.
         """
         try:
             numbers = self._connection.next()
@@ -230,11 +230,11 @@ class Sensor:
         return _sample(*numbers)
 
     def tare(self, frames: int = 32, *, force: bool = False, keep: bool = False) -> Tare:
-        """Takes the mean of the next good `frames` (1–256) as the rest position: nothing may touch
-        the film. `force`: though something seems to. `keep`: through restarts.
+        """Takes the mean of the next good `frames` (1–256) as the rest position. Nothing may touch
+        the film. `force`: even if the film seems to be touched. `keep`: through restarts.
 
-        Raises `RefusedError` when the sensor finds that it is not at rest, with the force that the
-        markers look like, or sees no markers.
+        Raises `RefusedError` when the sensor sees no markers or is not at rest; then the text has
+        the force that the markers show.
         """
         try:
             markers, spread, moved = self._connection.tare(frames, force, keep)
@@ -243,31 +243,33 @@ class Sensor:
         return Tare(np.array(markers), spread, _moved(*moved) if moved else None)
 
     def rest(self) -> Rest:
-        """The rest position in use, and how far from it the untouched film was seen last."""
+        """Asks for the rest position in use, and its changes since it was taken."""
         try:
             return Rest(*self._connection.rest())
         finally:
             self._tell_log()
 
     def set_down(self, x: float, y: float, z: float) -> None:
-        """Says where gravity pulls on the film, from its next frame on: a vector of any length, x
-        right and y down in the image, z away from the camera. The film hangs by its own weight;
-        told how it is held, a sensor that turns measures on. As often as the robot moves, up to 100
-        times a second: nothing answers. The tare must have been taken when this was told, too.
+        """Sets the direction of gravity on the film, from its next frame on. The vector may have
+        any length; x is right and y down in the image, z away from the camera.
+
+        The film hangs by its own weight. A sensor that turns needs this direction to keep
+        measuring: call it whenever the robot moves, up to 100 times a second. The sensor sends no
+        reply. The direction must also have been set when the tare was taken.
 
         Raises `Error` when the vector has no direction.
         """
         self._connection.set_down((x, y, z))
 
     def down_unknown(self) -> None:
-        """Says that nobody knows where gravity pulls: uncertainties include that."""
+        """Sets the direction of gravity as unknown: uncertainties then include that."""
         self._connection.set_down(None)
 
     def snapshot(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3): the next whole frame as the sensing reads it, levels of red, green
         and blue.
 
-        Raises `RefusedError` when the camera sends none, `LostError` when it came damaged.
+        Raises `RefusedError` when the camera sends no frame, `LostError` when it arrived damaged.
         """
         try:
             _, _, width, height, levels = self._connection.snapshot()
@@ -285,7 +287,7 @@ class Sensor:
 
 
 class Recording:
-    """What was recorded of a sensor: iterates once over its samples."""
+    """The recording of a sensor: iterates once over its samples."""
 
     def __init__(self, reader: Reader) -> None:
         self._reader = reader
@@ -293,7 +295,7 @@ class Recording:
 
     @property
     def is_cut(self) -> bool:
-        """True once its end was reached, when it had been cut before its own."""
+        """True after the end of a recording that was cut."""
         return self._reader.is_cut()
 
     def __iter__(self) -> Iterator[Sample]:

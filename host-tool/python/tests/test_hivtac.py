@@ -1,4 +1,4 @@
-"""`hivtac` on the firmware in the rig, over TCP, and on recordings of the tool.
+"""Tests `hivtac` on the firmware in the rig, over TCP, and on recordings of the tool.
 
     HIVTAC_RIG=… HIVTAC_ELF=… HIVTAC_TOOL=… python host-tool/python/tests/test_hivtac.py
 
@@ -161,7 +161,7 @@ class WithoutASensor(unittest.TestCase):
         self.assertGreater(turns, 50)
 
     def test_ctrl_c_ends_a_wait(self):
-        # What runs in a shell's background ignores SIGINT, and so do its children.
+        # A process in a shell's background ignores SIGINT, as do its children.
         program = (
             "import signal, sys, hivtac\n"
             "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
@@ -184,7 +184,7 @@ class WithoutASensor(unittest.TestCase):
 
 
 class silent:
-    """A TCP port at which somebody takes every connection, and says nothing."""
+    """A TCP port that accepts every connection, and sends nothing."""
 
     def __enter__(self):
         self._listener = socket.create_server(("127.0.0.1", 0))

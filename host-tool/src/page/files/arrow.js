@@ -1,11 +1,11 @@
-// The force as an arrow on the film, seen from the tip's side: x, y and z as the sensor has them.
+// Draws the force as an arrow on the film, seen from the tip's side, with the sensor's x, y and z.
 
-/** Half the side of the film that is drawn, and where its markers are, mm. */
+/** Half the side of the drawn film, and the distance of its markers along x and y, mm. */
 const FILM_MM = 5;
 const MARKER_MM = 3.717;
-/** The longest arrow, mm of the film. */
+/** Length of the longest arrow, mm on the film. */
 const LONGEST_MM = 6;
-/** What the longest arrow may stand for, mN. */
+/** Possible forces of the longest arrow, mN. */
 const SCALES = [5, 10, 20, 30, 50, 70, 100, 150, 200, 300, 500, 700, 1000, 2000, 5000];
 const START = { yaw: -0.5, pitch: 0.5 };
 const TURN = 0.1;
@@ -41,7 +41,7 @@ export class Arrow {
     this.pitch = Math.min(Math.PI / 2, Math.max(0.05, this.pitch + pitch));
   }
 
-  /** From mm of the film to pixels of the canvas, without perspective. */
+  /** Converts mm on the film to pixels of the canvas, without perspective. */
   project([x, y, z]) {
     const right = x * Math.cos(this.yaw) - y * Math.sin(this.yaw);
     const away = x * Math.sin(this.yaw) + y * Math.cos(this.yaw);
@@ -64,7 +64,7 @@ export class Arrow {
     this.colour = (name) => style.getPropertyValue(`--${name}`);
   }
 
-  /** `force` in mN or null; `largest`: of the last half minute, which sets the scale. */
+  /** `force`: mN, or null. `largest`: largest |F| of the last half minute; it sets the scale. */
   draw(force, largest, frame) {
     this.fit();
     this.drawFilm();
@@ -127,7 +127,7 @@ export class Arrow {
     pen.globalAlpha = 1;
   }
 
-  /** An uncertainty, mm, as a disc. */
+  /** Draws an uncertainty as a disc; `radius` in mm. */
   drawRound(point, radius) {
     const { pen } = this;
     pen.globalAlpha = 0.3;

@@ -1,16 +1,16 @@
-// Curves over the last half minute with bands of uncertainty, in a bounded store: a column of time
-// keeps the least and the largest of what fell into it, however many samples those were.
+// Draws curves over the last half minute with bands of uncertainty. Memory is bounded: each column
+// of time keeps only the least and the largest of its values.
 
 const SECONDS = 30;
 const COLUMNS = 600;
 const PER_SECOND = COLUMNS / SECONDS;
-/** Of each curve a column keeps its least and largest value, and the same with uncertainty. */
+/** Numbers of a curve in a column: least and largest value, and both with uncertainty. */
 const KEPT = 4;
 const LEFT = 44;
 const BELOW = 16;
 
 export class Chart {
-  /** `names`: colours of the style sheet, one a curve. */
+  /** `names`: names of colours in the style sheet, one for each curve. */
   constructor(canvas, names, fromZero) {
     this.canvas = canvas;
     this.names = names;
@@ -23,7 +23,7 @@ export class Chart {
     return ((column % COLUMNS) * this.names.length + curve) * KEPT;
   }
 
-  /** Values at a time, s, and their standard uncertainties; null is a gap. */
+  /** Adds values at a time, s, with their standard uncertainties; null leaves a gap. */
   add(seconds, values, sigmas) {
     if (values === null) return;
     const column = Math.floor(seconds * PER_SECOND);
@@ -39,7 +39,7 @@ export class Chart {
     });
   }
 
-  /** Columns of the last half minute that have a value. */
+  /** The columns of the last half minute that have values. */
   *filled(end = this.end) {
     const last = Math.floor(end * PER_SECOND);
     for (let column = Math.max(0, last - COLUMNS + 1); column <= last; column += 1) {
@@ -47,7 +47,7 @@ export class Chart {
     }
   }
 
-  /** The largest size of a value. */
+  /** The largest absolute value. */
   largest() {
     let largest = 0;
     for (const column of this.filled(this.end ?? 0)) {
@@ -115,7 +115,7 @@ export class Chart {
     }
   }
 
-  /** A band and a line, apart where half a second and more is missing. */
+  /** Draws a band and a line, with gaps where values are missing for over half a second. */
   drawCurve(pen, colour, place, curve) {
     let part = [];
     for (const column of this.filled()) {
@@ -157,7 +157,7 @@ function rule(pen, from, to) {
   pen.stroke();
 }
 
-/** 1, 2 or 5 times a power of ten, at least this. */
+/** The least number of the form 1, 2 or 5 times a power of ten that is not below `least`. */
 function niceStep(least) {
   const power = 10 ** Math.floor(Math.log10(least));
   return [1, 2, 5, 10].map((n) => n * power).find((step) => step >= least * 0.999);

@@ -1,4 +1,4 @@
-// What presses anywhere cover: a map for each range of forces, as hivtac-calibrate tells it.
+// Shows the coverage of free presses, from hivtac-calibrate: a map for each range of forces.
 
 const WORDS = { covered: "covered", begun: "begun", missing: "missing", unneeded: "not needed" };
 
@@ -8,7 +8,7 @@ export class Coverage {
     this.shown = "";
   }
 
-  /** Nothing is shown while no presses are recorded. */
+  /** Shows a coverage; hides it when `told` is null because no presses are recorded. */
   show(told) {
     const text = JSON.stringify(told);
     if (text === this.shown) return;

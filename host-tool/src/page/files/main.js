@@ -1,4 +1,4 @@
-// The page: one stream of events, one view a sensor.
+// Runs the page: one stream of events, one view for each sensor.
 
 import { SensorView } from "./sensor.js";
 
@@ -17,7 +17,7 @@ function begin(hello) {
   link.textContent = "";
 }
 
-/** A connection that begins anew tells the last half minute anew. */
+/** Receives the events; a new connection repeats the last half minute. */
 function listen() {
   const events = new EventSource("events");
   const on = (name, act) =>
@@ -32,7 +32,7 @@ function listen() {
   };
 }
 
-/** The view that a key is for: the one with the focus, or the first. */
+/** The view that receives a key: the one with the focus, or the first. */
 function chosen() {
   return views.find((view) => view.element.contains(document.activeElement)) ?? views[0];
 }
@@ -42,7 +42,7 @@ document.addEventListener("keydown", (event) => {
   chosen()?.key(event.key.toLowerCase());
 });
 
-/** Twenty pictures a second are motion; more would cost the processor more. */
+/** Twenty pictures a second look like motion; more would load the processor. */
 const DRAW_EVERY_MS = 50;
 let drawn = 0;
 function draw(now) {

@@ -1,5 +1,5 @@
-// What the camera sees, with mask and markers: the next picture is asked for when one is shown, so
-// that a slow page asks for few.
+// Shows the camera's picture with mask and markers. It requests a picture after it has shown the
+// one before, and a slow page therefore requests few.
 
 const PAUSE_MS = 200;
 const AFTER_FAILURE_MS = 2000;
@@ -7,7 +7,7 @@ const PASSED = 255;
 
 const wait = (ms) => new Promise((done) => setTimeout(done, ms));
 
-/** The line of JSON before the first line end, the levels and the mask. */
+/** Splits bytes into the line of JSON, the levels and the mask. */
 function taken(bytes) {
   const end = bytes.indexOf(10);
   const told = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
@@ -23,7 +23,7 @@ export class Picture {
     this.shown = null;
     part("mask-on").addEventListener("change", () => this.draw());
     part("picture-on").addEventListener("change", () => this.follow());
-    // The first one when the page stands.
+    // The first picture, once the page is complete.
     setTimeout(() => this.follow());
   }
 
@@ -38,7 +38,7 @@ export class Picture {
     this.runs = false;
   }
 
-  /** Shows the next picture; says why there is none. */
+  /** Shows the next picture; returns null, or the reason for a missing picture. */
   async next() {
     try {
       const response = await fetch(`picture/${this.number}`);

@@ -1,4 +1,4 @@
-// One sensor: its numbers, lights, charts, arrow, picture and threshold.
+// Shows one sensor: its numbers, lights, charts, arrow, picture and threshold.
 
 import { Arrow } from "./arrow.js";
 import { Chart } from "./chart.js";
@@ -6,14 +6,14 @@ import { Coverage } from "./coverage.js";
 import { Picture } from "./picture.js";
 import { Threshold } from "./threshold.js";
 
-/** How long a light stays on after its last sample, so that it can be read. */
+/** Time for which a light stays on after its last sample, long enough to be read. */
 const LIGHT_MS = 1500;
 const CONTACT = 1 << 16;
 const SLIP = 1 << 17;
-/** The direction's uncertainty is that of an angle in a plane: √2 that along one axis. */
+/** The direction's uncertainty is that of an angle in a plane: √2 times that along one axis. */
 const ONE_AXIS = Math.SQRT1_2;
 
-/** A sample of the stream as names, in mN, degrees and mm. */
+/** Converts a sample of the stream to named values in mN, degrees and mm. */
 function named([sequence, frame, timeUs, status, row]) {
   const sample = { sequence, frame, seconds: timeUs / 1e6, status, force: null };
   if (row) {
@@ -31,7 +31,7 @@ function named([sequence, frame, timeUs, status, row]) {
   return sample;
 }
 
-/** Standard uncertainties of the components: the force's along itself and across. */
+/** Standard uncertainties of the components, from those along the force and across it. */
 function sigmas({ vector, magnitude, magnitudeSigma, directionSigma }) {
   const across = magnitude * Math.min(directionSigma * ONE_AXIS * Math.PI / 180, 1);
   return vector.map((component) => {
@@ -55,7 +55,7 @@ export class SensorView {
     this.size = new Chart(this.part("size"), ["size"], true);
     this.components = new Chart(this.part("components"), ["x", "y", "z"], false);
     const order = (what, more) => this.order(what, more);
-    // What is being recorded is shown and no more.
+    // A sensor that hivtac-calibrate records takes no orders.
     for (const name of ["buttons", "camera"]) this.part(name).hidden = !obeys;
     this.part("picture-on").checked = obeys;
     this.picture = new Picture(number, (name) => this.part(name));
@@ -75,7 +75,7 @@ export class SensorView {
     if (part.textContent !== text) part.textContent = text;
   }
 
-  /** Has the device do something; says how it went, and whether. */
+  /** Sends an order to the device and shows the answer; returns true if it was done. */
   async order(what, more = {}) {
     const body = JSON.stringify({ sensor: this.number, order: what, ...more });
     try {
@@ -121,7 +121,7 @@ export class SensorView {
     }
   }
 
-  /** On the charts' axis of time, where a device that starts anew goes on after a gap. */
+  /** Sets a sample's time on the charts' axis, where a restarted device goes on after a gap. */
   place(sample) {
     let shown = sample.seconds + this.shift;
     if (shown < this.end) {

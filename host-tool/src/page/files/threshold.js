@@ -1,5 +1,5 @@
-// Sliders for the device's threshold. What they say is sent as they move, one order at a time, the
-// newest first.
+// Shows sliders for the device's threshold. It sends their values as they move, one order at a
+// time, always the newest values.
 
 const HUE = 179;
 const BYTE = 255;
@@ -22,7 +22,7 @@ export class Threshold {
     this.sends = false;
   }
 
-  /** What the device has; not while it is being changed here. */
+  /** Shows the device's threshold, except while it is being changed here. */
   show({ format, limits }) {
     if (format !== this.format) this.build(format);
     if (this.sends) return;
