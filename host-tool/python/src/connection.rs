@@ -1,5 +1,5 @@
-//! A conversation with a device. The interpreter's lock is given back while anything waits, and
-//! taken only after the connection's own, so that two threads may use one connection.
+//! A conversation with a device. While anything waits, the interpreter's lock is free. It is taken
+//! only after the connection's own lock, and two threads may use one connection.
 
 use crate::error::{Error, raised};
 use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
@@ -19,14 +19,14 @@ use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// A device that sends nothing for so long while it should is gone.
+/// Silence after which a streaming device counts as gone.
 const SILENCE: Duration = Duration::from_secs(10);
-/// Time that a tare, or keeping something, may need besides its frames.
+/// Time for a tare or for keeping settings, in addition to the frames.
 const PATIENCE: Duration = Duration::from_secs(10);
-/// Time a device may need for a frame at its slowest; an emulated one is slower than a real one.
+/// Longest time between two frames; an emulated device is slower than a real one.
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 
-/// An open connection, or one that was closed.
+/// A connection, open or closed.
 #[pyclass(frozen)]
 pub struct Connection {
     talk: Mutex<Option<Talk>>,
@@ -34,21 +34,21 @@ pub struct Connection {
     patience: Duration,
 }
 
-/// What a connection is amid.
+/// The state of an open connection.
 struct Talk {
     link: Link,
     is_streaming: bool,
     heard: Heard,
 }
 
-/// A level, and a text.
+/// A log level and a line.
 type LeveledLine = (u8, String);
 
-/// What came while something else was waited for.
+/// Messages that arrived while another one was awaited.
 #[derive(Default)]
 struct Heard {
     samples: VecDeque<SampleNumbers>,
-    /// Lines that the device logged, each with its level.
+    /// Log lines of the device.
     lines: Vec<LeveledLine>,
 }
 
@@ -64,7 +64,7 @@ impl Heard {
     }
 }
 
-/// As Python's `logging` numbers levels.
+/// A log level as a number of Python's `logging`.
 fn level(level: LogLevel) -> u8 {
     match level {
         LogLevel::Error => 40,
@@ -84,7 +84,7 @@ impl Talk {
         link.request(request, patience, |message| heard.take(message))
     }
 
-    /// The next sample, however long it takes while the device says anything.
+    /// Waits for the next sample, for as long as the device sends messages.
     fn sample(&mut self, patience: Duration) -> Result<SampleNumbers, Failure> {
         if !self.is_streaming {
             self.request(Request::StartWithMarkers, patience)?;
@@ -137,8 +137,8 @@ impl Talk {
 
 #[pymethods]
 impl Connection {
-    /// Connects: to a port (`tcp:HOST:PORT` or a serial port's name), to the sensor with a name or
-    /// serial number, or to the only one. `timeout` in s: longest wait for its answers.
+    /// Connects to a port (`tcp:HOST:PORT` or a serial port's name), to the sensor with a name or
+    /// serial number, or to the only sensor. `timeout`: longest wait for its answers, s.
     #[new]
     fn open(
         py: Python<'_>,
@@ -174,12 +174,12 @@ impl Connection {
         })
     }
 
-    /// Who the device is.
+    /// The device's identity.
     fn hello<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         told::hello(py, &self.hello)
     }
 
-    /// The next sample; `None` when the connection was closed.
+    /// The next sample; `None` once the connection is closed.
     fn next(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
         let next = py.detach(|| match &mut *self.lock() {
             Some(talk) => talk.sample(self.patience).map(Some),
@@ -193,13 +193,13 @@ impl Connection {
         self.with(py, |talk| talk.tare(frames, force, keep))
     }
 
-    /// What became of the rest position.
+    /// The rest position's state and changes.
     fn rest(&self, py: Python<'_>) -> PyResult<RestNumbers> {
         self.with(py, |talk| talk.rest(self.patience))
     }
 
-    /// Says where gravity pulls, by a vector of any length in the film's frame; `None`: nobody
-    /// knows.
+    /// Sets the direction of gravity, as a vector of any length in the film's frame; `None` if it
+    /// is unknown.
     fn set_down(&self, py: Python<'_>, vector: Option<[f64; 3]>) -> PyResult<()> {
         let down = match vector {
             None => Down::Unknown,
@@ -208,7 +208,7 @@ impl Connection {
         self.with(py, |talk| talk.link.set_down(down))
     }
 
-    /// Number, device time, s, columns and rows of a frame, and its levels of red, green and blue.
+    /// Number of a frame, its device time (s), columns, rows, and levels of red, green and blue.
     fn snapshot<'py>(
         &self,
         py: Python<'py>,
@@ -223,7 +223,7 @@ impl Connection {
         Ok((frame.number, time_s, frame.width, frame.height, levels))
     }
 
-    /// The lines that the device logged since they were last asked for.
+    /// The lines that the device logged since the last call.
     fn take_lines(&self, py: Python<'_>) -> Vec<LeveledLine> {
         py.detach(|| {
             let mut talk = self.lock();
@@ -232,13 +232,13 @@ impl Connection {
         })
     }
 
-    /// Ends the conversation; again, it does nothing.
+    /// Ends the conversation; further calls have no effect.
     fn close(&self, py: Python<'_>) {
         py.detach(|| {
             if let Some(mut talk) = self.lock().take()
                 && talk.is_streaming
             {
-                // The port may be gone, and is given up all the same.
+                // An error is ignored: the port may be gone, and is closed anyway.
                 let _ = talk.link.command(Request::Stop);
             }
         });
@@ -250,7 +250,7 @@ impl Connection {
         self.talk.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Does something on an open connection, without the interpreter's lock.
+    /// Runs a function on an open connection, without the interpreter's lock.
     fn with<T: Send>(
         &self,
         py: Python<'_>,

@@ -1,4 +1,4 @@
-//! Failures of the tool as exceptions, with its text.
+//! Converts failures of the tool to exceptions with the same text.
 
 use crate::interrupt;
 use hivtac_host::failure::{Failure, Kind};
@@ -31,7 +31,7 @@ create_exception!(
     "The sensor refused a command, or did not answer it."
 );
 
-/// The exception of a failure; of an interruption what the signal's handler raised.
+/// The exception for a failure; for an interruption, the one that the signal's handler raised.
 pub fn raised(failure: Failure) -> PyErr {
     let text = failure.to_string();
     match failure.kind {

@@ -1,10 +1,10 @@
-//! Ctrl-C while the tool's code waits without the interpreter's lock: Python's own handler decides.
+//! Handles Ctrl-C during waits without the interpreter's lock, with Python's own handler.
 
 use pyo3::{PyErr, Python};
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
-/// Time between two looks: each takes the interpreter's lock, for which it may have to wait.
+/// Time between two checks: each takes the interpreter's lock, which may need a wait.
 const LOOK_EVERY: Duration = Duration::from_millis(50);
 
 thread_local! {
@@ -12,7 +12,7 @@ thread_local! {
     static RAISED: RefCell<Option<PyErr>> = const { RefCell::new(None) };
 }
 
-/// True when a signal's handler raised something in this thread, which [`take`] gives. Must be
+/// True when a signal's handler raised an exception in this thread, which [`take`] returns. Must be
 /// called without the interpreter's lock.
 pub fn is_interrupted() -> bool {
     if LOOKED
@@ -30,7 +30,7 @@ pub fn is_interrupted() -> bool {
     is_raised
 }
 
-/// What was raised, once.
+/// The raised exception, which is then forgotten.
 pub fn take() -> Option<PyErr> {
     RAISED.take()
 }

@@ -1,5 +1,5 @@
-//! The native half of Python's `hivtac`: connections and recordings, by the code of the tool.
-//! Numbers leave it in SI units; `hivtac/__init__.py` makes arrays of them, and is what users see.
+//! The native half of Python's `hivtac`: connections and recordings, with the tool's code. Its
+//! numbers are in SI units. Users see `hivtac/__init__.py`, which makes arrays of them.
 
 mod connection;
 mod error;

@@ -1,4 +1,4 @@
-//! A recording that is read sample by sample.
+//! Reads a recording sample by sample.
 
 use crate::error::raised;
 use crate::told::{self, SampleNumbers};
@@ -26,7 +26,7 @@ impl Reader {
         Ok(Reader { recording, hello })
     }
 
-    /// Who the device was.
+    /// The device's identity.
     fn hello<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         told::hello(py, &self.hello)
     }
@@ -45,7 +45,7 @@ impl Reader {
         next.map_err(raised)
     }
 
-    /// True once its end was reached and it had been cut before its own.
+    /// True after the end of a recording that was cut.
     fn is_cut(&self, py: Python<'_>) -> bool {
         py.detach(|| self.lock().is_cut())
     }

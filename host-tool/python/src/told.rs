@@ -1,4 +1,4 @@
-//! What the device tells, as tuples and dictionaries in SI units.
+//! Converts a device's messages to tuples and dictionaries in SI units.
 
 use hivtac_host::force_fields::{FORCE, PLACE};
 use hivtac_host::shown::{shown, unit_number};
@@ -26,7 +26,7 @@ pub type SampleNumbers = (
     Option<[(f64, f64, u32); 4]>,
 );
 
-/// A sample that came at a time, ns since 1970.
+/// A sample that was received at `came_ns`, ns since 1970.
 pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
     let markers = sample
         .markers
@@ -53,7 +53,7 @@ fn force(force: &Force) -> ForceNumbers {
     (vector, angles, size, angle_sigma, size_sigma, place)
 }
 
-/// Who the device is.
+/// The device's identity.
 pub fn hello<'py>(py: Python<'py>, hello: &DeviceHello) -> PyResult<Bound<'py, PyDict>> {
     let told = PyDict::new(py);
     told.set_item("serial", unit_number(&hello.device_id))?;
@@ -67,18 +67,18 @@ pub fn hello<'py>(py: Python<'py>, hello: &DeviceHello) -> PyResult<Bound<'py, P
     Ok(told)
 }
 
-/// Of the marker that moved most, px; of the markers' middle, px; turn, rad; how much larger their
-/// pattern is, in parts of it; what is left beside that, px.
+/// Largest motion of a marker, px; motion of the markers' middle, px; turn, rad; relative growth of
+/// the pattern; largest coordinate of the unexplained motion, px.
 type MovedNumbers = (f64, (f64, f64), f64, f64, f64);
 
-/// Markers at rest, px; how far they spread, px; how far they moved from the rest before.
+/// Markers at rest, px; their motion during the tare, px; motion from the rest position before.
 pub type TareNumbers = ([(f64, f64); 4], f64, Option<MovedNumbers>);
 
-/// Whether a rest position was taken, and is kept; how far re-zeroing moved it, how far from there
-/// the untouched film was seen last, and how far it is from the kept one, px.
+/// Whether a rest position was taken, and whether it is kept. Then distances in px: by re-zeroing,
+/// last one of the untouched film, from the kept position.
 pub type RestNumbers = (bool, bool, f64, Option<f64>, Option<f64>);
 
-/// What a tare gave.
+/// The result of a tare.
 pub fn tare(report: &TareReport) -> TareNumbers {
     (
         report
@@ -100,7 +100,7 @@ fn moved(moved: &Moved) -> MovedNumbers {
     )
 }
 
-/// What became of a rest position.
+/// The state and changes of a rest position.
 pub fn rest(report: &SettingsReport) -> RestNumbers {
     let is_taken = report.tare.is_some();
     (

@@ -1,4 +1,4 @@
-//! `hivtac bring-up` of devices that are pressed, or not there.
+//! Tests `hivtac bring-up` on devices that are pressed, and without a device.
 
 use crate::fake::*;
 use crate::run::*;
@@ -47,7 +47,7 @@ fn felt(frame: u32, place: Option<[i32; 2]>) -> DeviceMessage {
     DeviceMessage::Sample(sample)
 }
 
-/// A board on which all is right, and which is pressed at these places, in µm, one after the other.
+/// A board without faults that is pressed at these places, in µm, one after the other.
 fn board(presses: [[i32; 2]; 2]) -> FakeDevice {
     FakeDevice::on_tcp([Box::new(move |device: &mut Conversation| {
         device.snapshots = [crate::snapshot::rest_frame(), crate::snapshot::rest_frame()].into();
@@ -62,7 +62,7 @@ fn board(presses: [[i32; 2]; 2]) -> FakeDevice {
                 device.send(inspection());
             }
             device.answer_to(message);
-            // The first start is that of the clocks; the second that of the press.
+            // The clocks' step makes the first start, the press's step the second.
             starts += u32::from(request == Some(Request::Start));
             let places = match request {
                 Some(Request::Start) if starts == 2 => {

@@ -1,4 +1,4 @@
-//! Finding, greeting, asking and commanding a device.
+//! Tests that the tool finds, greets, queries and commands a device.
 
 use crate::fake::*;
 use crate::run::*;
@@ -393,7 +393,7 @@ fn shells_are_told_what_completes_a_command() {
     assert_eq!(run(&["completion", "nonsense"]).code, Some(2));
 }
 
-/// What was done, for a program: one object, and its parts.
+/// Each command prints one object with its result for programs.
 #[test]
 fn commands_tell_programs_what_they_did() {
     let told = |arguments: &[&str]| {

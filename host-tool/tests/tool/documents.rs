@@ -1,4 +1,4 @@
-//! `docs/troubleshooting.md` names everything that can go wrong, with what to do.
+//! Tests that `docs/troubleshooting.md` names every fault, with what to do.
 
 use hivtac_host::failure::Kind;
 use hivtac_host::link::judge;
@@ -13,7 +13,7 @@ fn root_file(name: &str) -> String {
     text.unwrap_or_else(|error| panic!("{name}: {error}"))
 }
 
-/// The row of a table whose first cell is this: its cells, three of them, none empty.
+/// The three cells of the table's row with this first cell; none of them is empty.
 fn row<'t>(text: &'t str, first: &str) -> [&'t str; 3] {
     let begin = format!("| {first} |");
     let mut rows = text.lines().filter(|line| line.starts_with(&begin));
@@ -28,7 +28,7 @@ fn row<'t>(text: &'t str, first: &str) -> [&'t str; 3] {
     three
 }
 
-/// What stands between two headings of the same level.
+/// The text between two headings of the same level.
 fn section<'t>(text: &'t str, heading: &str) -> &'t str {
     let begin = format!("\n## {heading}\n");
     let (_, rest) = text
@@ -61,17 +61,17 @@ fn every_exit_code_has_its_meaning() {
         let [_, meaning, _] = row(text, &kind.exit_code().to_string());
         assert_eq!(meaning, kind.meaning());
     }
-    // Those, success, and the table's head.
+    // One row for each kind, one for success, and the table's head.
     assert_eq!(text.matches("\n| ").count(), Kind::ALL.len() + 2);
 }
 
-/// By the names of the enumeration's variants, and the words that the tool has for them.
+/// By the names of the enumeration's variants, and the tool's words for them.
 #[test]
 fn every_refusal_has_its_words_and_what_to_do() {
     let source = root_file("wire/src/message.rs");
     let (_, rest) = source.split_once("pub enum Outcome {").unwrap();
     let (body, _) = rest.split_once("\n}").unwrap();
-    // What a variant carries stands further to the right.
+    // The fields of a variant are indented further.
     let lines = body.lines().filter_map(|line| line.strip_prefix("    "));
     let variants = lines.filter(|line| line.starts_with(char::is_uppercase));
     let names: Vec<_> = variants
@@ -98,7 +98,7 @@ fn every_refusal_has_its_words_and_what_to_do() {
     assert_eq!(text.matches("\n| `").count(), names.len() - 1);
 }
 
-/// By the table at the head of the file that makes them.
+/// By the table at the head of the source file with the patterns.
 #[test]
 fn every_pattern_of_the_led_has_its_meaning() {
     let source = root_file("firmware/src/health.rs");

@@ -1,4 +1,4 @@
-//! `hivtac monitor` when the device, the reader or the user goes away.
+//! Tests `hivtac monitor` when the device, the reader or the user goes away.
 
 use crate::fake::*;
 use crate::run::*;
@@ -14,7 +14,7 @@ fn a_pulled_cable_is_an_error_after_the_summary() {
         let script: Script = Box::new(move |device| {
             device.until_start();
             device.send(sample(5, 5));
-            // A hangup may discard what waits in the terminal.
+            // A hangup may discard bytes that wait in the terminal.
             pulled.recv().unwrap();
         });
         let device = match is_tcp {
@@ -39,7 +39,7 @@ fn a_pulled_cable_is_an_error_after_the_summary() {
     }
 }
 
-/// Two programs on one port: the second is told why it cannot have it, and the first goes on.
+/// With two programs on one port, the second gets the reason of its refusal, and the first goes on.
 #[test]
 fn a_second_program_on_a_port_is_refused() {
     let (go_on, told) = std::sync::mpsc::channel();
@@ -146,7 +146,7 @@ fn a_device_that_forgot_the_conversation_is_lost() {
 fn a_device_whose_camera_is_silent_is_waited_for() {
     let device = FakeDevice::on_pty(Box::new(|device| {
         device.until_start();
-        // The probe.
+        // The question whether the device is there.
         assert!(device.answer_one());
         device.send(sample(1, 1));
         device.serve();
@@ -237,7 +237,7 @@ fn a_slow_reader_gets_everything() {
     assert_eq!(run.code, Some(0));
 }
 
-/// A device that sends for as long as somebody listens.
+/// A device that sends for as long as it has a reader.
 fn endless() -> FakeDevice {
     FakeDevice::on_tcp([Box::new(|device| {
         device.until_start();
@@ -250,11 +250,11 @@ fn endless() -> FakeDevice {
     })])
 }
 
-/// A tool that waits for its reader never ends; a busy computer may take long for what the tool
-/// does in a tenth of a second.
+/// A tool that waits for its reader never ends. A busy computer may take this long for work of a
+/// tenth of a second.
 const SOON: Duration = Duration::from_secs(10);
 
-/// Waits until a pipe that nobody reads takes nothing more.
+/// Waits until a pipe without a reader is full.
 fn until_full(pipe: &ChildStdout) {
     let end = Instant::now() + SOON;
     let mut before = 0;
@@ -269,7 +269,7 @@ fn until_full(pipe: &ChildStdout) {
     }
 }
 
-/// Nobody reads either pipe; the first is full after some hundred lines.
+/// Neither pipe is read; the first is full after some hundred lines.
 #[test]
 fn ctrl_c_ends_it_though_its_reader_stalls() {
     for format in [&["--json"][..], &[]] {
@@ -303,8 +303,8 @@ fn its_time_is_over_though_its_reader_stalls() {
     assert!(run.stderr.contains(" frames shown, "), "{}", run.stderr);
 }
 
-/// A file may have a few thousand bytes here: what is cut of a line on a full disk is taken back,
-/// also where lines are added to a file.
+/// Files may have a few thousand bytes here. The cut part of a line on a full disk is removed, also
+/// when lines are appended to a file.
 #[test]
 fn a_full_disk_leaves_whole_lines() {
     let folder = tempfile::tempdir().unwrap();
@@ -335,7 +335,7 @@ fn a_full_disk_leaves_whole_lines() {
     }
 }
 
-/// A device that says what would colour a terminal, clear it, or look like another line.
+/// A device sends text that could colour a terminal, clear it, or look like another line.
 #[test]
 fn nothing_that_a_device_says_acts_on_the_terminal() {
     let evil = "\x1b[31m\r\nhivtac: all is well\u{9b}2J\u{202e}";

@@ -1,4 +1,4 @@
-//! A device that follows a script, on TCP or on a pseudo-terminal.
+//! A simulated device that follows a script, on TCP or on a pseudo-terminal.
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
@@ -35,31 +35,31 @@ pub struct Conversation {
     stream: Box<dyn Stream>,
     decoder: Decoder<HOST_FRAME_LIMIT>,
     pub stats: Stats,
-    /// Commands that were received, for the test to look at.
+    /// The commands that were received, for the test's checks.
     pub commands: mpsc::Sender<Request>,
-    /// What a tare is answered with; `None`: nothing.
+    /// The reply to a tare; `None` for no reply.
     pub tare: Option<Outcome>,
-    /// What it says of itself.
+    /// Its hello.
     pub hello: DeviceHello,
     /// Its settings.
     pub settings: SettingsReport,
-    /// How it is doing.
+    /// Its health.
     pub health: Health,
-    /// How keeping ends.
+    /// The outcome of keeping settings.
     pub flash: Outcome,
-    /// What is sent for each snapshot in turn before it is said to be done.
+    /// The messages of each snapshot in turn, before the reply.
     pub snapshots: VecDeque<Vec<DeviceMessage>>,
-    /// True when the host takes nothing any more.
+    /// True when the host accepts no more bytes.
     pub host_is_gone: bool,
-    /// Its connection, where that is TCP.
+    /// Its connection, for TCP.
     tcp: Option<TcpStream>,
 }
 
-/// What a device does on one connection.
+/// The behaviour of a device on one connection.
 pub type Script = Box<dyn FnOnce(&mut Conversation) + Send>;
 
 impl Conversation {
-    /// The next message of the host; `None` when it is gone.
+    /// The host's next message; `None` when the host is gone.
     pub fn next(&mut self) -> Option<HostMessage> {
         loop {
             let mut byte = [0];
@@ -75,7 +75,7 @@ impl Conversation {
         }
     }
 
-    /// Sends bytes; a host that is gone does not matter.
+    /// Sends bytes; ignores a host that is gone.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.host_is_gone |= self.stream.write_all(bytes).is_err();
     }
@@ -89,7 +89,8 @@ impl Conversation {
         self.send(DeviceMessage::Reply(Reply { id, outcome }));
     }
 
-    /// Answers like a good device until the host says start; true then, false when it is gone.
+    /// Answers like a good device until the host's start command. Returns true then, and false when
+    /// the host is gone.
     pub fn until_start(&mut self) -> bool {
         while let Some(message) = self.next() {
             if self.answer(message) {
@@ -99,14 +100,14 @@ impl Conversation {
         false
     }
 
-    /// Answers like a good device until the host is gone; samples are not sent.
+    /// Answers like a good device until the host is gone; sends no samples.
     pub fn serve(&mut self) {
         while let Some(message) = self.next() {
             self.answer(message);
         }
     }
 
-    /// Is gone, on TCP, once the host has read what was sent: closing at once may discard that.
+    /// Ends a TCP connection after the host has read all bytes: closing at once may discard some.
     pub fn end_after_what_was_sent(&mut self) {
         self.tcp.take().unwrap().shutdown(Shutdown::Write).unwrap();
         while self.next().is_some() {}
@@ -123,7 +124,7 @@ impl Conversation {
         self.answer(message);
     }
 
-    /// Answers one message; true for start.
+    /// Answers one message; true for a start command.
     fn answer(&mut self, message: HostMessage) -> bool {
         let (id, request) = match message {
             HostMessage::Command(Command { id, request }) => (id, request),
@@ -189,7 +190,7 @@ impl Conversation {
     }
 }
 
-/// A device with no problem.
+/// The health of a device without problems.
 pub const HEALTHY: Health = Health {
     reset: ResetReason::PowerOn,
     temperature_centidegrees: Some(4_150),
@@ -199,7 +200,7 @@ pub const HEALTHY: Health = Health {
     at_start: 0,
 };
 
-/// What its model was made for.
+/// The threshold that its model was made for.
 pub const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
 
 pub fn hello() -> DeviceHello {
@@ -227,8 +228,7 @@ pub fn hello() -> DeviceHello {
     }
 }
 
-/// Of a device with a name that is kept, a tare that is not, and the model's threshold.
-/// What a tare's report says of the rest position before.
+/// A tare's motion from the rest position before.
 pub const MOVED: Moved = Moved {
     farthest: Px(20_316),
     shift: (Px(13_107), Px(-6_554)),
@@ -237,6 +237,7 @@ pub const MOVED: Moved = Moved {
     beside: Px(524),
 };
 
+/// Settings with a kept name, a tare that is not kept, and the model's threshold.
 pub fn settings() -> SettingsReport {
     let marker = |x: i32, y: i32| Marker {
         x: Px(x << 16),
@@ -280,7 +281,7 @@ pub fn settings() -> SettingsReport {
     }
 }
 
-/// The camera as the light needs it.
+/// A camera that adapts to the light.
 fn camera() -> CameraReport {
     CameraReport {
         settings: CameraSettings::default(),
@@ -317,7 +318,7 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
     })
 }
 
-/// A device that plays one script for each connection, then is gone.
+/// A device that plays one script for each connection, then goes away.
 pub struct FakeDevice {
     /// For `--port`.
     pub port: String,
@@ -360,12 +361,13 @@ impl FakeDevice {
         FakeDevice { port, commands }
     }
 
-    /// On a pseudo-terminal; it vanishes when the script is over, as a pulled cable's port does.
+    /// A device on a pseudo-terminal; it vanishes after the script, as the port of a pulled cable
+    /// does.
     pub fn on_pty(script: Script) -> FakeDevice {
         let (device, host_side, port) = pseudo_terminal().unwrap();
         let (sender, commands) = mpsc::channel();
         std::thread::spawn(move || {
-            // Held open, so that the device's end works before the tool comes.
+            // Kept open, because the device's end must work before the tool opens its end.
             let _host_side = host_side;
             script(&mut conversation(Box::new(device), &sender));
         });
@@ -374,7 +376,7 @@ impl FakeDevice {
 }
 
 /// A new pseudo-terminal: the device's end, the host's end, and the name by which the host opens
-/// it. Neither is inherited by the tool: a terminal that the tool itself holds would never vanish.
+/// it. The tool inherits neither end: a terminal that it holds would never vanish.
 fn pseudo_terminal() -> rustix::io::Result<(File, File, String)> {
     let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
     let device = rustix::pty::openpt(flags)?;
@@ -390,7 +392,8 @@ fn pseudo_terminal() -> rustix::io::Result<(File, File, String)> {
     ))
 }
 
-/// A device that streams these messages after start, then answers until the host is gone.
+/// A device that streams these messages after the start command, then answers until the host is
+/// gone.
 pub fn streaming(messages: Vec<DeviceMessage>) -> Script {
     Box::new(move |device| {
         if device.until_start() {

@@ -1,4 +1,4 @@
-//! New firmware: the loader is started, and what came back is told.
+//! Tests an update of the firmware: the loader's start, and the report about the device afterwards.
 
 use crate::fake::*;
 use crate::run::*;
@@ -12,7 +12,7 @@ fn program(directory: &tempfile::TempDir) -> String {
     path.to_str().unwrap().to_owned()
 }
 
-/// A device that is gone once it was asked to start its loader.
+/// A device that goes away when it must start its loader.
 fn until_loader(device: &mut Conversation) {
     while let Some(message) = device.next() {
         let starts = matches!(

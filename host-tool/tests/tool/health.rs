@@ -1,4 +1,4 @@
-//! The self-test.
+//! Tests `hivtac self-test`.
 
 use crate::fake::*;
 use crate::run::*;
@@ -16,7 +16,7 @@ fn ill() -> FakeDevice {
     device(Health {
         reset: ResetReason::Watchdog,
         temperature_centidegrees: None,
-        // A problem that a later version has is passed over.
+        // A problem of a later version is ignored.
         problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit() | 1 << 30,
         at_start: Problem::ModelFallback.bit() | Problem::CameraRegisters.bit(),
         ..HEALTHY

@@ -1,4 +1,4 @@
-//! The tool against scripted devices: what it prints, and how it ends.
+//! Tests the tool with simulated devices: its output and its exit codes.
 #![cfg(unix)]
 
 mod bring_up;

@@ -1,4 +1,4 @@
-//! `hivtac monitor` against scripted devices.
+//! Tests `hivtac monitor` with simulated devices.
 
 use crate::fake::*;
 use crate::run::*;
@@ -161,9 +161,8 @@ fn what_is_left_over_from_before_the_hello_is_ignored() {
     );
 }
 
-/// The port stays open, but the device behind it was unplugged or restarted and knows nothing of
-/// the conversation. The output is not read until the device has sent everything; nothing of it is
-/// lost.
+/// The port stays open, but the device behind it was unplugged or restarted and has lost the
+/// conversation. The output is read only after the device has sent everything; none of it is lost.
 #[test]
 fn it_ends_after_the_given_time() {
     let device = FakeDevice::on_tcp([streaming(samples(0..2))]);
@@ -199,8 +198,8 @@ fn log_lines_go_to_standard_error() {
 #[test]
 fn the_truth_stands_beside_and_is_compared() {
     let mut log = tempfile::NamedTempFile::new().unwrap();
-    // The sample's force exactly, twice the force in the same direction, and one at a right angle;
-    // the sample's place, one half a millimetre beside it, and none.
+    // The sample's exact force, twice the force in the same direction, and a force at a right
+    // angle. The sample's place, a place half a millimetre away, and no place.
     for (frame, magnitude, [x, y, z], place) in [
         (
             1,

@@ -1,4 +1,4 @@
-//! `hivtac check`, `record` and `replay`, end to end.
+//! Tests `hivtac check`, `record` and `replay`, end to end.
 
 use crate::fake::*;
 use crate::run::*;
@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 use std::io::{BufRead, BufReader};
 use std::time::Duration;
 
-/// A device that sends these numbers as samples, one every 5 ms, and its counters; then waits.
+/// A device that sends samples with these numbers, one every 5 ms, and its counters; then waits.
 fn paced(numbers: Vec<u32>) -> Script {
     paced_and_told(numbers, |_| ())
 }
 
-/// The same, and tells of each that was sent.
+/// The same device; it calls `tell` with the number of each sample that it sent.
 fn paced_and_told(numbers: Vec<u32>, tell: impl Fn(u32) + Send + 'static) -> Script {
     Box::new(move |device| {
         while let Some(message) = device.next() {
@@ -60,7 +60,7 @@ fn check_measures_and_its_exit_code_says_which_limit_failed() {
         (report["rate_hz"].as_f64().unwrap() - 30.0).abs() < 0.1,
         "{report}"
     );
-    // Every frame of 33.333 ms comes after 5 ms.
+    // Frames of 33.333 ms arrive every 5 ms.
     let jitter = report["jitter_p50_ms"].as_f64().unwrap();
     assert!((20.0..30.0).contains(&jitter), "{report}");
     assert_eq!(report["latency_ms"], 4.785);
@@ -88,7 +88,7 @@ impl Folder {
     }
 }
 
-/// What `monitor` shows of a recording, as fast as it reads.
+/// The sequence numbers that `monitor` shows of a recording, as fast as it reads.
 pub fn replayed(options: &[&str], frames: &str) -> Vec<u64> {
     let mut replay = start(&[&["replay", "--fast", "--json"], options].concat());
     let mut said = String::new();
@@ -137,7 +137,7 @@ fn what_was_recorded_is_played_as_it_came() {
     );
 }
 
-/// Cut anywhere, a recording plays as far as it goes; what is none says so.
+/// A cut recording plays to the cut; another file is refused.
 #[test]
 fn a_recording_that_was_cut_plays_to_the_cut() {
     let folder = Folder::new();
@@ -146,7 +146,7 @@ fn a_recording_that_was_cut_plays_to_the_cut() {
     run(&["record", &file, "--seconds", "0.5", "--port", &device.port]);
     let whole = std::fs::read(&file).unwrap();
     let cut = folder.path("cut.mcap");
-    // Before the index at its end.
+    // A cut before the index at the file's end.
     std::fs::write(&cut, &whole[..whole.len() / 3]).unwrap();
     let mut replay = start(&["replay", "--fast", &cut]);
     let mut said = String::new();
@@ -184,7 +184,7 @@ fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
     let folder = Folder::new();
     let file = folder.path("a.mcap");
     let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| {
-        // Until it has been asked and started.
+        // Until the device has been asked and started.
         device.answer_one();
         device.answer_one();
         device.answer_one();
@@ -207,7 +207,7 @@ fn ctrl_c_ends_a_recording_cleanly() {
     let folder = Folder::new();
     let file = folder.path("a.csv");
     let (told, sent) = std::sync::mpsc::channel();
-    // Nobody hears of the last ones.
+    // The receiver of the last numbers is gone.
     let tell = move |number| {
         let _ = told.send(number);
     };
@@ -229,7 +229,7 @@ fn ctrl_c_ends_a_recording_cleanly() {
     );
 }
 
-/// A file may have a few thousand bytes here: what was flushed before is whole.
+/// Files may have a few thousand bytes here: what was flushed before is whole.
 #[test]
 fn a_full_disk_ends_a_recording_with_what_fits() {
     let folder = Folder::new();
@@ -255,7 +255,7 @@ fn a_full_disk_ends_a_recording_with_what_fits() {
     );
 }
 
-/// A sensor with another number and name, which sends these numbers.
+/// A sensor with another number and name, which sends samples with these numbers.
 fn another(number: u8, name: &'static str, numbers: Vec<u32>) -> FakeDevice {
     let script = paced(numbers);
     FakeDevice::on_tcp([Box::new(move |device: &mut Conversation| {

@@ -1,6 +1,6 @@
-//! Rest positions that are wrong: `hivtac sense` refuses them with the reason, or what it says
-//! afterwards is within three stated standard uncertainties. Of a unit of which nothing is known,
-//! of one that was calibrated, and of one with a stretched film.
+//! Tests wrong rest positions: `hivtac sense` must refuse them with the reason, or its force must
+//! be within three stated standard uncertainties. The units are an unknown one, a calibrated one,
+//! and one with a stretched film.
 
 use crate::run::run;
 use crate::sense::{Folder, MODEL, json_of, photograph};
@@ -8,18 +8,18 @@ use hivtac_twin::{DiscMotion, Frame, Load, Mounting, Options, Preset, Pressed, S
 use hivtac_wire::frame::CRC32;
 use serde_json::Value;
 
-/// A unit whose film is stretched by 2.6 % along x and 2.4 % along y, as finite elements have it,
-/// and its model after ten loads: `cargo test --profile tools -p hivtac-studies -- --ignored
-/// a_stretched_unit_is_written`.
+/// A unit with a film stretched by 2.6 % along x and 2.4 % along y, computed by finite elements,
+/// and its model after ten loads. `cargo test --profile tools -p hivtac-studies -- --ignored
+/// a_stretched_unit_is_written` writes both.
 static STRETCHED: &[u8] = include_bytes!("stretched/model.hvtm");
 static FILM: &str = include_str!("stretched/film.json");
 
-/// What a tare is taken under, and what is read afterwards, N.
+/// Forces during a tare, and the force that is measured afterwards, N.
 const RESIDUAL_N: [f64; 5] = [5e-4, 1e-3, 1.5e-3, 2e-3, 1e-2];
 const PRESS_N: f64 = 0.1;
-/// Where, mm.
+/// Place of the presses, mm.
 const PLACE_MM: [f64; 2] = [1.0, -0.5];
-/// How cameras move: to the right and down, px, and how much larger the picture becomes.
+/// Motions of cameras: to the right and down, px, and relative growth of the picture.
 const MOTIONS: [([f64; 2], f64); 5] = [
     ([0.1, 0.0], 0.0),
     ([0.0, 0.2], 0.0),
@@ -27,7 +27,7 @@ const MOTIONS: [([f64; 2], f64); 5] = [
     ([-0.2, 0.2], 0.0),
     ([0.0, 0.0], 3e-3),
 ];
-/// Standard uncertainties that an error may have.
+/// Largest error, in standard uncertainties.
 const SIGMAS: f64 = 3.0;
 
 /// A simulated unit and its model.
@@ -35,7 +35,7 @@ struct Unit {
     name: &'static str,
     model: Vec<u8>,
     options: Options,
-    /// Its film under forces, N, where it is not the nominal one.
+    /// Its film under forces, N; `None` for the nominal film.
     film: Option<Vec<(f64, Pressed)>>,
 }
 
@@ -53,7 +53,7 @@ fn units() -> [Unit; 3] {
     ]
 }
 
-/// The built-in model as of a unit that was calibrated: origin, unit, and the checksum that fits.
+/// The built-in model as a calibrated unit's: origin, unit, and a matching checksum.
 fn calibrated() -> Vec<u8> {
     let mut file = MODEL.to_vec();
     file[62] = 1;
@@ -103,7 +103,7 @@ fn state(told: &Value) -> (f64, Pressed) {
 }
 
 impl Unit {
-    /// Under a straight force, behind a camera that shifted, px, and whose picture became larger.
+    /// A frame under a straight force, with a camera that shifted, px, and whose picture grew.
     fn frame(&self, force_n: f64, ([right, down], larger): ([f64; 2], f64), number: u64) -> Frame {
         let mut options = self.options.clone();
         let [x, y] = options.mounting.shift_px;
@@ -124,7 +124,7 @@ impl Unit {
         scene.render_pressed(*pressed, &load, number)
     }
 
-    /// What `hivtac sense` says of a press after a tare.
+    /// The result of `hivtac sense` for a press after a tare.
     fn sense(&self, tare: &Frame, press: &Frame) -> Result<Value, String> {
         let folder = Folder::new();
         let model = folder.path("model.hvtm");
@@ -142,13 +142,13 @@ impl Unit {
     }
 }
 
-/// What a refusal says that the film looks touched by.
+/// The force that a refusal names, mN.
 fn millinewtons(why: &str) -> Option<f64> {
     let (_, by) = why.split_once("looks touched, by ")?;
     by.split_once(" mN")?.0.parse().ok()
 }
 
-/// How many stated standard uncertainties the press is off, in the part that is off most.
+/// The error of the press in stated standard uncertainties, for the part with the largest.
 fn off(found: &Value) -> f64 {
     let force = &found["force"];
     assert!(force.is_object(), "{found}");
@@ -163,8 +163,8 @@ fn off(found: &Value) -> f64 {
     parts.into_iter().fold(0.0, f64::max)
 }
 
-/// Silicone that has not recovered, or a finger. Beside a calibration it is refused with the force
-/// that it looks like; without one 10 mN are, and what is less is covered.
+/// Silicone that has not recovered, or a finger. With a calibration the tare is refused, with the
+/// force that it looks like. Without one 10 mN are refused, and smaller forces are covered.
 #[test]
 fn a_tare_of_a_pressed_film_is_refused_or_covered() {
     for unit in units() {
@@ -186,7 +186,7 @@ fn a_tare_of_a_pressed_film_is_refused_or_covered() {
     }
 }
 
-/// A camera that moved since the tare, and one that moved before it.
+/// Cameras that moved after the tare, and before it.
 #[test]
 fn a_camera_that_moved_is_covered_or_tared() {
     for unit in units() {

@@ -1,10 +1,10 @@
-//! The tool run as a user runs it.
+//! Runs the tool as a user does.
 
 use std::process::{Child, Command, Output, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
-/// Longest time any run of the tool may take.
+/// Longest time of any run of the tool.
 const RUN_PATIENCE: Duration = Duration::from_secs(30);
 
 /// A run of the tool.
@@ -31,7 +31,7 @@ impl Run {
         &mut self.0
     }
 
-    /// Waits for the end.
+    /// Waits for its end.
     pub fn finish(self) -> Finished {
         let pid = self.0.id();
         let (sender, receiver) = mpsc::channel();
@@ -54,7 +54,7 @@ pub fn signal(pid: u32, name: &str) {
     assert!(status.unwrap().success());
 }
 
-/// What a run left.
+/// The exit code and output of a run.
 #[derive(Debug)]
 pub struct Finished {
     pub code: Option<i32>,

@@ -1,4 +1,4 @@
-//! `hivtac sense` on pictures that are drawn here.
+//! Tests `hivtac sense` on pictures that are drawn here.
 
 use crate::run::*;
 use hivtac_sensor::force::model::Model;
@@ -29,7 +29,7 @@ fn picture(width: u32, height: u32, discs: &[Disc]) -> RgbImage {
     })
 }
 
-/// Discs where the built-in model's markers rest, as large as they are there.
+/// Discs with the positions and sizes of the built-in model's markers at rest.
 fn at_rest() -> Vec<Disc> {
     let rest = Model::parse(MODEL).unwrap().rest;
     let areas = rest
@@ -41,7 +41,7 @@ fn at_rest() -> Vec<Disc> {
         .collect()
 }
 
-/// The rest position drawn larger and shifted, as a slanted press makes it.
+/// The rest position drawn larger and shifted, as under a slanted press.
 fn pressed() -> Vec<Disc> {
     let push = |(x, y, radius): Disc| {
         (
@@ -53,7 +53,7 @@ fn pressed() -> Vec<Disc> {
     at_rest().into_iter().map(push).collect()
 }
 
-/// A frame of the simulated sensor, at rest or under a press beside the middle.
+/// A frame of the simulated sensor, at rest or under a press away from the middle.
 fn frame(is_pressed: bool) -> Frame {
     let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
     let press = Load::from_angles(0.1, 4.0, -3.0).unwrap();
@@ -82,7 +82,7 @@ pub fn photograph(frame: &Frame) -> RgbImage {
     RgbImage::from_raw(frame.width, frame.height, frame.to_rgb888()).unwrap()
 }
 
-/// A folder for pictures, while it is held.
+/// A folder for pictures, which is deleted with this value.
 pub struct Folder(TempDir);
 
 impl Folder {
@@ -200,7 +200,7 @@ fn png_and_ppm_give_the_same_and_jpeg_is_read() {
     assert_eq!(jpeg["blobs"].as_array().unwrap().len(), 4);
 }
 
-/// Decoders paint what is missing of a JPEG file in grey.
+/// Decoders paint the missing part of a JPEG file grey.
 #[test]
 fn a_jpeg_that_was_cut_anywhere_is_refused() {
     let folder = Folder::new();
@@ -222,7 +222,7 @@ fn a_jpeg_that_was_cut_anywhere_is_refused() {
 const TURNED: &[u8] = b"\xff\xe1\x00\x22Exif\0\0MM\0*\0\0\0\x08\0\x01\
     \x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
 
-/// A camera that was held sideways says so: what lies below to the left was above to the left.
+/// Of a camera that was held sideways: the lower left was the upper left.
 #[test]
 fn a_picture_is_turned_as_its_exif_data_say() {
     let folder = Folder::new();
@@ -238,7 +238,7 @@ fn a_picture_is_turned_as_its_exif_data_say() {
     assert_eq!([x, y], [39.0, 60.0], "{found}");
 }
 
-/// A model that never ends.
+/// A model file without an end.
 #[test]
 fn a_model_file_is_read_no_farther_than_a_model_can_be_long() {
     let folder = Folder::new();
@@ -287,7 +287,7 @@ fn a_tare_takes_its_status_bit_away() {
     );
 }
 
-/// Whatever the model was not made for gives no force, and says so.
+/// Conditions other than the model's give no force, and a message.
 #[test]
 fn other_conditions_give_no_force() {
     let folder = Folder::new();

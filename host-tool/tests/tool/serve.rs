@@ -1,9 +1,9 @@
-//! `hivtac serve`, as far as it goes without a program that receives it; what arrives there is
-//! looked at by `tests/python/test_serve.py`.
+//! Tests `hivtac serve` as far as possible without a receiver; `tests/python/test_serve.py` tests
+//! what a receiver gets.
 
 use crate::run::*;
 
-/// Its exit code and what it says on standard error.
+/// The exit code and the text on standard error.
 fn refused(options: &[&str]) -> (Option<i32>, String) {
     let finished = run(&[&["serve"], options].concat());
     assert_eq!(finished.stdout, "", "{finished:?}");
@@ -26,7 +26,7 @@ fn it_says_what_is_missing() {
     }
 }
 
-/// One line, before any device is looked for.
+/// One line, before the search for a device.
 #[cfg(not(any(feature = "ros2", feature = "foxglove")))]
 #[test]
 fn a_tool_that_was_built_without_it_says_how_to_build_it() {

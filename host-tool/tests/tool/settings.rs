@@ -1,4 +1,4 @@
-//! Settings that are kept: shown, named, saved, given back and forgotten.
+//! Tests kept settings: shown, changed, exported, imported and reset.
 
 use crate::fake::*;
 use crate::run::*;
@@ -129,7 +129,7 @@ fn worn_flash_is_a_refusal() {
     assert!(run.stderr.contains("its flash is worn"), "{}", run.stderr);
 }
 
-/// A file of the settings of a fake device, some of its text replaced.
+/// A file with the settings of a fake device, with some of its text replaced.
 fn exported(directory: &tempfile::TempDir, from: &str, to: &str) -> String {
     let path = directory.path().join("thumb.json");
     let path = path.to_str().unwrap().to_owned();
@@ -186,7 +186,7 @@ fn a_file_that_is_no_settings_changes_nothing() {
     assert!(missing.stderr.contains("/no/such/file.json"));
 }
 
-/// The device refuses the rest position: nothing has been kept by then.
+/// The device refuses the rest position before anything has been kept.
 #[test]
 fn an_import_that_is_refused_keeps_nothing() {
     let directory = tempfile::tempdir().unwrap();
@@ -220,7 +220,7 @@ fn a_reset_is_the_devices_own() {
     assert_eq!(commands(&device), [Request::Reset]);
 }
 
-/// What a device is told, and what the tool says.
+/// The commands that a device received, and the tool's output.
 fn told(arguments: &[&str]) -> (Vec<Request>, String) {
     let device = device();
     let run = run(&[arguments, &["--port", &device.port]].concat());
@@ -228,7 +228,7 @@ fn told(arguments: &[&str]) -> (Vec<Request>, String) {
     (commands(&device), run.stdout)
 }
 
-/// What a device is told, and what it says that it keeps.
+/// The settings that a device received, and the tool's output.
 fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
     let (commands, text) = told(arguments);
     let [Request::GetSettings, Request::SetTemporal(settings), keep] = &commands[..] else {
@@ -334,7 +334,7 @@ fn a_re_zeroed_rest_position_is_told() {
     assert!(shown.contains(&line), "{shown}");
 }
 
-/// What `docs/using.md` says that these print.
+/// These commands print what `docs/using.md` shows.
 #[test]
 fn the_guide_shows_what_setting_prints() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -366,7 +366,7 @@ fn the_guide_shows_what_setting_prints() {
     assert_eq!(shown, 14);
 }
 
-/// What a device's camera is set to, and what the tool says that it keeps.
+/// The camera settings that a device received, and the tool's output.
 fn camera_changed(arguments: &[&str]) -> (CameraSettings, String) {
     let (commands, text) = told(arguments);
     let [
@@ -432,7 +432,7 @@ fn what_the_camera_cannot_do_changes_nothing() {
     }
 }
 
-/// Of another camera, or another rate: nothing else of the file is set either.
+/// From another camera, or with another rate: the file's other settings are not set either.
 #[test]
 fn a_file_with_an_exposure_that_the_camera_has_not_changes_nothing() {
     let directory = tempfile::tempdir().unwrap();
@@ -455,7 +455,7 @@ fn a_file_with_an_exposure_that_the_camera_has_not_changes_nothing() {
     assert_eq!(commands(&device)[1], set);
 }
 
-/// What is said of gravity that is told, and that a tare from before says nothing of it.
+/// The output after a change of gravity; a known direction asks for a new tare.
 fn down_changed(arguments: &[&str]) -> String {
     let device = device();
     let run = run(&[arguments, &["--port", &device.port]].concat());

@@ -1,4 +1,4 @@
-//! `hivtac snapshot` of devices that send a frame, or a part of one.
+//! Tests `hivtac snapshot` with devices that send a frame, or part of one.
 
 use crate::fake::*;
 use crate::run::*;
@@ -14,7 +14,7 @@ use tempfile::TempDir;
 
 const RED: Threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
 
-/// The bytes of a frame of the simulated sensor under a press.
+/// The bytes of the simulated sensor's frame under a press.
 fn bytes_of(format: Format) -> Vec<u8> {
     let press = Load::from_angles(0.1, 4.0, -3.0).unwrap();
     frame(format, &press, 0.0)
@@ -41,7 +41,7 @@ pub fn rest_frame() -> Vec<DeviceMessage> {
     messages(RED, &frame(Format::Rgb565, &Load::REST, 0.0))
 }
 
-/// Markers as they lie there, about.
+/// Markers at approximately their places in that frame.
 pub fn at_rest() -> [Marker; 4] {
     [Marker {
         x: Px(3 << 15),
@@ -50,7 +50,7 @@ pub fn at_rest() -> [Marker; 4] {
     }; 4]
 }
 
-/// Header and parts, as a device sends them, amid other messages.
+/// Header and parts as a device sends them, between other messages.
 fn messages(threshold: Threshold, bytes: &[u8]) -> Vec<DeviceMessage> {
     let header = Snapshot {
         frame: 31,
@@ -95,7 +95,7 @@ fn path(folder: &TempDir, name: &str) -> String {
     folder.path().join(name).to_str().unwrap().to_owned()
 }
 
-/// What `hivtac sense` finds in a file, without its name.
+/// The result of `hivtac sense` for a file, without the file's name.
 fn sense(file: &str) -> Value {
     let found = run(&["sense", "--json", file]);
     let mut found: Value = serde_json::from_str(&found.stdout).unwrap();
@@ -163,7 +163,7 @@ fn a_person_is_told_of_the_frame() {
     );
 }
 
-/// A run that must fail with this code and these words, and leave no file.
+/// Checks that a run fails with this code and these words, and leaves no file.
 fn check_failure(messages: Vec<DeviceMessage>, code: i32, words: &str) {
     let folder = TempDir::new().unwrap();
     let png = path(&folder, "a.png");
@@ -203,7 +203,7 @@ fn refusals_are_explained() {
     }
 }
 
-/// The device vanishes amid the parts.
+/// The device vanishes between the parts.
 #[test]
 fn a_lost_connection_is_said() {
     let folder = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! `hivtac threshold auto` of devices that send pictures.
+//! Tests `hivtac threshold auto` with devices that send pictures.
 
 use crate::fake::*;
 use crate::run::*;
@@ -7,7 +7,7 @@ use hivtac_wire::message::*;
 use hivtac_wire::settings::Selection;
 use serde_json::Value;
 
-/// A device that sends three pictures of the untouched film; `change` what they hold.
+/// A device that sends three pictures of the untouched film, which `change` may modify.
 fn device(change: fn(&mut DeviceMessage)) -> FakeDevice {
     FakeDevice::on_tcp([Box::new(move |device: &mut Conversation| {
         let picture = || {
@@ -20,7 +20,7 @@ fn device(change: fn(&mut DeviceMessage)) -> FakeDevice {
     })])
 }
 
-/// What a device was told to set and keep.
+/// The commands that a device received to set and keep settings.
 fn orders(device: &FakeDevice) -> Vec<Request> {
     let is_order = |it: &Request| matches!(it, Request::SetThreshold(_) | Request::Keep(_));
     device.commands.try_iter().filter(is_order).collect()
@@ -74,7 +74,7 @@ fn a_dry_run_sets_nothing() {
     assert_eq!(orders(&device), []);
 }
 
-/// Pictures that are black: nothing is set.
+/// With black pictures no threshold is set.
 #[test]
 fn a_picture_that_does_not_separate_is_exit_code_9() {
     let device = device(|message| {

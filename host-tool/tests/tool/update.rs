@@ -1,4 +1,4 @@
-//! Models that are sent to a device.
+//! Tests updates of a device's model.
 
 use crate::fake::*;
 use crate::run::*;
@@ -23,7 +23,7 @@ fn crc() -> u32 {
     u32::from_le_bytes(file[file.len() - 4..].try_into().unwrap())
 }
 
-/// A device that says after an update that it uses this model.
+/// A device that reports this model after an update.
 fn device(source: ModelSource, crc: u32, outcome: Outcome) -> FakeDevice {
     let script: Script = Box::new(move |device| {
         while let Some(message) = device.next() {
@@ -103,8 +103,8 @@ fn a_model_that_the_device_refuses_is_told_with_its_reason() {
     }
 }
 
-/// The tool gave up on an update that the device goes on with: it says how to see what came of it,
-/// and who tries again meanwhile is told to wait.
+/// The tool ended its wait for an update that the device still carries out. It says how to see the
+/// result, and a new attempt meanwhile gets the advice to wait.
 #[test]
 fn an_update_that_is_not_answered_may_be_done_all_the_same() {
     let script: Script = Box::new(|device| {
@@ -150,7 +150,7 @@ fn the_built_in_model_is_taken_back() {
     assert_eq!(asked, [Request::UseBuiltInModel]);
 }
 
-/// Before anything is asked of a device: there is none here.
+/// Before anything is sent: there is no device here.
 #[test]
 fn a_file_that_is_no_model_is_named_with_what_is_wrong() {
     let directory = tempfile::tempdir().unwrap();

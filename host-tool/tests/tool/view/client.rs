@@ -1,4 +1,4 @@
-//! A browser as far as these tests need one.
+//! A minimal browser for these tests.
 
 use crate::run::*;
 use serde_json::Value;
@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 /// Longest wait for an answer or an event.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
-/// A tool that serves its page.
+/// A running tool that serves its page.
 pub struct View {
     pub run: Run,
     /// `127.0.0.1:PORT`.
@@ -66,7 +66,7 @@ impl View {
         (String::from_utf8(answer).unwrap(), body)
     }
 
-    /// The number in the first line of the answer.
+    /// The status code of the answer.
     pub fn status(&self, request: &str) -> u16 {
         let (head, _) = self.ask(request.as_bytes());
         head.split(' ').nth(1).unwrap().parse().unwrap()
@@ -97,7 +97,7 @@ impl View {
         Events(BufReader::new(stream))
     }
 
-    /// Ends it as Ctrl-C does.
+    /// Ends the tool as Ctrl-C does, and returns its exit code.
     pub fn interrupt(mut self) -> Option<i32> {
         signal(self.run.child().id(), "INT");
         self.run.child().wait().unwrap().code()
@@ -106,17 +106,17 @@ impl View {
 
 impl Drop for View {
     fn drop(&mut self) {
-        // Fails only when it has ended already.
+        // Fails only if it has ended already.
         let _ = self.run.child().kill();
         let _ = self.run.child().wait();
     }
 }
 
-/// A stream of events that is read.
+/// A stream of events.
 pub struct Events(BufReader<TcpStream>);
 
 impl Events {
-    /// Reads until there is something in an event of this name.
+    /// Reads until `find` returns a value for an event of this name.
     pub fn until<T>(&mut self, name: &str, mut find: impl FnMut(&Value) -> Option<T>) -> T {
         let end = Instant::now() + PATIENCE;
         let mut own = false;
@@ -137,7 +137,7 @@ impl Events {
         panic!("no such {name} within {PATIENCE:?}");
     }
 
-    /// The state of a sensor, once it is so.
+    /// The first state of a sensor for which `is_so` is true.
     pub fn state(&mut self, sensor: u32, is_so: impl Fn(&Value) -> bool) -> Value {
         self.until("state", |event| {
             let is_own = event["sensor"] == sensor;
@@ -145,7 +145,7 @@ impl Events {
         })
     }
 
-    /// The first sample with this sequence number or a later one.
+    /// The first sample with this or a later sequence number.
     pub fn sample(&mut self, sensor: u32, sequence: u64) -> Value {
         self.until("samples", |event| {
             let samples = event["samples"].as_array().unwrap().iter();

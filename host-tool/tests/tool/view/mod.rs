@@ -1,4 +1,4 @@
-//! `hivtac view` as a browser sees it, and as others see it who should not.
+//! Tests `hivtac view` as its browser and as unauthorized clients.
 
 mod client;
 mod orders;
@@ -13,7 +13,7 @@ use std::io::{Read, Write};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// A device that sends samples 0 to `count` when it is to start, and then answers.
+/// A device that sends samples 0 to `count` after the start command, and then answers.
 fn device(count: u32) -> Script {
     Box::new(move |device| {
         device.snapshots = [rest_frame()].into();
@@ -147,7 +147,7 @@ fn what_is_too_long_or_no_request_is_refused() {
         405
     );
     assert_eq!(view.status("\0\0\0\0\r\n\r\n"), 400);
-    // One that never goes on is told to, and others are served meanwhile.
+    // A client that never completes its request gets a refusal; others are served meanwhile.
     let mut slow = view.connect();
     slow.write_all(b"GET / HT").unwrap();
     assert_eq!(view.get("/").0.split(' ').nth(1), Some("200"));
@@ -188,7 +188,7 @@ fn events_carry_forces_and_how_the_device_stands() {
         (&state["lost"], &state["latency_us"], &state["board"]),
         (&json!(0), &json!(4785), &json!("fake board"))
     );
-    // A browser that comes later is given the last half minute.
+    // A browser that connects later gets the last half minute.
     assert_eq!(view.events().sample(0, 0)[0], 0);
 }
 
@@ -220,7 +220,7 @@ fn readers_that_stall_stop_nobody() {
     let begun = Instant::now();
     let mut newest = 0;
     while begun.elapsed() < Duration::from_secs(4) {
-        // The device goes on, which it could not if nobody read its port.
+        // The device goes on, which shows that its port is read.
         newest = reader.sample(0, newest + 1000)[0].as_u64().unwrap();
     }
     assert!(newest > 5_000, "{newest}");

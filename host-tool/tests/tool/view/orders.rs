@@ -1,4 +1,4 @@
-//! What the page has a device do: pictures, tares, thresholds and recordings.
+//! Tests the page's orders to a device: pictures, tares, thresholds and recordings.
 
 use super::client::View;
 use super::{device, serve};
@@ -37,7 +37,7 @@ fn a_picture_has_its_pixels_mask_and_markers() {
         told["threshold"]["limits"],
         json!([170, 10, 100, 255, 45, 255])
     );
-    // The next one comes with nothing in it, and the page is told why there is none.
+    // The next snapshot is empty, and the page gets the reason for the missing picture.
     let (_, body) = view.get("/picture/0");
     let told: Value = serde_json::from_slice(&body).unwrap();
     assert!(
@@ -115,7 +115,7 @@ fn a_recording_begins_and_ends_with_its_button() {
         while let Some(message) = device.next() {
             if let HostMessage::Command(Command { request, .. }) = &message {
                 match request {
-                    // With the tare come samples, and with exposing the end.
+                    // The tare brings samples, and the order to expose ends the connection.
                     Request::Tare { .. } => (0..20).for_each(|n| device.send(sample(n, n))),
                     Request::Expose => return,
                     _ => (),
@@ -145,7 +145,7 @@ fn a_recording_begins_and_ends_with_its_button() {
         "{ended}"
     );
     assert!(file.exists() && !partial.exists());
-    // What is cut off by a pulled cable keeps its name, and the page says so.
+    // A file that is cut by a pulled cable keeps its temporary name, and the page says so.
     order("record");
     order("expose");
     let lost = view.events().state(0, |state| {
