@@ -1,4 +1,5 @@
-//! How near the sensor comes to what four markers can tell, wherever the tip presses.
+//! Measures how near the sensor's errors come to the least that four markers allow, anywhere on the
+//! film.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -16,7 +17,7 @@ use serde::Serialize;
 use crate::page;
 use crate::press::{Errors, FORCES_MN, Information, REACH_MM, Row, TestedUnit, press};
 
-/// The weights file of the sensor that tells places.
+/// The weights file of the default model, which gives places.
 pub const WEIGHTS: &str = "calibration/models/default.weights";
 
 /// Press anywhere within ±4 mm on the simulated sensor and hold the errors against the Cramér–Rao
@@ -35,7 +36,7 @@ pub struct Anywhere {
 }
 
 impl Anywhere {
-    /// Runs it.
+    /// Runs the study.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         if self.json {
@@ -55,7 +56,7 @@ impl Anywhere {
         page::write("anywhere.md", include_str!("anywhere.md"), &text)
     }
 
-    /// Errors and bounds at each force with so many steps, or as many as the file says.
+    /// Errors and bounds at each force with `steps` steps, or with the file's number for `None`.
     fn held(&self, weights: &Weights, steps: Option<u8>) -> Result<Vec<Held>> {
         let mut weights = weights.clone();
         if let (Some(film), Some(steps)) = (&mut weights.film, steps) {
@@ -70,27 +71,27 @@ impl Anywhere {
     }
 }
 
-/// Errors of presses on a unit, and how many times the Cramér–Rao bound they are.
+/// Errors of presses on a unit, and their ratio to the Cramér–Rao bound.
 #[derive(Serialize)]
 struct Held {
-    /// Root mean squares.
+    /// Root mean squares of the errors.
     #[serde(flatten)]
     row: Row,
-    /// Of direction, |F| and place.
+    /// Ratios for direction, |F| and place.
     times_the_bound: [f64; 3],
     #[serde(skip)]
     errors: Errors,
-    /// Why there was no force, by status.
+    /// Counts of refused forces, by status.
     #[serde(skip)]
     reasons: BTreeMap<String, u32>,
-    /// Presses that move a marker out of the picture, or are beyond the simulated film: they are
-    /// left out.
+    /// Number of presses that are left out: they move a marker out of the picture, or exceed the
+    /// simulated film.
     #[serde(skip)]
     hidden: u32,
 }
 
 impl Held {
-    /// What a model says of so many presses of one |F|, mN, on a unit.
+    /// The errors of a model for `presses` presses of one |F|, mN, on a unit.
     fn of(unit: &TestedUnit, model: &Model<'_>, force_mn: u32, presses: u32) -> Result<Held> {
         let mut tared = unit.tare(model)?;
         let mut answers = Vec::new();
@@ -128,8 +129,9 @@ impl Held {
         })
     }
 
-    /// Cells of a table: root mean squares, how many times the bound they are, how many errors are
-    /// within their stated bounds, and how many presses have no force, why, and are left out.
+    /// Cells of a table: root mean squares, their ratios to the bound, and the part of the errors
+    /// within their stated bounds. Then the number of presses without a force, with the reasons,
+    /// and of those left out.
     fn cells(&self) -> String {
         let Row {
             force_mn,

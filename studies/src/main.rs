@@ -1,5 +1,5 @@
-//! `hivtac-studies`: what only proves or compares: the project's numbers beside what is possible,
-//! on units drawn at random, and beside the paper's pipeline.
+//! `hivtac-studies`: runs the project's studies, which compare its results with what is possible,
+//! with units drawn at random, and with the paper's pipeline.
 
 mod anywhere;
 mod maps;
@@ -36,7 +36,7 @@ enum Command {
 }
 
 fn main() -> Result<()> {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may end early.
     sigpipe::reset();
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),

@@ -1,4 +1,4 @@
-//! Maps over the place of the tip, as one SVG.
+//! Draws maps over the place of the tip as one SVG.
 
 use std::path::Path;
 
@@ -7,17 +7,17 @@ use hivtac_twin::MARKERS;
 
 use crate::page;
 
-/// Places of the tip along each side of a map, and the farthest, mm.
+/// Places of the tip along each side of a map, and the largest coordinate, mm.
 pub const PLACES: usize = 41;
 const FARTHEST_MM: f64 = 5.0;
-/// The calibrated places, mm.
+/// Largest coordinate of the calibrated places, mm.
 pub const CALIBRATED_MM: f64 = 4.0;
 
-/// From good to bad (viridis, turned round).
+/// Colours from good to bad (viridis, reversed).
 const COLOURS: [&str; 8] = [
     "#fde725", "#9fda3a", "#4ac16d", "#1fa187", "#277f8e", "#365c8d", "#46327e", "#440154",
 ];
-/// A cell, a map's side, and the places around it, px.
+/// Sizes in px: a cell, a map's side, and the margins.
 const CELL: usize = 6;
 const SIDE: usize = CELL * PLACES;
 const LEFT: usize = 34;
@@ -29,18 +29,18 @@ const DOWN: usize = TOP + SIDE + 54;
 pub struct Map {
     /// What it shows.
     pub title: String,
-    /// Where one colour ends and the next begins.
+    /// The value where each colour ends and the next begins.
     pub levels: &'static [f64; COLOURS.len() - 1],
     pub values: Vec<f64>,
 }
 
-/// The place with this number, mm: row by row.
+/// The coordinates of a place, mm, by its number, which counts row by row.
 pub fn place_mm(number: usize) -> [f64; 2] {
     let at = |k: usize| FARTHEST_MM * (2.0 * k as f64 / (PLACES - 1) as f64 - 1.0);
     [at(number % PLACES), at(number / PLACES)]
 }
 
-/// Writes maps in rows of so many.
+/// Writes maps in rows of `columns`.
 pub fn write(path: &Path, columns: usize, maps: &[Map]) -> Result<()> {
     let (width, height) = (columns * ACROSS, maps.len().div_ceil(columns) * DOWN);
     let mut svg = format!(

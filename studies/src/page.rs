@@ -1,4 +1,4 @@
-//! What a study gives: a page under `docs/results` with its pictures, or one JSON object.
+//! Writes a study's results: a page under `docs/results` with its pictures, or one JSON object.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -7,10 +7,10 @@ use std::path::Path;
 use anyhow::{Context, Result};
 use serde::Serialize;
 
-/// Where a page's results go.
+/// The mark in a page that the results replace.
 const PLACE: &str = "<!-- results -->";
 
-/// Writes a page: its text with the results in their place.
+/// Writes a page: `text` with the results in place of the mark.
 pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     let (before, after) = text
         .split_once(PLACE)
@@ -19,7 +19,7 @@ pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     write_file(&Path::new("docs/results").join(name), &text)
 }
 
-/// Writes a file of the project and says so.
+/// Writes a file of the project and prints its name.
 pub fn write_file(path: &Path, text: &str) -> Result<()> {
     fs::write(path, text).with_context(|| {
         format!(

@@ -1,5 +1,5 @@
-//! The paper's pipeline with the place as two more outputs, beside ours, on the same frames of
-//! 800×600.
+//! Compares the paper's pipeline, extended by the place as two more outputs, with the project's
+//! own, on the same frames of 800×600.
 
 use anyhow::{Result, anyhow};
 use clap::Args;
@@ -22,11 +22,11 @@ use crate::press::{self, Errors, FORCES_MN, REACH_MM};
 
 /// Columns and rows.
 const SIZE: [u16; 2] = [800, 600];
-/// Steps from the answer of our network.
+/// Gauss–Newton steps from the answer of the project's network.
 const STEPS: u8 = 1;
-/// The seed of the frames that are judged.
+/// The seed of the test frames.
 const TEST_SEED: u64 = 77;
-/// Frames within this of a force, in parts of it, count for it.
+/// Largest relative difference from a force for which a frame counts.
 const NEAR: f64 = 0.2;
 
 /// Train the paper's network on the paper's centroids, force and place, and judge it beside ours on
@@ -50,13 +50,13 @@ pub struct Paper {
 /// A force and the place of its tip, N and mm.
 type Answer = ([f64; 3], [f64; 2]);
 
-/// A frame's truth and what a pipeline says; `None` when it refuses.
+/// A frame's true answer and a pipeline's answer; `None` if it refuses the frame.
 struct Judged {
     truth: Answer,
     found: Option<Answer>,
 }
 
-/// What a pipeline says near a force.
+/// The errors of a pipeline near a force.
 #[derive(Serialize)]
 struct Row {
     pipeline: &'static str,
@@ -65,11 +65,11 @@ struct Row {
 }
 
 impl Paper {
-    /// Runs it.
+    /// Runs the study.
     pub fn run(&self) -> Result<()> {
         let theirs = self.theirs()?;
         let ours = self.ours()?;
-        // Frames that either refuses count for neither.
+        // Frames that one of the pipelines refuses count for neither.
         let both = || {
             let both = theirs.iter().zip(&ours);
             both.filter(|(theirs, ours)| theirs.found.is_some() && ours.found.is_some())
@@ -104,7 +104,7 @@ impl Paper {
         page::write("paper.md", include_str!("paper.md"), &text)
     }
 
-    /// Plain means of masks, and a network of three layers of 512 in floats.
+    /// The paper's pipeline: plain means of masks, and a network of three layers of 512 in floats.
     fn theirs(&self) -> Result<Vec<Judged>> {
         let training = dataset(CentroidEstimator::BinaryMask, self.frames, 1)?;
         let options = Training {
@@ -128,7 +128,8 @@ impl Paper {
         }))
     }
 
-    /// Weighted centroids, a small network and steps, as the chip computes them.
+    /// The project's pipeline: weighted centroids, a small network and steps, as the chip computes
+    /// them.
     fn ours(&self) -> Result<Vec<Judged>> {
         let bytes = export(&small(self.frames)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
@@ -144,7 +145,7 @@ impl Paper {
     }
 }
 
-/// A small network with the nominal film, from as many frames as are asked for.
+/// A small network with the nominal film, trained on `frames` frames.
 fn small(frames: usize) -> Result<Weights> {
     let dataset = dataset(CentroidEstimator::RednessWeighted, frames, 1)?;
     let options = Training {
@@ -159,7 +160,7 @@ fn small(frames: usize) -> Result<Weights> {
     network.with_film(STEPS, &dataset)
 }
 
-/// So many presses anywhere, seen at 800×600.
+/// A data set of presses anywhere, seen at 800×600.
 fn dataset(centroid: CentroidEstimator, frames: usize, seed: u64) -> Result<Dataset> {
     let [width, height] = SIZE;
     let recipe = Recipe {
@@ -179,7 +180,7 @@ fn dataset(centroid: CentroidEstimator, frames: usize, seed: u64) -> Result<Data
     generate(&recipe, || ())
 }
 
-/// What is said of the frames with a press.
+/// The answers of a pipeline for the frames with a press.
 fn judged(dataset: &Dataset, mut says: impl FnMut(&Observation) -> Option<Answer>) -> Vec<Judged> {
     let pressed = dataset
         .rows

@@ -1,4 +1,4 @@
-//! What the residual cannot see: one marker that is found beside its place.
+//! Measures what the residual cannot detect: one marker that is found away from its true place.
 
 use std::path::PathBuf;
 
@@ -18,10 +18,10 @@ use crate::page;
 
 /// Forces, mN.
 const FORCES_MN: [u32; 2] = [50, 200];
-/// How far a marker is found beside its place, px, and how many ways.
+/// Displacements of a marker, px, and number of directions.
 const OFF_PX: [f64; 10] = [0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0];
 const WAYS: u32 = 8;
-/// Errors that the sensor's statements still hold, in parts of its stated standard uncertainties.
+/// Largest error that agrees with the sensor's statement, in stated standard uncertainties.
 const SIGMAS: f64 = 3.0;
 
 /// Find each marker in turn a little beside its place, and see how wrong a force gets before it is
@@ -39,37 +39,37 @@ pub struct Unseen {
     json: bool,
 }
 
-/// Places at one force.
+/// The results for all places at one force.
 #[derive(Serialize)]
 struct Row {
     force_mn: u32,
-    /// Displacements that change the force by more than three stated standard uncertainties, and
-    /// how many of these are refused, per cent.
+    /// Percentage refused among the displacements that change the force by more than three stated
+    /// standard uncertainties.
     refused: f64,
-    /// Of all places: the median and the largest displacement that is not refused, px.
+    /// Median and maximum over all places of the largest displacement that is not refused, px.
     off_px: [f64; 2],
-    /// The median and the largest error that is not refused: degrees, mN, mm.
+    /// Median and maximum of the largest error that is not refused: degrees, mN, mm.
     direction_deg: [f64; 2],
     magnitude_mn: [f64; 2],
     place_mm: [f64; 2],
-    /// Where the largest error of the direction is, mm.
+    /// The place with the largest error of the direction, mm.
     at_mm: [f64; 2],
 }
 
-/// A place of the tip, with how many displacements matter and how many of those are refused.
+/// A place of the tip, with the number of displacements that matter, and of those that are refused.
 #[derive(Default)]
 struct Cell {
     place_mm: [f64; 2],
     /// The largest displacement of a marker that is not refused, px.
     off_px: f64,
-    /// The largest error then: of the direction, degrees, of |F|, mN, and of the place, mm.
+    /// The largest errors at such displacements: direction, degrees; |F|, mN; place, mm.
     errors: [f64; 3],
     matter: u32,
     refused: u32,
 }
 
 impl Unseen {
-    /// Runs it.
+    /// Runs the study.
     pub fn run(&self) -> Result<()> {
         let bytes = export(&Weights::load(&self.weights)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
@@ -98,14 +98,14 @@ impl Unseen {
     }
 }
 
-/// A model's film.
+/// The film of a model.
 struct Film<'m> {
     forward: Forward<'m>,
     mounting: Mounting,
 }
 
 impl<'m> Film<'m> {
-    /// Of a model; `None` when it has no film.
+    /// From a model; `None` if it has no film.
     fn new(model: &Model<'m>) -> Option<Film<'m>> {
         let forward = model.forward?;
         let mounting = Mounting {
@@ -115,7 +115,7 @@ impl<'m> Film<'m> {
         Some(Film { forward, mounting })
     }
 
-    /// A straight press, N, at a place, mm, and markers without noise that show it.
+    /// A straight press, N, at a place, mm, and its markers without noise.
     fn contact(&self, force_n: f64, place_mm: [f64; 2]) -> (Pose, Observed<'static>) {
         let Film { forward, mounting } = self;
         let force_n = [0.0, 0.0, -force_n as f32];
@@ -184,7 +184,7 @@ impl Cell {
     }
 }
 
-/// Of the direction, degrees, of |F|, mN, and of the place, mm.
+/// Errors of the direction, degrees, of |F|, mN, and of the place, mm.
 fn errors(forward: &Forward<'_>, found: &Pose, truth: &Pose) -> [f64; 3] {
     let [a, b] = [found, truth].map(|pose| pose.direction().map(f64::from));
     let [found_n, truth_n] = [found, truth].map(|pose| forward.stiffness.magnitude_n(pose.size));
@@ -237,7 +237,7 @@ impl Row {
     }
 }
 
-/// The largest displacement that is not refused, and the direction's error with it.
+/// Maps of the largest displacement that is not refused, and of the direction's error with it.
 fn panels(maps: &[(u32, Vec<Cell>)]) -> Vec<Map> {
     let displaced = maps.iter().map(|(force_mn, cells)| Map {
         title: format!("displaced unseen, px, {force_mn} mN"),

@@ -1,4 +1,4 @@
-//! `hivtac-studies scene …` as a user runs it.
+//! Tests `hivtac-studies scene …` as a user runs it.
 
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -24,7 +24,7 @@ fn stdout(directory: &Path, arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// What is said of a mistake; all of `words` are in it.
+/// Asserts that the command fails with a message that contains all of `words`.
 fn assert_refused(directory: &Path, arguments: &[&str], words: &[&str]) {
     let output = run(directory, arguments);
     assert!(!output.status.success(), "{arguments:?}");
@@ -92,7 +92,7 @@ fn mistakes_are_named() {
     film(&["--offset-mm", "1"], &["--offset-mm", "0.1,-0.2"]);
 }
 
-/// Tip depth and the markers' (x, y) of `scene film --json`.
+/// The tip's depth and the markers' (x, y) from `scene film --json`.
 fn film(more: &[&str]) -> (f64, [[f64; 2]; 4]) {
     let pressed = ["film", "--force-n", "0.1", "--alpha-deg", "5", "--json"];
     let said = stdout(Path::new("."), &[&pressed[..], more].concat());

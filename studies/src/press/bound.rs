@@ -1,4 +1,4 @@
-//! The Cramér–Rao bound of a force and its place that are read from the centroids of four markers.
+//! Computes the Cramér–Rao bound of a force and its place that are measured from four centroids.
 
 use anyhow::{Context, Result};
 use hivtac_twin::Load;
@@ -9,7 +9,7 @@ use super::{Answer, TestedUnit};
 const UNKNOWNS: usize = 5;
 /// Coordinates of the four centroids.
 const COORDINATES: usize = 8;
-/// Part of |F| by which a load is changed to see how the centroids follow, and how far a tip, mm.
+/// Change of a load for the derivatives of the centroids: part of |F|, and distance of the tip, mm.
 const STEP: f64 = 0.005;
 const STEP_MM: f64 = 0.01;
 
@@ -17,7 +17,7 @@ const STEP_MM: f64 = 0.01;
 pub struct Information([[f64; COORDINATES]; COORDINATES]);
 
 impl Information {
-    /// Of how centroids scatter around where the markers truly are, in these very frames.
+    /// From the scatter of centroids around the true places of the markers, in these frames.
     pub fn of(answers: &[Answer]) -> Result<Information> {
         let off: Vec<[f64; COORDINATES]> = (answers.iter())
             .filter_map(|answer| answer.off_px?.as_flattened().try_into().ok())
@@ -32,7 +32,7 @@ impl Information {
         Ok(Information(inverse(covariance).context("too few frames")?))
     }
 
-    /// The least mean squares that any unbiased reading of a press on a unit can have: of the angle
+    /// The least mean squares of any unbiased measurement of a press on a unit. Of the angle
     /// between found and true force, square radians, to first order; of |F|, N²; of each coordinate
     /// of the place, mm².
     pub fn bound(&self, unit: &TestedUnit, load: &Load) -> Result<[f64; 3]> {
@@ -55,7 +55,7 @@ impl Information {
     }
 }
 
-/// How the centroids follow each unknown, px per N and px per mm: central differences.
+/// Derivatives of the centroids by each unknown, px per N and px per mm, by central differences.
 fn jacobian(unit: &TestedUnit, load: &Load) -> Result<[[f64; COORDINATES]; UNKNOWNS]> {
     let mut columns = [[0.0; COORDINATES]; UNKNOWNS];
     for (k, column) in columns.iter_mut().enumerate() {
@@ -89,7 +89,7 @@ fn centroids(unit: &TestedUnit, load: Load) -> Result<[f64; COORDINATES]> {
     Ok(px)
 }
 
-/// A⁻¹ by Gauss and Jordan; `None` when A is not positive definite.
+/// A⁻¹ by Gauss–Jordan elimination; `None` if A is not positive definite.
 fn inverse<const N: usize>(mut a: [[f64; N]; N]) -> Option<[[f64; N]; N]> {
     let mut b: [[f64; N]; N] =
         std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));

@@ -1,4 +1,4 @@
-//! Units as people build them, drawn at random.
+//! Draws random units, as people build them.
 
 use hivtac_calibration::forward::tolerances::{
     FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS,
@@ -8,16 +8,16 @@ use hivtac_twin::{Lens, Mechanics, Mounting, Options};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// No marker is glued farther beside its place along an axis, mm.
+/// Largest error of a glued marker along an axis, mm.
 const MARKER_AT_MOST_MM: f64 = 0.3;
-/// Nothing is drawn farther than so many standard deviations.
+/// Largest deviation of a drawn number, in standard deviations.
 const AT_MOST: f64 = 2.5;
-/// The tip's radius, mm: evenly between.
+/// Range of the tip's radius, mm, with a uniform distribution.
 const TIP_RADIUS_MM: [f64; 2] = [0.25, 1.0];
 /// The focal length of all lenses, µm.
 const FOCAL_UM: f64 = 2100.0;
 
-/// A unit.
+/// A unit that was drawn at random.
 #[derive(Clone, Debug)]
 pub struct Drawn {
     /// Its scene.
@@ -27,7 +27,7 @@ pub struct Drawn {
 }
 
 impl Drawn {
-    /// The unit with this number, behind a camera of a focal length in px.
+    /// The unit with this number, with a camera's focal length in px.
     pub fn new(number: u64, focal_px: f64) -> Self {
         let mut random = seeded(number);
         let mut drawn = |sigma: f64, at_most: f64| {
@@ -68,7 +68,7 @@ impl Drawn {
     }
 }
 
-/// Random numbers, the same for the same seed.
+/// A random number generator, the same for the same seed.
 pub fn seeded(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }

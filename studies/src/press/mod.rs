@@ -1,4 +1,4 @@
-//! Known presses on simulated sensors, and what the sensor says of them.
+//! Known presses on simulated sensors, and the sensor's answers.
 
 mod bound;
 mod drawn;
@@ -18,13 +18,13 @@ use hivtac_twin::{FilmError, Load};
 
 /// Forces, mN.
 pub const FORCES_MN: [u32; 3] = [50, 100, 200];
-/// How far from the middle, along x and along y, tips press, mm.
+/// Largest coordinate of a press's place along x and along y, mm.
 pub const REACH_MM: f64 = 4.0;
 /// The largest α and β, degrees.
 pub const ANGLE_DEG: f64 = 8.0;
 
-/// The press with this number of a force from one to another, N: force, places and angles evenly
-/// within their limits.
+/// The press with this number, with a force between two values, N. Force, place and angles are
+/// evenly spread within their limits.
 pub fn press(number: u32, [from_n, to_n]: [f64; 2], reach_mm: f64) -> Result<Load, FilmError> {
     let either = |base| 2.0 * part(number, base) - 1.0;
     let force_n = from_n + (to_n - from_n) * part(number, 11);
@@ -32,7 +32,8 @@ pub fn press(number: u32, [from_n, to_n]: [f64; 2], reach_mm: f64) -> Result<Loa
         .with_offset_mm([5, 7].map(|base| reach_mm * either(base)))
 }
 
-/// A part of one for a press with this number, evenly spread; another base is another coordinate.
+/// A number between 0 and 1 for the press `number`, evenly spread; each base gives another
+/// coordinate.
 fn part(number: u32, base: usize) -> f64 {
     halton(number as usize + 20, base)
 }

@@ -1,5 +1,4 @@
-//! Films as people mount them, solved by finite elements: stretched, cut otherwise, of other
-//! rubber.
+//! Films as people mount them, by finite elements: stretched, cut otherwise, of other rubber.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -11,22 +10,22 @@ use rand::Rng;
 
 use super::seeded;
 
-/// States that are kept to start others from.
+/// Number of states that are kept as starts for others.
 const MOST_STATES: usize = 40;
-/// How fine the films' meshes are: another one than that of fits.
+/// Fineness of the films' meshes, which differs from that of fits.
 const FINENESS: f64 = 0.7;
 
 /// A film on its posts.
 pub struct RealFilm {
     film: Film,
     rest: Equilibrium,
-    /// The states that were found last, and what a scene shows of them.
+    /// The newest states, with the film's shape for a scene.
     states: Mutex<Vec<(Load, Equilibrium, Pressed)>>,
 }
 
 impl RealFilm {
-    /// The film with this number, on the posts and with the dots of these options, under a tip of a
-    /// radius, mm.
+    /// The film with this number, with the posts and dots of these options, under a tip with a
+    /// radius in mm.
     pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
         let film = Film::new(&drawn(number, options, tip_radius_mm))?;
         Ok(Self {
@@ -46,7 +45,7 @@ impl RealFilm {
             0.0 => self.rest.clone(),
             _ => {
                 let at_mm = self.film.material_point(&self.rest, load.offset_mm());
-                // From the state under the load that is nearest to this one.
+                // Starts from the state under the load nearest to this one.
                 let far = |(other, ..): &&(Load, _, _)| far(load, other);
                 let nearest = states.iter().min_by(|a, b| far(a).total_cmp(&far(b)));
                 let start = nearest.map_or(&self.rest, |(_, state, _)| state);
@@ -68,14 +67,14 @@ impl RealFilm {
     }
 }
 
-/// How far a load is from another one: a millimetre of place is as far as 20 mN.
+/// Square distance of two loads: a millimetre of place counts as much as 20 mN.
 fn far(load: &Load, other: &Load) -> f64 {
     let apart =
         |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum() };
     apart(&load.vector_n(), &other.vector_n()) + 4e-4 * apart(&load.offset_mm(), &other.offset_mm())
 }
 
-/// The film with this number.
+/// The design of the film with this number.
 fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
     let mut random = seeded(77_000 + number);
     let mut between = |from: f64, to: f64| random.random_range(from..to);
@@ -94,7 +93,7 @@ fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
             stiffening: between(0.02, 0.2),
         },
     };
-    // Every third is cut at its holes.
+    // Every third film is cut at its holes.
     let overhang_mm = match number / 3 % 3 {
         0 => 0.0,
         _ => between(0.0, 8.0),

@@ -1,4 +1,4 @@
-//! Errors of many answers, by force.
+//! Sums errors of many answers, by force.
 
 use anyhow::{Context, Result};
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
@@ -7,38 +7,39 @@ use hivtac_sensor::force::Force;
 use hivtac_twin::Load;
 use serde::Serialize;
 
-/// Sums of squares of errors, and how many of them are within what was stated.
+/// Sums of squares of errors, and the number of errors within their stated bounds.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Errors {
     /// Answers with a force.
     pub count: u32,
     /// Answers without one.
     pub refused: u32,
-    /// Forces of which direction, |F| or place is beyond three stated standard uncertainties.
+    /// Forces whose direction, |F| or place exceeds three stated standard uncertainties.
     pub beyond: u32,
-    /// Of the direction, square degrees; of |F|, mN²; of each coordinate of the place, µm².
+    /// Squares for the direction, square degrees; for |F|, mN²; for each coordinate of the place,
+    /// µm².
     squares: [f64; 3],
-    /// How many of them are within their 95 % bounds.
+    /// Number of each kind of errors within their 95 % bounds.
     within: [u32; 3],
 }
 
-/// Root mean squares at a force.
+/// Root mean square errors at a force.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// |F|, mN.
     pub force_mn: u32,
-    /// Of the direction, degrees.
+    /// Error of the direction, degrees.
     pub direction_deg: f64,
-    /// Of |F|, mN.
+    /// Error of |F|, mN.
     pub magnitude_mn: f64,
-    /// Of each coordinate of the place, µm.
+    /// Error of each coordinate of the place, µm.
     pub place_um: f64,
-    /// Forces.
+    /// Number of forces.
     pub frames: u32,
 }
 
 impl Errors {
-    /// Takes an answer; it is an error when its force comes without a place.
+    /// Adds an answer; a force without a place is an error.
     pub fn add(&mut self, force: Option<&Force>, truth: &Load) -> Result<()> {
         let Some(force) = force else {
             self.refused += 1;
@@ -58,8 +59,9 @@ impl Errors {
         Ok(())
     }
 
-    /// Takes a force, N, with its size, N, and its place, mm, beside the true force and place; and
-    /// the 95 % bounds that it states: of the direction, degrees, of |F|, mN, and of the place, µm.
+    /// Adds a force (N), its magnitude (N) and its place (mm), with the true force and place. Also
+    /// takes the stated 95 % bounds: of the direction (degrees), of |F| (mN), and of the place
+    /// (µm).
     pub fn take(
         &mut self,
         (found_n, magnitude_n, found_mm): ([f64; 3], f64, [f64; 2]),
@@ -73,7 +75,7 @@ impl Errors {
             1e3 * (found_mm[0] - truth_mm[0]).hypot(found_mm[1] - truth_mm[1]),
         ];
         self.count += 1;
-        // Three standard uncertainties are so much more than a 95 % bound.
+        // Ratio of three standard uncertainties to a 95 % bound.
         let far = 3.0 / MAGNITUDE_BOUND;
         self.beyond += u32::from((0..3).any(|k| errors[k] > far * bounds[k]));
         for k in 0..3 {
@@ -83,7 +85,7 @@ impl Errors {
         }
     }
 
-    /// Takes other errors with their own.
+    /// Adds the errors of another sum.
     pub fn merge(&mut self, other: &Errors) {
         self.count += other.count;
         self.refused += other.refused;
@@ -94,19 +96,18 @@ impl Errors {
         }
     }
 
-    /// Root mean squares: of the direction, degrees, of |F|, mN, and of each coordinate of the
-    /// place, µm.
+    /// Root mean square errors: direction, degrees; |F|, mN; each coordinate of the place, µm.
     pub fn rms(&self) -> [f64; 3] {
         self.squares.map(|sum| (sum / f64::from(self.count)).sqrt())
     }
 
-    /// Of the errors of each the part within their stated 95 % bounds, per cent.
+    /// Percentage of each kind of errors within their stated 95 % bounds.
     pub fn covered(&self) -> [f64; 3] {
         self.within
             .map(|within| 100.0 * f64::from(within) / f64::from(self.count))
     }
 
-    /// The row of a force.
+    /// The row for a force.
     pub fn row(&self, force_mn: u32) -> Row {
         let [direction_deg, magnitude_mn, place_um] = self.rms();
         Row {

@@ -1,4 +1,4 @@
-//! One simulated unit: its scene, its tare, its answers.
+//! A simulated unit: its scene, its tare and its answers.
 
 use anyhow::{Result, anyhow};
 use hivtac_sensor::force::Force;
@@ -17,11 +17,11 @@ use super::{Drawn, RealFilm};
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
 
-/// A simulated sensor as somebody built it.
+/// A simulated sensor, as a person built it.
 pub struct TestedUnit {
     pub scene: Scene,
     pub tip_radius_mm: f64,
-    /// Its film, where it is not the scene's.
+    /// Its film, if that is not the scene's.
     real: Option<RealFilm>,
 }
 
@@ -30,23 +30,22 @@ pub struct Tared<'m> {
     pub sensor: Box<Sensor<'m>>,
 }
 
-/// What a sensor said of a press.
+/// A sensor's answer to a press.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
     /// The press.
     pub load: Load,
-    /// The force; `None` when it was refused.
+    /// The force; `None` if it was refused.
     pub force: Option<Force>,
-    /// Why it was refused, or how far to trust it.
+    /// Why it was refused, or how reliable it is.
     pub status: Status,
-    /// How far each marker's centroid is from where it truly was, px; `None` where it was not
-    /// found.
+    /// Error of each marker's centroid, px; `None` if the markers were not found.
     pub off_px: Option<[[f64; 2]; 4]>,
 }
 
 impl TestedUnit {
-    /// Of these options, as a camera of these conditions sees it, pressed by a tip of a radius in
-    /// mm.
+    /// The unit with these options and a camera for these conditions, pressed by a tip with a
+    /// radius in mm.
     pub fn new(
         conditions: &Conditions,
         options: Options,
@@ -64,7 +63,7 @@ impl TestedUnit {
         })
     }
 
-    /// The unit with this number of those that people build.
+    /// The unit with this number among randomly drawn units.
     pub fn drawn(conditions: &Conditions, number: u64) -> Result<Self> {
         let focal_px = conditions.geometry.focal.to_f64();
         let Drawn {
@@ -74,7 +73,7 @@ impl TestedUnit {
         Self::new(conditions, options, tip_radius_mm, number)
     }
 
-    /// The same with the film of this number of those that people mount.
+    /// The same unit with the film of this number among randomly drawn films.
     pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
         let unit = Self::drawn(conditions, number)?;
         let options = unit.scene.options();
@@ -85,7 +84,7 @@ impl TestedUnit {
         })
     }
 
-    /// A frame under a press; the number selects its noise.
+    /// A frame under a press; `number` selects its noise.
     pub fn frame(&self, load: &Load, number: u64) -> Result<Frame> {
         let load = self.with_tip(*load)?;
         Ok(match self.pressed(&load)? {
@@ -102,20 +101,20 @@ impl TestedUnit {
         })
     }
 
-    /// The film under a press with this unit's tip, where it is not the scene's.
+    /// The film under a press with this unit's tip; `None` if the film is the scene's.
     pub fn pressed(&self, load: &Load) -> Result<Option<Pressed>> {
         let film = self.real.as_ref();
         film.map(|film| film.press(load)).transpose()
     }
 
-    /// A press with this unit's tip.
+    /// The press with this unit's tip.
     pub fn with_tip(&self, load: Load) -> Result<Load> {
         Ok(load.with_tip_radius_mm(self.tip_radius_mm)?)
     }
 
-    /// Whether the simulated film holds a press, and all markers are wholly in the picture under
-    /// it. A soft film's tables end before the largest force: there the simulation would stay where
-    /// it is.
+    /// Whether the simulated film holds a press, with all markers wholly in the picture. The tables
+    /// of a soft film end before the largest force; beyond their end the simulated film would not
+    /// move.
     pub fn shows_all(&self, load: &Load) -> Result<bool> {
         if self.real.is_none() && !self.scene_holds(load) {
             return Ok(false);
@@ -124,7 +123,7 @@ impl TestedUnit {
         let camera = self.scene.camera();
         let sides = [camera.width(), camera.height()].map(f64::from);
         let inside = truth.markers.iter().flatten().filter(|marker| {
-            // An image is at most so much longer than round.
+            // Largest length of a marker's image, compared with a round one.
             let far = 1.2 * (marker.area_px2 / std::f64::consts::PI).sqrt() + 2.0;
             let within = |at: f64, side: f64| (far..side - 1.0 - far).contains(&at);
             let [x, y] = marker.centroid_px;
@@ -133,7 +132,7 @@ impl TestedUnit {
         Ok(inside.count() == 4)
     }
 
-    /// Whether the tables of the scene's film hold a press.
+    /// Whether the tables of the scene's film cover a press.
     fn scene_holds(&self, load: &Load) -> bool {
         let Unit {
             stiffness,
@@ -168,12 +167,12 @@ impl TestedUnit {
 }
 
 impl Tared<'_> {
-    /// What the sensor says of a frame, whatever its format.
+    /// The sensor's measurement of a frame of any format.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
         self.sensor.measure_frame(&frame.to_rgb565())
     }
 
-    /// Where markers are seen under a press, the mean of some frames; the number selects their
+    /// The mean places of the markers under a press, over some frames; `number` selects their
     /// noise.
     pub fn seen_px(
         &mut self,
@@ -195,7 +194,7 @@ impl Tared<'_> {
         Ok(mean)
     }
 
-    /// What the sensor says of a press on its unit, alone; the number selects the noise.
+    /// The sensor's answer to a single press on its unit; `number` selects the noise.
     pub fn answer(&mut self, unit: &TestedUnit, load: Load, number: u64) -> Result<Answer> {
         self.sensor.forget_frame();
         let frame = unit.frame(&load, number)?;

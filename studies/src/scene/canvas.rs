@@ -1,4 +1,4 @@
-//! A picture to draw in.
+//! A picture for drawings.
 
 use std::fs::File;
 use std::io::BufWriter;
@@ -13,13 +13,13 @@ pub type Colour = [u8; 3];
 
 pub const BLACK: Colour = [0, 0, 0];
 pub const WHITE: Colour = [255, 255, 255];
-/// Plain to see on the film's grey and on the markers' red.
+/// Distinct from the film's grey and from the markers' red.
 pub const CYAN: Colour = [0, 255, 255];
 
 /// Side of a character, px.
 pub const CHARACTER: u32 = 8;
 
-/// A picture in 8-bit red, green and blue. What is drawn outside of it is left out.
+/// A picture in 8-bit red, green and blue. Drawings outside of it are ignored.
 pub struct Canvas {
     width: u32,
     height: u32,
@@ -27,7 +27,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// A picture of one colour.
+    /// A picture with a single colour.
     pub fn new(width: u32, height: u32, colour: Colour) -> Canvas {
         Canvas {
             width,
@@ -36,7 +36,7 @@ impl Canvas {
         }
     }
 
-    /// A frame, each of its pixels a square of `scale` × `scale`.
+    /// A frame with each pixel drawn as a square of `scale` × `scale`.
     pub fn of_frame(frame: &Frame, scale: u32) -> Canvas {
         let small = Canvas {
             width: frame.width,
@@ -52,8 +52,8 @@ impl Canvas {
         canvas
     }
 
-    /// Half as wide and high: each pixel the mean of four, in steps of 4 of 255, which noise hardly
-    /// leaves: the file is then a third as large.
+    /// Half of the width and height: each pixel is the mean of four, in steps of 4 of 255. Noise
+    /// rarely changes such a step, and the file is a third as large.
     pub fn halved(&self) -> Canvas {
         let mut small = Canvas::new(self.width / 2, self.height / 2, BLACK);
         for y in 0..small.height {
@@ -80,7 +80,7 @@ impl Canvas {
         }
     }
 
-    /// A filled rectangle from its upper left pixel.
+    /// Fills a rectangle from its upper left pixel.
     pub fn fill(&mut self, [x, y]: [i64; 2], [width, height]: [i64; 2], colour: Colour) {
         for row in y..y + height {
             for column in x..x + width {
@@ -89,7 +89,7 @@ impl Canvas {
         }
     }
 
-    /// Another picture, its upper left pixel at (x, y).
+    /// Draws another picture with its upper left pixel at (x, y).
     pub fn paste(&mut self, [x, y]: [i64; 2], other: &Canvas) {
         for row in 0..other.height {
             for column in 0..other.width {
@@ -99,8 +99,8 @@ impl Canvas {
         }
     }
 
-    /// Text from the upper left pixel of its first character; every pixel of a character is a
-    /// square of `scale`. Characters that the font has not become question marks.
+    /// Draws text from the upper left pixel of its first character; each of its pixels is a square
+    /// of `scale`. Characters that the font lacks become question marks.
     pub fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
         let side = i64::from(scale);
         let advance = side * i64::from(CHARACTER);
@@ -114,7 +114,7 @@ impl Canvas {
         }
     }
 
-    /// Text with an edge in another colour, so that it shows on anything.
+    /// Draws text with an edge in another colour, which is visible on every background.
     pub fn edged_text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
         let edge = i64::from(scale);
         for (dx, dy) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {

@@ -1,4 +1,4 @@
-//! The pictures of `docs/scene.md` and `docs/building-a-sensor.md`.
+//! Draws the pictures of `docs/scene.md` and `docs/building-a-sensor.md`.
 
 use std::fs;
 use std::path::PathBuf;
@@ -16,19 +16,19 @@ use crate::press::{Tared, TestedUnit};
 
 /// Frame size of all pictures.
 pub const SIZE: [u32; 2] = [320, 240];
-/// The moment of a moving hard case that is shown, s.
+/// Time of the shown frame of a moving hard case, s.
 pub const SHOWN_S: f64 = 0.25;
 
-/// The model whose sensing judges hard cases.
+/// The model that measures hard cases.
 static MODEL: &[u8] = include_bytes!("../../../calibration/models/default.hvtm");
-/// Pixels between pictures, and above and below a caption.
+/// Distance between pictures, and above and below a caption, px.
 const GAP: u32 = 8;
-/// A line of text, px.
+/// Height of a line of text, px.
 const LINE: u32 = CHARACTER + 3;
-/// Width of a hard case's place: 24 characters of text below its picture; and places in a row.
+/// Width of a hard case, 24 characters of text below its picture; and number of cases in a row.
 const CASE_WIDTH: u32 = 24 * CHARACTER;
 const CASE_COLUMNS: u32 = 7;
-/// Outcomes of hard cases.
+/// Colours of the outcomes of hard cases.
 const RIGHT: Colour = [0, 110, 60];
 const REJECTED: Colour = [0, 80, 170];
 const WRONG: Colour = [200, 0, 0];
@@ -40,13 +40,13 @@ const LEGEND: [(&str, Colour); 3] = [
 /// The loads of the frames: |F| in N, α and β in degrees.
 const LOADS: [(f64, f64, f64); 3] = [(0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.2, 8.0, -6.0)];
 
-/// A picture: its caption, and what of the simulated sensor is not as it should be.
+/// A picture: its caption, and the faults of the simulated sensor in it.
 struct Step {
     caption: &'static str,
     wrong: fn(&mut Options),
 }
 
-/// From the bare film to a sensor that is right; each but the last has one thing wrong.
+/// From the bare film to a correct sensor; each picture but the last has one fault.
 const STEPS: [Step; 8] = [
     Step {
         caption: "film on its posts",
@@ -88,7 +88,7 @@ const STEPS: [Step; 8] = [
     },
 ];
 
-/// Pictures of the guide in a row.
+/// Number of the guide's pictures in a row.
 const GUIDE_COLUMNS: u32 = 4;
 
 /// Arguments of `scene figures`.
@@ -120,7 +120,7 @@ fn at_rest() -> Result<Scene> {
     Ok(Scene::preset("rest", Preset::Ov7725, SIZE[0], SIZE[1], 1)?)
 }
 
-/// Frames under growing loads side by side, with the true centroids.
+/// Draws frames under growing loads, next to each other, with the true centroids.
 fn frames() -> Result<Canvas> {
     let scene = at_rest()?;
     let count = LOADS.len() as u32;
@@ -142,7 +142,7 @@ fn frames() -> Result<Canvas> {
     Ok(picture)
 }
 
-/// All hard cases, each at half its size, with what the sensing makes of them.
+/// Draws all hard cases, each at half its size, with the sensing's results.
 fn cases() -> Result<Canvas> {
     let cases = hard_cases();
     let place = [CASE_WIDTH + GAP, SIZE[1] / 2 + 2 * LINE + 2 * GAP];
@@ -170,7 +170,7 @@ fn cases() -> Result<Canvas> {
     Ok(sheet)
 }
 
-/// What the sensing makes of a frame.
+/// The sensing's result for a frame, with its colour.
 fn outcome(case: &HardCase, frame: &Frame, tared: &mut Tared<'_>) -> (String, Colour) {
     let seen = tared.measure(frame);
     let rejected = reasons(seen.status);
@@ -192,7 +192,7 @@ fn outcome(case: &HardCase, frame: &Frame, tared: &mut Tared<'_>) -> (String, Co
     (said, if is_right { RIGHT } else { WRONG })
 }
 
-/// The guide's steps, each at half its size.
+/// Draws the guide's steps, each at half its size.
 fn guide() -> Result<Canvas> {
     let scene = at_rest()?;
     let rows = STEPS.len() as u32 / GUIDE_COLUMNS;

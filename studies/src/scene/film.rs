@@ -1,4 +1,5 @@
-//! The film under one load: where tip and markers go, and where the markers are seen.
+//! `scene film`: the film under one load, with the places of tip and markers and the markers'
+//! images.
 
 use anyhow::Result;
 use clap::{Args, ValueEnum};
@@ -6,7 +7,7 @@ use hivtac_twin::film::Film;
 use hivtac_twin::{Camera, Contact, Load, MARKERS, Preset};
 use serde_json::{Value, json};
 
-/// The frame size whose pixels are printed.
+/// The frame size for the printed pixels.
 const SIZE: [u32; 2] = [800, 600];
 
 /// Arguments of `scene film`.
@@ -64,7 +65,7 @@ struct Answer {
     tip_mm: [f64; 3],
     /// The tip's force on the film, N.
     force_n: [f64; 3],
-    /// How each marker moved, the mean over its disc, mm, and the centroid of its image, px.
+    /// Mean displacement of each marker over its disc, mm, and the centroid of its image, px.
     markers: [([f64; 3], [f64; 2]); 4],
 }
 
@@ -120,7 +121,7 @@ fn full(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> 
 
 impl Answer {
     fn tip_depth_mm(&self) -> f64 {
-        // Not −0 at rest.
+        // Avoids −0 at rest.
         0.0 - self.tip_mm[2]
     }
 

@@ -20,7 +20,7 @@ pub enum SceneCommand {
 }
 
 impl SceneCommand {
-    /// Does it.
+    /// Runs the command.
     pub fn run(&self) -> Result<()> {
         match self {
             SceneCommand::Render(args) => args.run(),

@@ -1,4 +1,4 @@
-//! One frame of a scene as a picture.
+//! `scene render`: one frame of a scene as a picture.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -61,7 +61,7 @@ impl RenderArgs {
     }
 }
 
-/// The scene of a file or a name, and the moment to show.
+/// The scene of a file or a name, and the time to show, s.
 fn scene(source: &str) -> Result<(Scene, f64)> {
     let path = Path::new(source);
     if path.extension().is_some_and(|end| end == "toml") || path.is_file() {
@@ -82,14 +82,14 @@ fn scene(source: &str) -> Result<(Scene, f64)> {
     Ok((scene.with_context(said)?, 0.0))
 }
 
-/// Draws a cross at each marker's true centroid and its identity beside it, into a picture of a
-/// frame at a scale.
+/// Draws a cross at each marker's true centroid, with its identity, into a picture of a frame at a
+/// scale.
 pub(super) fn mark_truth(canvas: &mut Canvas, truth: &Truth, scale: u32) {
     for (id, marker) in truth.markers.iter().enumerate() {
         if let Some(marker) = marker {
             let at = marker.centroid_px.map(|px| in_picture(px, scale));
             cross(canvas, at, scale);
-            // Towards the outside of the pattern, where no other marker is.
+            // Outside of the pattern, where no other marker is.
             let width = i64::from(scale * CHARACTER);
             let right = [1, 2].contains(&id);
             let beside = 10 * i64::from(scale);
@@ -99,12 +99,12 @@ pub(super) fn mark_truth(canvas: &mut Canvas, truth: &Truth, scale: u32) {
     }
 }
 
-/// The pixel of a picture at a scale in which a point of the frame lies.
+/// The pixel in a picture at a scale that contains a point of the frame.
 fn in_picture(px: f64, scale: u32) -> i64 {
     ((px + 0.5) * f64::from(scale)).floor() as i64
 }
 
-/// A cross of one-pixel lines, whatever the scale, with a dark edge: its middle is the place.
+/// Draws a cross of one-pixel lines at any scale, with a dark edge; its middle marks the place.
 fn cross(canvas: &mut Canvas, [x, y]: [i64; 2], scale: u32) {
     let arm = 3 * i64::from(scale);
     let length = 2 * arm + 1;

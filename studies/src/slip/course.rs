@@ -1,4 +1,5 @@
-//! What a tip or an object does to the film, with truth: press, drag, release, grasp, catch.
+//! Simulates how a tip or an object moves on the film, with true values: press, drag, release,
+//! grasp, catch.
 
 use anyhow::Result;
 use hivtac_twin::Load;
@@ -7,19 +8,19 @@ use rand_chacha::ChaCha8Rng;
 
 use super::friction::{Friction, Meeting, STIFFNESS};
 
-/// Friction ratios are drawn evenly between.
+/// Range of friction ratios, with a uniform distribution.
 const RATIOS: [f64; 2] = [0.3, 0.7];
-/// Nothing touches the film for so long at first, s.
+/// Time before the first touch, s.
 const BEFORE_S: f64 = 0.15;
-/// Steps of the simulation in a second, and how many of them make one that is kept.
+/// Steps of the simulation in a second, and number of steps for one that is kept.
 const STEPS_HZ: f64 = 5_000.0;
 const KEPT_EACH: usize = 5;
 /// Standard gravity, m/s².
 const GRAVITY: f64 = 9.806_65;
-/// How far from the film's middle contacts begin, mm along each axis.
+/// Largest distance from the film's middle at which contacts begin, mm along each axis.
 const REACH_MM: f64 = 2.0;
 
-/// What happens.
+/// The kind of a course.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind {
     /// A tilted press that sticks.
@@ -28,14 +29,14 @@ pub enum Kind {
     Drag,
     /// A pulled tip that lifts: it slips while it leaves.
     Release,
-    /// An object that is gripped and lifted: it holds, falls, or is gripped anew.
+    /// An object that is gripped and lifted: it holds, falls, or is gripped again.
     Grasp,
-    /// An object that hits the film, with or without a way along it.
+    /// An object that hits the film, with or without a motion along it.
     Catch,
 }
 
 impl Kind {
-    /// All of them, with their names for people.
+    /// All kinds, with their names for people.
     pub const ALL: [(Kind, &'static str); 5] = [
         (Kind::Press, "press"),
         (Kind::Drag, "drag"),
@@ -45,19 +46,19 @@ impl Kind {
     ];
 }
 
-/// A contact in time.
+/// A contact over time.
 pub struct Course {
-    /// A meeting each millisecond.
+    /// The state of the contact for each millisecond.
     meetings: Vec<Meeting>,
-    /// Where it begins, mm.
+    /// The place where it begins, mm.
     start_mm: [f64; 2],
-    /// Where the pull goes.
+    /// The direction of the pull.
     toward: [f64; 2],
     tip_radius_mm: f64,
 }
 
 impl Course {
-    /// One of a kind, drawn at random, with a tip of a radius in mm.
+    /// A random course of a kind, with a tip's radius in mm.
     pub fn drawn(kind: Kind, tip_radius_mm: f64, random: &mut ChaCha8Rng) -> Self {
         let ratio = random.random_range(RATIOS[0]..RATIOS[1]);
         let (sin, cos) = random.random_range(0.0..std::f64::consts::TAU).sin_cos();
@@ -76,7 +77,7 @@ impl Course {
             Kind::Grasp => run.grasp(),
             Kind::Catch => run.catch(),
         }
-        // Nothing touches it in the end.
+        // At the end nothing touches the film.
         run.until(0.1, |_| (0.0, 0.0));
         Self {
             meetings: run.meetings,
@@ -86,12 +87,12 @@ impl Course {
         }
     }
 
-    /// How long it is, s.
+    /// Its duration, s.
     pub fn duration_s(&self) -> f64 {
         (self.meetings.len() - 1) as f64 * 1e-3
     }
 
-    /// How the tip meets the film at a time, s.
+    /// The state of the contact at a time, s.
     pub fn meeting(&self, time_s: f64) -> Meeting {
         let at = (time_s * 1e3).clamp(0.0, (self.meetings.len() - 1) as f64);
         let [before, after] = [at.floor(), at.ceil()].map(|k| self.meetings[k as usize]);
@@ -105,7 +106,7 @@ impl Course {
         }
     }
 
-    /// What presses at a time, s.
+    /// The load at a time, s.
     pub fn load(&self, time_s: f64) -> Result<Load> {
         let meeting = self.meeting(time_s);
         let along = self.toward.map(|part| meeting.pull_n * part);
@@ -131,7 +132,8 @@ impl Run<'_> {
         self.random.random_range(from..to)
     }
 
-    /// For a time, s, from force into the film and tip's place by the part of that time, 0 to 1.
+    /// Simulates a time, s. `at` gives force into the film and tip's place from the part of that
+    /// time, 0 to 1.
     fn until(&mut self, duration_s: f64, at: impl Fn(f64) -> (f64, f64)) {
         let steps = (duration_s * STEPS_HZ) as usize;
         for step in 0..steps {
@@ -184,7 +186,7 @@ impl Run<'_> {
         self.until(falls_s, |part| (force_n * (1.0 - part), pulled_mm));
     }
 
-    /// An object hangs from the film while it sticks; it falls when it is too heavy.
+    /// An object hangs from the film while it sticks; a heavy one falls.
     fn grasp(&mut self) {
         let grip_n = self.drawn(0.04, 0.1);
         let closes_s = self.drawn(0.1, 0.3);
@@ -223,7 +225,7 @@ impl Run<'_> {
         self.until(0.02, |part| (normal_n * (1.0 - ramp(part)), last_mm));
     }
 
-    /// As the scene's `catch`, and a way along the film that friction brakes.
+    /// Like the scene's `catch`, with a motion along the film that friction slows.
     fn catch(&mut self) {
         let (peak_n, hold_n) = (self.drawn(0.08, 0.15), self.drawn(0.03, 0.06));
         let frequency_hz = self.drawn(6.0, 12.0);
@@ -253,19 +255,19 @@ impl Run<'_> {
 #[derive(Default)]
 struct Moved {
     mass_kg: f64,
-    /// mm, and mm/s.
+    /// Place in mm, and speed in mm/s.
     at_mm: f64,
     speed: f64,
 }
 
-/// Of an object that the film's sideways stiffness holds, in parts of the critical one.
+/// Damping of an object on the film's sideways stiffness, relative to the critical damping.
 const DAMPING: f64 = 0.3;
 
 impl Moved {
     /// One step of the simulation under a force, N.
     fn step(&mut self, force_n: f64) {
         let step_s = 1.0 / STEPS_HZ;
-        // N/m, and N s/m.
+        // In N/m, and N s/m.
         let critical = 2.0 * (STIFFNESS * 1e3 * self.mass_kg).sqrt();
         let braked_n = DAMPING * critical * self.speed * 1e-3;
         self.speed += (force_n - braked_n) / self.mass_kg * 1e3 * step_s;
@@ -273,7 +275,7 @@ impl Moved {
     }
 }
 
-/// From 0 to 1, with half a cosine.
+/// A half cosine from 0 to 1.
 fn ramp(part: f64) -> f64 {
     0.5 - 0.5 * (std::f64::consts::PI * part.clamp(0.0, 1.0)).cos()
 }

@@ -1,29 +1,29 @@
-//! Coulomb friction between a tip and the film: what sticks is pulled, what is pulled too far
-//! slips.
+//! Coulomb friction between a tip and the film: a sticking film is pulled with the tip, and slips
+//! beyond a limit.
 
 /// Sideways stiffness of the film under a tip, N/mm.
 pub const STIFFNESS: f64 = 0.1;
-/// Sliding over static friction.
+/// Ratio of sliding friction to static friction.
 const SLIDING: f64 = 0.8;
-/// In this time a slip takes back what the film was pulled too far, s: its damping.
+/// Time constant with which a slip relaxes the film's excess pull, s: its damping.
 const RELAXES_S: f64 = 0.005;
-/// What slides no faster than this, mm/s, sticks again.
+/// Speed below which a sliding contact sticks again, mm/s.
 const STICKS: f64 = 0.2;
 
-/// How a tip meets the film at one time.
+/// The state of a contact at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Meeting {
     /// Force into the film, N, ≥ 0.
     pub normal_n: f64,
     /// Force along the film, in the direction of the pull, N.
     pub pull_n: f64,
-    /// How far the contact has slipped over the film, mm.
+    /// Distance that the contact has slipped over the film, mm.
     pub slipped_mm: f64,
     /// Whether it slips.
     pub slips: bool,
 }
 
-/// A contact whose tip is moved along the film: it takes the film with it until friction gives way.
+/// A contact whose tip moves along the film and pulls it, until friction fails.
 #[derive(Clone, Copy, Debug)]
 pub struct Friction {
     /// The static friction ratio.
@@ -32,7 +32,7 @@ pub struct Friction {
 }
 
 impl Friction {
-    /// Of a static friction ratio.
+    /// A contact with a static friction ratio.
     pub fn new(ratio: f64) -> Self {
         Self {
             ratio,
@@ -40,7 +40,7 @@ impl Friction {
         }
     }
 
-    /// A short time later, when the tip presses with a force and stands so far along its way, mm.
+    /// Its state after a short time, for a force of the tip and the tip's place along its way, mm.
     pub fn step(&mut self, normal_n: f64, tip_mm: f64, step_s: f64) -> Meeting {
         let pulled_n = STIFFNESS * (tip_mm - self.now.slipped_mm);
         let holds_n = self.ratio * normal_n;
@@ -48,7 +48,7 @@ impl Friction {
         let mut slips = self.now.slips || pulled_n.abs() > holds_n;
         let mut pull_n = pulled_n;
         if normal_n <= 0.0 {
-            // The film goes back to where it rests.
+            // The film returns to its rest position.
             self.now.slipped_mm = tip_mm;
             (slips, pull_n) = (false, 0.0);
         } else if slips {
@@ -57,7 +57,7 @@ impl Friction {
             let moved_mm = beyond_n / STIFFNESS * part;
             self.now.slipped_mm += moved_mm;
             pull_n = STIFFNESS * (tip_mm - self.now.slipped_mm);
-            // Friction holds no more than that.
+            // Friction cannot hold more than that.
             pull_n = pull_n.clamp(-holds_n, holds_n);
             slips = moved_mm.abs() > STICKS * step_s;
         }
@@ -78,7 +78,7 @@ mod tests {
     #[test]
     fn it_sticks_until_the_pull_is_too_large_follows_the_tip_and_sticks_when_that_stops() {
         let mut friction = Friction::new(0.5);
-        // At 5 mm/s the film is pulled 0.5 mm, which is 0.05 N, after 100 ms.
+        // At 5 mm/s the film is pulled by 0.5 mm, which is 0.05 N, after 100 ms.
         let tip_mm = |k: u32| 5e-3 * f64::from(k.min(400));
         let meetings: Vec<Meeting> = (0..600)
             .map(|k| friction.step(0.1, tip_mm(k), 1e-3))

@@ -1,4 +1,4 @@
-//! Contact and slip on scenes with truth.
+//! Tests contact and slip on scenes with known true values.
 
 mod course;
 mod friction;
@@ -28,16 +28,17 @@ use crate::units::Bench;
 use course::{Course, Kind};
 use score::{Frame, Score};
 
-/// Lines of an OV7725's frame, of which 240 are rows, and its frames a second.
+/// Lines of an OV7725's frame, 240 of them rows, and its frames a second.
 const LINES: u16 = 278;
 const RATE_HZ: f64 = 156.12;
-/// How long each row is exposed, s.
+/// Exposure of each row, s.
 const EXPOSURE_S: f64 = 0.004;
-/// Frames that a course is drawn anew for when they do not show the markers: one in so many, s.
+/// Time between two checks whether a drawn course shows all markers, s; if not, another course is
+/// drawn.
 const LOOKED_AT_S: f64 = 0.02;
-/// Courses that are drawn before none is found.
+/// Most courses that are drawn before the study fails.
 const DRAWS: u32 = 1000;
-/// How the units are made ready, in the order of the tables.
+/// How the units are prepared, in the order of the tables.
 const UNITS: [&str; 3] = ["nominal", "tare alone", "ten loads"];
 
 /// Press, drag, release, grasp and catch, and count what contact and slip miss, invent, and how
@@ -58,7 +59,7 @@ pub struct Slip {
     json: bool,
 }
 
-/// A row of the table: how the unit was made ready, and what happened.
+/// A row of the table: the unit's preparation, and the kind of the course.
 #[derive(Serialize)]
 struct Row {
     unit: &'static str,
@@ -67,11 +68,11 @@ struct Row {
     score: Score,
 }
 
-/// Contacts and slips by how the unit was made ready and by what happened, at last all of it.
+/// Contacts and slips by the unit's preparation and by kind; the last entry sums all kinds.
 type Scores = [[[Score; 2]; Kind::ALL.len() + 1]; UNITS.len()];
 
 impl Slip {
-    /// Runs it.
+    /// Runs the study.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
@@ -95,7 +96,7 @@ impl Slip {
         page::write("slip.md", include_str!("page.md"), &text)
     }
 
-    /// One unit, made ready in each way.
+    /// Tests one unit with each preparation.
     fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Scores> {
         let conditions = &model.conditions;
         let nominal = TestedUnit::new(conditions, Options::default(), 0.5, number)?;
@@ -127,7 +128,7 @@ impl Slip {
     }
 }
 
-/// A course of a kind that the simulated film can hold and whose markers stay in the picture.
+/// A course that the simulated film can hold, with all markers in the picture.
 fn shown(unit: &TestedUnit, kind: Kind, random: &mut ChaCha8Rng) -> Result<Course> {
     for _ in 0..DRAWS {
         let course = Course::drawn(kind, unit.tip_radius_mm, random);
@@ -143,7 +144,7 @@ fn shown(unit: &TestedUnit, kind: Kind, random: &mut ChaCha8Rng) -> Result<Cours
     Err(anyhow!("no {kind:?} of {DRAWS} can be shown"))
 }
 
-/// What a sensor says of a course, frame by frame.
+/// A sensor's results for a course, frame by frame.
 fn follow(unit: &TestedUnit, tared: &mut Tared<'_>, course: &Course) -> Result<Vec<Frame>> {
     let shutter = Shutter {
         exposure_s: EXPOSURE_S,
@@ -156,7 +157,7 @@ fn follow(unit: &TestedUnit, tared: &mut Tared<'_>, course: &Course) -> Result<V
         if time_s > course.duration_s() {
             break;
         }
-        // Between the times that were looked at a load may be one that the film does not hold.
+        // Between the checked times there may be a load that the film does not hold.
         let load = |after_s| course.load(time_s + after_s).unwrap_or(Load::REST);
         let noise = u64::from(number);
         let picture = unit.scene.frame_under(&shutter, noise, load)?;

@@ -1,29 +1,29 @@
-//! What contact and slip of a course miss, invent, and how late they come.
+//! Counts contacts and slips of a course that are missed or invented, and measures their delays.
 
 use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-/// A contact or a slip goes on across gaps of at most so many frames.
+/// Longest gap within a contact or a slip, in frames.
 const GAP: usize = 2;
-/// What is told up to so long after an event belongs to it, s: the limits' time.
+/// Longest delay of a report that belongs to an event, s: the time of the limits.
 const LATE_S: f64 = 0.05;
-/// A slip of less than this is none to find, nor one to invent, mm.
+/// Least length of a slip, mm; a shorter one counts neither as missed nor as invented.
 const LEAST_SLIP_MM: f64 = 0.1;
 
-/// A frame: what is true in the middle of its exposure, and what was told.
+/// A frame: the true state in the middle of its exposure, and the reported one.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Frame {
-    /// s.
+    /// Time, s.
     pub time_s: f64,
     /// True contact, and true slip.
     pub touches: bool,
     pub slips: bool,
-    /// How far the contact has slipped, mm.
+    /// Distance that the contact has slipped, mm.
     pub slipped_mm: f64,
     /// Whether the sensor had a force.
     pub has_force: bool,
-    /// Contact and slip as they were told.
+    /// The reported contact and slip.
     pub told_touch: bool,
     pub told_slip: bool,
 }
@@ -31,20 +31,20 @@ pub struct Frame {
 /// Counts of events, and their delays.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Score {
-    /// True ones, and those of them that were told.
+    /// True events, and those of them that were reported.
     pub true_events: u32,
     pub found: u32,
-    /// Told ones, and those of them that are none.
+    /// Reported events, and those of them that are not true.
     pub told: u32,
     pub invented: u32,
-    /// Those that were not told, of which frames had no force.
+    /// Unreported events with frames that had no force.
     pub missed_without_force: u32,
-    /// From the first frame in which each found one is true until it is told, s.
+    /// Time from the first true frame of each reported event to its report, s.
     pub delays_s: Vec<f64>,
 }
 
 impl Score {
-    /// Takes another score's events.
+    /// Adds the events of another score.
     pub fn merge(&mut self, other: &Score) {
         self.true_events += other.true_events;
         self.found += other.found;
@@ -54,13 +54,13 @@ impl Score {
         self.delays_s.extend(&other.delays_s);
     }
 
-    /// Of the contacts of a course.
+    /// The score of a course's contacts.
     pub fn of_contacts(frames: &[Frame]) -> Score {
         let truth = events(frames, |frame| frame.touches);
         Score::of(frames, &truth, &truth, |frame| frame.told_touch)
     }
 
-    /// Of its slips.
+    /// The score of its slips.
     pub fn of_slips(frames: &[Frame]) -> Score {
         let all = events(frames, |frame| frame.slips);
         let far = |event: &&Event| {
@@ -72,7 +72,8 @@ impl Score {
         Score::of(frames, &wanted, &all, |frame| frame.told_slip)
     }
 
-    /// Of events that shall be told; of others none is invented by what is told of it.
+    /// The score for the events `wanted`; a report of an event in `others` does not count as
+    /// invented.
     fn of(
         frames: &[Frame],
         wanted: &[Event],
@@ -107,7 +108,8 @@ impl Score {
         score
     }
 
-    /// The delay that so many of a hundred found ones stay within, ms; `None` when there are none.
+    /// The delay that `percent` of the reported events do not exceed, ms; `None` without such
+    /// events.
     pub fn delay_ms(&self, percent: usize) -> Option<f64> {
         let mut sorted = self.delays_s.clone();
         sorted.sort_by(f64::total_cmp);
@@ -116,7 +118,7 @@ impl Score {
     }
 }
 
-/// Frames from the first to the last in which something is.
+/// First to last frame of an event.
 type Event = RangeInclusive<usize>;
 
 fn events(frames: &[Frame], is: impl Fn(&Frame) -> bool) -> Vec<Event> {
@@ -130,7 +132,7 @@ fn events(frames: &[Frame], is: impl Fn(&Frame) -> bool) -> Vec<Event> {
     events
 }
 
-/// The frames of an event and those in which it can be told yet.
+/// The frames of an event, and those after it whose reports still belong to it.
 fn belonging<'f>(frames: &'f [Frame], event: &Event) -> impl Iterator<Item = &'f Frame> {
     let last_s = frames[*event.end()].time_s + LATE_S;
     let after = frames[*event.start()..].iter();
@@ -141,7 +143,7 @@ fn belonging<'f>(frames: &'f [Frame], event: &Event) -> impl Iterator<Item = &'f
 mod tests {
     use super::*;
 
-    /// Frames of 10 ms: `t` is true, `x` told, `b` both, `n` true without a force.
+    /// Frames of 10 ms: `t` true, `x` reported, `b` both, `n` true without a force.
     fn score(text: &str) -> Score {
         let mut slipped_mm = 0.0;
         let frames = text.chars().enumerate().map(|(at, what)| {
@@ -164,7 +166,8 @@ mod tests {
             ("...tttbbb.....", [1, 1, 1, 0, 0]),
             ("...tttnnn.....", [1, 0, 0, 0, 1]),
             ("......xx......", [0, 0, 1, 1, 0]),
-            // Late, and its own; too late; a short gap; too short to count.
+            // A late report with one of its own; a report too late; a short gap; a slip too short
+            // to count.
             ("...tttttt...xx", [1, 1, 1, 0, 0]),
             ("ttt........xxx", [1, 0, 1, 1, 0]),
             ("..bb.bb...bb..", [2, 2, 2, 0, 0]),

@@ -1,4 +1,5 @@
-//! `hivtac-studies tradeoff`: the best configuration under a user's limits (`docs/tradeoff.md`).
+//! `hivtac-studies tradeoff`: picks the best configuration under a user's limits
+//! (`docs/tradeoff.md`).
 
 mod model;
 mod pick;
@@ -14,7 +15,7 @@ use serde::Deserialize;
 
 use pick::{Limits, best};
 
-/// Every configuration that was measured: its accuracy, simulated, and its cost, modelled.
+/// All measured configurations, with simulated accuracy and modelled cost.
 const TABLE: &str = include_str!("../../tradeoff/configurations.csv");
 /// The core's cycles in a microsecond.
 const CYCLES_PER_US: f64 = 480.0;
@@ -30,38 +31,38 @@ pub struct TradeoffArgs {
     out: Option<PathBuf>,
 }
 
-/// One configuration, as a row of the table has it.
+/// One configuration, as a row of the table.
 #[derive(Clone, Debug, Deserialize)]
 struct Configuration {
     /// Columns and rows of a frame.
     width: u16,
     height: u16,
-    /// How markers' positions are taken: `binary` or `weighted`.
+    /// Estimator of the markers' positions: `binary` or `weighted`.
     centroid: String,
     /// Widths of the network's hidden layers, such as `64-64`.
     network: String,
-    /// How its numbers are held: `f32`, `int16` or `int8 per channel`.
+    /// Format of its numbers: `f32`, `int16` or `int8 per channel`.
     numbers: String,
-    /// Gauss–Newton steps from the network's answer, at the least; 0: it stands alone.
+    /// Least number of Gauss–Newton steps from the network's answer; 0 for the network alone.
     steps: u8,
     /// Mean angle between found and true force, degrees.
     direction_deg: f64,
-    /// The same from 50 mN up, and half of the interval that holds the true mean with 95 %.
+    /// The same for forces from 50 mN up, and half of the 95 % interval of the true mean.
     strong_direction_deg: f64,
     strong_direction_deg_95: Option<f64>,
     /// Root mean square error of |F|, mN, and of each coordinate of the place, µm.
     force_rmse_mn: f64,
     place_rmse_um: f64,
-    /// Frames that no single contact explains, in parts of those that are judged.
+    /// Part of the judged frames that no single contact explains.
     unexplained: f64,
-    /// Of a frame.
+    /// Cycles for a frame.
     modelled_cycles: i64,
-    /// From the last pixel to the sample, µs.
+    /// Time from the last pixel to the sample, µs.
     latency_microseconds: f64,
 }
 
 impl TradeoffArgs {
-    /// Picks, says what, and trains it when a folder is given.
+    /// Picks a configuration and prints it; trains it if a folder is given.
     pub fn run(&self) -> Result<()> {
         let all = configurations()?;
         let picked = best(&all, &self.limits)?;
@@ -74,7 +75,7 @@ impl TradeoffArgs {
     }
 }
 
-/// Those that the firmware does as it is.
+/// The configurations that the firmware supports unchanged.
 fn configurations() -> Result<Vec<Configuration>> {
     let mut reader = csv::Reader::from_reader(TABLE.as_bytes());
     let titles = reader.headers()?.clone();
@@ -91,7 +92,7 @@ fn configurations() -> Result<Vec<Configuration>> {
 }
 
 impl Configuration {
-    /// As the sensing has it.
+    /// The estimator as the sensing's type.
     fn estimator(&self) -> CentroidEstimator {
         match self.centroid.as_str() {
             "binary" => CentroidEstimator::BinaryMask,
@@ -108,7 +109,7 @@ impl Configuration {
         1e6 / self.microseconds()
     }
 
-    /// The upper end of the interval of the direction error from 50 mN up, degrees.
+    /// Upper end of the interval of the direction error from 50 mN up, degrees.
     fn limit_error_deg(&self) -> f64 {
         self.strong_direction_deg + self.strong_direction_deg_95.unwrap_or(0.0)
     }

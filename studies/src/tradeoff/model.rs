@@ -1,4 +1,4 @@
-//! The model and the settings of a picked configuration, ready to flash.
+//! Makes the model and the settings of a picked configuration, ready to flash.
 
 use std::fs;
 use std::path::Path;
@@ -15,27 +15,27 @@ use serde_json::json;
 
 use super::Configuration;
 
-/// Frames that the network is trained on, and frames that tell the markers' noise and their seed:
-/// as for the default model.
+/// Number of training frames; then number and seed of the frames for the markers' noise. As for the
+/// default model.
 const ROWS: usize = 80_000;
 const NOISE: (usize, u64) = (6_000, 5);
-/// Loads of the frames that are rendered, a little beyond those that are judged.
+/// Loads of the rendered frames, slightly beyond those that are judged.
 const RENDERED: Range = Range {
     force_n: 0.25,
     alpha_deg: 10.0,
     beta_deg: 10.0,
     place_mm: 4.2,
 };
-/// Frames that are rendered for a model.
+/// Number of rendered frames for a model.
 pub(super) const FRAMES: usize = ROWS + NOISE.0;
-/// Frames to check on, and the seed of their loads and noise.
+/// Number of frames for the check, and the seed of their loads and noise.
 const CHECKED: (usize, u64) = (4000, 1_000_001);
 
 /// Trains the model of a configuration on as many frames as the default model has, and writes
 /// `model.weights`, `model.hvtm` and `settings.json` into a folder. `progress` is called for every
 /// rendered frame.
 ///
-/// Gives what to do with them, in words.
+/// Returns a text that says how to use the files.
 pub(super) fn write(
     picked: &Configuration,
     folder: &Path,
@@ -84,7 +84,7 @@ pub(super) fn write(
         fs::write(&file, bytes).with_context(|| format!("cannot write {}", file.display()))?;
     }
     let (samples, seed) = CHECKED;
-    // The contact reading is `force`: no friction has a part in it.
+    // With the contact reading `force`, friction has no effect.
     let report = check(&bytes, samples, seed, || ())?;
     let folder = folder.display();
     Ok(format!(

@@ -1,11 +1,11 @@
-//! Which configuration is best under a user's limits.
+//! Picks the best configuration under a user's limits.
 
 use anyhow::{Context, Result};
 use clap::Args;
 
 use super::Configuration;
 
-/// Errors count as equal within this part of themselves: training again changes them as much.
+/// Relative difference up to which errors count as equal: repeated training changes them as much.
 const EQUAL: f64 = 0.05;
 
 /// A user's limits.
@@ -25,9 +25,9 @@ pub struct Limits {
 
 /// The best configuration within the limits.
 ///
-/// With a limit on the error, the fastest. Otherwise the most accurate: of those whose direction
-/// error from 50 mN up, error of |F| and error of the place are within a twentieth of the least of
-/// each, and time within a twentieth of the fastest's, the one that refuses least.
+/// With a limit on the error, the fastest. Otherwise the most accurate: the error of the direction
+/// from 50 mN up, of |F| and of the place must be within a twentieth of the least of each. Among
+/// those within a twentieth of the fastest's time, the one that refuses least.
 pub(super) fn best<'c>(all: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
     let fitting: Vec<_> = all.iter().filter(|c| limits.hold(c)).collect();
     let best = match limits.max_error_deg {
@@ -49,7 +49,7 @@ pub(super) fn best<'c>(all: &'c [Configuration], limits: &Limits) -> Result<&'c 
     })
 }
 
-/// The one with the least of something, and its equals.
+/// The configuration with the least value of `of`, and its equals.
 fn equals<'c>(
     among: &[&'c Configuration],
     of: fn(&Configuration) -> f64,
@@ -59,7 +59,7 @@ fn equals<'c>(
     among.iter().filter(near).copied().collect()
 }
 
-/// What comes nearest to limits of time, and to one of the error.
+/// Text about what comes nearest to limits of time, and to a limit of the error.
 fn nearest(all: &[Configuration]) -> Option<String> {
     let fastest = all.iter().min_by_key(|c| c.modelled_cycles)?;
     let by_error = |c: &&Configuration| (1e6 * c.limit_error_deg()) as u64;
@@ -74,7 +74,7 @@ fn nearest(all: &[Configuration]) -> Option<String> {
 }
 
 impl Limits {
-    /// Whether a configuration is within them.
+    /// Whether a configuration is within the limits.
     fn hold(&self, c: &Configuration) -> bool {
         self.budget_us.is_none_or(|most| c.microseconds() <= most)
             && self.min_rate.is_none_or(|least| c.rate() >= least)
@@ -86,8 +86,7 @@ impl Limits {
 mod tests {
     use super::*;
 
-    /// A configuration that takes so many cycles for so much error: direction (degrees) and |F|
-    /// (mN).
+    /// A configuration with a number of cycles and errors of direction (degrees) and |F| (mN).
     fn made(cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
         Configuration {
             width: 320,
@@ -107,7 +106,7 @@ mod tests {
         }
     }
 
-    /// Rough; good; as good; a little better; much better in |F|.
+    /// Inaccurate; good; equally good; slightly better; much better in |F|.
     fn several() -> Vec<Configuration> {
         vec![
             made(96_000, [0.5, 0.3]),

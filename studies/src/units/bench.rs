@@ -1,5 +1,4 @@
-//! The loads by which somebody calibrates a unit, as their gauge, their stage or their hand tells
-//! them.
+//! The loads of a unit's calibration, as a gauge, a stage or a hand measures them.
 
 use anyhow::{Context, Result};
 use hivtac_calibration::data::rest::Rest;
@@ -27,43 +26,42 @@ const TEN: [(f64, f64, f64, [f64; 2]); 10] = [
     (0.1, 0.0, 0.0, [-3.0, -0.5]),
     (0.1, 0.0, 0.0, [0.5, -3.0]),
 ];
-/// Frames of each.
+/// Frames of each load.
 const FRAMES: u64 = 4;
-/// Forces of presses anywhere, N.
+/// Range of the forces of presses anywhere, N.
 const ANYWHERE_N: [f64; 2] = [0.02, 0.22];
-/// How many loads there are of them with places, and by hand.
+/// Number of loads with known places, and of loads by hand.
 const SEVENTY: usize = 70;
 const BY_HAND: usize = 120;
-/// Standard deviations: of the gauge, N, of a stage's zero, mm, of a place that is noted, mm, and
-/// of a hand's direction each way, degrees.
+/// Standard deviations: of the gauge, N; of a stage's zero, mm; of a noted place, mm. And of a
+/// hand's direction on each axis, degrees.
 const GAUGE_N: f64 = 1e-3;
 const STAGE_MM: f64 = 0.1;
 const PLACE_MM: f64 = 0.1;
 const HAND_DEG: f64 = 3.0;
-/// Standard uncertainty of a marker's mean coordinates, px: what the pixel grid does, and what is
-/// left of noise.
+/// Standard uncertainty of a marker's mean coordinates, px, from the pixel grid and residual noise.
 const MEAN_PX: f64 = 0.008;
 
-/// How somebody calibrates.
+/// The method of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Bench {
     /// Ten loads on a stage.
     Ten,
     /// Seventy loads anywhere, each place known to 0.1 mm.
     Seventy,
-    /// Three minutes by hand: no place is noted, the direction is the film's normal to 3°.
+    /// Three minutes by hand: places are unknown, and the direction is the film's normal to 3°.
     ByHand,
 }
 
 impl Bench {
-    /// All, with their names.
+    /// All methods, with their names.
     pub const ALL: [(Bench, &'static str); 3] = [
         (Bench::Ten, "ten loads"),
         (Bench::Seventy, "seventy loads, places to 0.1 mm"),
         (Bench::ByHand, "three minutes by hand"),
     ];
 
-    /// The weights for a unit after these loads; the number draws gauge and stage.
+    /// The weights for a unit after these loads; `number` selects the errors of gauge and stage.
     pub fn calibrate(
         self,
         weights: &Weights,
@@ -135,7 +133,7 @@ impl Bench {
                 loads.push(SeenLoad {
                     direction_rad: HAND_DEG.to_radians(),
                     each_place_mm: f64::INFINITY,
-                    // Areas at rest are good enough for a rough place.
+                    // Areas at rest suffice for a rough place.
                     place_mm: rough.place_mm(&told.observation(rest.areas_px)),
                     ..told
                 });
@@ -151,8 +149,8 @@ impl Bench {
     }
 }
 
-/// A load that is told to have this force, N, but for the gauge's error, and this place, mm, and
-/// under which markers are seen there, px.
+/// A load with this force, N, changed by the gauge's error, with this place, mm, and the markers'
+/// places, px.
 fn told(
     seen_px: [[f64; 2]; 4],
     force_n: [f64; 3],

@@ -1,4 +1,4 @@
-//! Units as people build them: with a tare alone, and after they were calibrated.
+//! Tests randomly drawn units: with a tare alone, and after a calibration.
 
 mod bench;
 #[cfg(test)]
@@ -50,7 +50,7 @@ enum Films {
 }
 
 impl Films {
-    /// Forces that are pressed, from and to, mN.
+    /// Ranges of the pressed forces, mN.
     fn forces_mn(self) -> &'static [[u32; 2]] {
         match self {
             Films::Nominal => &[[50, 50], [100, 100], [200, 200]],
@@ -58,7 +58,7 @@ impl Films {
         }
     }
 
-    /// How they are calibrated: films of finite elements in every way.
+    /// The calibrations: every one for films of finite elements.
     fn benches(self) -> &'static [(Bench, &'static str)] {
         match self {
             Films::Nominal => &Bench::ALL[..1],
@@ -67,30 +67,30 @@ impl Films {
     }
 }
 
-/// A unit with a tare alone, and after each bench's loads: its errors at each force, or why it
-/// could not be calibrated.
+/// A unit with a tare alone, and after each calibration: its errors at each force, or the reason
+/// why it could not be calibrated.
 type Tested = Vec<Result<Vec<Errors>>>;
 
-/// What all units say after one kind of calibration.
+/// The results of all units for one calibration.
 #[derive(Serialize)]
 struct Row {
     calibration: &'static str,
     force_mn: [u32; 2],
     units: usize,
     without_model: usize,
-    /// Root mean squares of all presses, and medians over units of their own: degrees, mN, µm.
+    /// Root mean squares over all presses, and medians over the units' own: degrees, mN, µm.
     rms: [f64; 3],
     median: [f64; 3],
-    /// Per cent of frames.
+    /// Percentage of frames.
     with_force: f64,
-    /// Per cent of forces: beyond three stated standard uncertainties in any part, and within the
-    /// stated 95 % of direction, |F| and place.
+    /// Percentages of forces: those beyond three stated standard uncertainties in any part, and
+    /// those within the stated 95 % of direction, |F| and place.
     beyond: f64,
     within: [f64; 3],
 }
 
 impl Units {
-    /// Runs it.
+    /// Runs the study.
     pub fn run(&self) -> Result<()> {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;

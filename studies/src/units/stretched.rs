@@ -1,4 +1,4 @@
-//! The files of a unit with a stretched film, which tests of the host tool render and measure.
+//! Writes the files of a unit with a stretched film, for tests of the host tool.
 
 use std::fs;
 use std::path::Path;
@@ -14,14 +14,14 @@ use super::Bench;
 use crate::anywhere::WEIGHTS;
 use crate::press::TestedUnit;
 
-/// The film with this number is stretched by 2.6 % along x and 2.4 % along y.
+/// The number of the film that is stretched by 2.6 % along x and 2.4 % along y.
 const NUMBER: u64 = 16;
-/// Straight presses at this place, mm: those that a tare may be taken under, and one that is read
-/// afterwards, N.
+/// Straight presses at this place, mm, with these forces, N: those during a tare, and the last one
+/// afterwards.
 const PLACE_MM: [f64; 2] = [1.0, -0.5];
 const FORCES_N: [f64; 6] = [5e-4, 1e-3, 1.5e-3, 2e-3, 1e-2, 0.1];
 
-/// Calibrates it by ten loads, and writes its model and how its film moves.
+/// Calibrates the unit by ten loads, and writes its model and the motion of its film.
 #[test]
 #[ignore = "writes host-tool/tests/tool/stretched"]
 fn a_stretched_unit_is_written() {
@@ -57,7 +57,7 @@ fn a_stretched_unit_is_written() {
     fs::write(folder.join("film.json"), format!("{told}\n")).unwrap();
 }
 
-/// How the film is under a load.
+/// The film's state under a load.
 fn state(unit: &TestedUnit, load: &Load) -> Value {
     let load = unit.with_tip(*load).unwrap();
     let pressed = unit.pressed(&load).unwrap();
