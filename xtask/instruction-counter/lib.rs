@@ -1,19 +1,19 @@
 //! A QEMU plugin that records what a program executes, exactly and repeatably: which blocks of
 //! instructions run, and in which order they follow each other.
 //!
-//! Recording begins when the program calls a function named `counting_begins` and ends when it
-//! calls `counting_ends`, as often as it likes; what runs after a call of `last_band_begins` is
-//! told apart from what ran before. At the end of the run the plugin writes to QEMU's log one JSON
-//! object:
+//! Recording begins when the program calls a function named `counting_begins`, and ends when it
+//! calls `counting_ends`; both may be repeated. A call of `last_band_begins` separates what ran
+//! before from what runs after it. At the end of the run the plugin writes one JSON object to
+//! QEMU's log:
 //!
 //! ```text
 //! {"blocks":[[ADDRESS,…],…],"runs":[[LAST_BAND,FROM,TO,COUNT],…]}
 //! ```
 //!
-//! A block is the addresses of its instructions, in order; block TO ran so often right after block
-//! FROM, which is `null` after a call. Blocks that QEMU translated several times count as one. A
-//! program that takes no interrupt and no fault leaves a block only at its end, so the counts are
-//! exact.
+//! A block is the list of its instructions' addresses, in order. COUNT is the number of times that
+//! block TO ran right after block FROM, which is `null` after a call. Blocks that QEMU translated
+//! several times count as one. Without interrupts and faults a program leaves a block only at its
+//! end, and the counts are exact.
 
 mod qemu;
 mod record;
@@ -25,13 +25,12 @@ use std::sync::{Mutex, PoisonError};
 use qemu::{BlockHandle, PluginId};
 use record::{Mark, Record};
 
-/// The version of the plugin interface that this is written against; QEMU reads it before anything
-/// else.
+/// The plugin interface's version that this plugin uses; QEMU reads it first.
 #[unsafe(no_mangle)]
 #[allow(non_upper_case_globals)]
 pub static qemu_plugin_version: c_int = if cfg!(feature = "plugin-api-2") { 2 } else { 1 };
 
-/// What was recorded so far. There is one processor, so nobody waits for the lock.
+/// The data recorded until now. With one processor, the lock is always free.
 static RECORD: Mutex<Record> = Mutex::new(Record::new());
 
 /// QEMU calls this once, when it loads the plugin.
@@ -42,7 +41,7 @@ pub extern "C" fn qemu_plugin_install(
     _argument_count: c_int,
     _arguments: *mut *mut c_char,
 ) -> c_int {
-    // SAFETY: both callbacks live as long as the plugin, and take what QEMU gives them.
+    // SAFETY: both callbacks live as long as the plugin, and accept QEMU's arguments.
     unsafe {
         qemu::qemu_plugin_register_vcpu_tb_trans_cb(id, translated);
         qemu::qemu_plugin_register_atexit_cb(id, ended, ptr::null_mut());
@@ -53,7 +52,7 @@ pub extern "C" fn qemu_plugin_install(
 /// QEMU has translated a block.
 extern "C" fn translated(_id: PluginId, handle: BlockHandle) {
     let number = with_record(|record| record.add_block(addresses(handle), mark(handle)));
-    // The number travels in place of a pointer; nothing is ever read through it.
+    // The number is passed as a pointer, through which nothing is ever read.
     let data = ptr::without_provenance_mut(number);
     // SAFETY: the handle is valid during this call.
     unsafe {
@@ -86,7 +85,7 @@ fn addresses(handle: BlockHandle) -> Vec<u64> {
     }
 }
 
-/// What the block tells this plugin: its function's name, when that has a meaning here.
+/// The block's mark: its function's name, if that is a marking function.
 fn mark(handle: BlockHandle) -> Option<Mark> {
     // SAFETY: as above, and a block has at least one instruction.
     let symbol = unsafe { qemu::qemu_plugin_insn_symbol(qemu::qemu_plugin_tb_get_insn(handle, 0)) };

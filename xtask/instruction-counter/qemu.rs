@@ -1,5 +1,5 @@
-//! What this plugin needs of QEMU's plugin interface (`qemu-plugin.h`), declared by hand: the
-//! header is not packaged everywhere.
+//! Declarations from QEMU's plugin interface (`qemu-plugin.h`) that this plugin uses. They are
+//! written by hand because the header is not packaged everywhere.
 
 use std::ffi::{c_char, c_int, c_uint, c_void};
 

@@ -1,37 +1,37 @@
-//! What was executed while the program asked for it to be recorded.
+//! Records the executed blocks while the program requests it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a call of one of the program's marking functions means.
+/// The meaning of a call of a marking function.
 #[derive(Clone, Copy)]
 pub enum Mark {
-    /// Record from here on.
+    /// Recording begins.
     Begin,
-    /// Record no longer.
+    /// Recording ends.
     End,
-    /// What comes now is part 1.
+    /// Part 1 begins.
     LastBand,
 }
 
 struct Block {
     addresses: Vec<u64>,
-    /// The marking functions themselves, their return included, are not recorded.
+    /// The block's mark. Marking functions are not recorded, up to their return.
     mark: Option<Mark>,
 }
 
-/// Blocks, and how they followed each other.
+/// The blocks, and their order of execution.
 pub struct Record {
     blocks: Vec<Block>,
     recording: bool,
     part: u8,
-    /// The block that ran last, since recording began.
+    /// The block that ran last since recording began.
     before: Option<usize>,
-    /// How often a block ran in a part after another.
+    /// Number of executions by part, block before, and block.
     runs: BTreeMap<(u8, Option<usize>, usize), u64>,
 }
 
 impl Record {
-    /// Before anything ran.
+    /// An empty record.
     pub const fn new() -> Record {
         Record {
             blocks: Vec::new(),
@@ -42,13 +42,13 @@ impl Record {
         }
     }
 
-    /// A block was translated: gives the number that it is run by.
+    /// Adds a translated block; returns its number for [`Record::run`].
     pub fn add_block(&mut self, addresses: Vec<u64>, mark: Option<Mark>) -> usize {
         self.blocks.push(Block { addresses, mark });
         self.blocks.len() - 1
     }
 
-    /// A block runs.
+    /// Records the execution of a block.
     pub fn run(&mut self, number: usize) {
         match self.blocks[number].mark {
             Some(Mark::Begin) => {
@@ -68,7 +68,7 @@ impl Record {
         }
     }
 
-    /// Everything, as the crate's documentation describes.
+    /// The whole record, in the format of the crate's documentation.
     pub fn report(&self) -> String {
         let (blocks, numbers) = self.blocks_that_ran();
         let mut runs = BTreeMap::<_, u64>::new();
@@ -84,7 +84,7 @@ impl Record {
         format!("{{\"blocks\":{blocks:?},\"runs\":[{}]}}\n", runs.join(","))
     }
 
-    /// Each block that ran, once, and its number among these by that of translation.
+    /// Each block that ran, once; and its index among these, by its number of translation.
     fn blocks_that_ran(&self) -> (Vec<&Vec<u64>>, Vec<usize>) {
         let ran: BTreeSet<usize> = self.runs.keys().map(|(.., block)| *block).collect();
         let mut numbers = vec![usize::MAX; self.blocks.len()];

@@ -1,4 +1,4 @@
-//! What the demo and the tests run: each is built by cargo, which also says where it lies.
+//! Builds the programs that demo and tests run; cargo reports the paths of the files.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -11,15 +11,15 @@ use serde_json::Value;
 use crate::process;
 use crate::toolchain::{self, build_for_target, cargo, work_folder};
 
-/// The profile of programs that run here, which is quick to build.
+/// The cargo profile of programs that run on this computer, which builds quickly.
 pub const TOOLS: &str = "tools";
-/// The rig's tests that run firmware, and those that cross rooms: cargo builds and runs them only
-/// by their names.
+/// Arguments for the rig's tests that run firmware. Cargo builds and runs these and
+/// [`ROOMS_TESTS`], which cross folders, only by their names.
 pub const RIG_TESTS: [&str; 2] = ["--test", "rig"];
 /// See [`RIG_TESTS`].
 pub const ROOMS_TESTS: [&str; 2] = ["--test", "rooms"];
 
-/// The boards that there is firmware for.
+/// The boards for which there is firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Board {
     /// WeAct MiniSTM32H743VIT6 with an OV7725.
@@ -29,20 +29,20 @@ pub enum Board {
     OpenmvH7,
 }
 
-/// Features of the firmware that each seed one bug which the rig must notice.
+/// Features of the firmware, each with one seeded bug that the rig must detect.
 const SEEDED_BUGS: &str =
     "bug-dmamux-request bug-polarity bug-camera-register bug-half-buffer bug-usb-clock";
 
-/// The programs that the tests of the rig and those across rooms run.
+/// The programs that the tests of the rig and across rooms run.
 pub struct Programs {
     firmware: PathBuf,
-    /// One ELF per seeded bug or feature, named by it, those with the model for YUV422, and those
-    /// for the second board.
+    /// The folder with one ELF for each seeded bug or feature, by its name. It also has those with
+    /// the model for YUV422 and those for the second board.
     bugs: PathBuf,
 }
 
 impl Programs {
-    /// Builds them.
+    /// Builds the programs.
     pub fn build() -> Result<Programs> {
         let bugs = work_folder("bugs")?;
         let keep = |mut command: Command, name: &str| {
@@ -60,24 +60,24 @@ impl Programs {
             let command = firmware_command(Board::OpenmvH7, bug);
             keep(command, name.trim_end_matches('-'))?;
         }
-        // Last, so that what cargo leaves behind is the firmware without a bug.
+        // Last, because cargo's own file must be the firmware without a bug.
         let firmware = firmware(Board::Weact)?;
         Ok(Programs { firmware, bugs })
     }
 
-    /// Tells a test runner where they lie.
+    /// Sets the environment variables by which a test runner finds the programs.
     pub fn name_to(&self, command: &mut Command) {
         command.env("HIVTAC_ELF", &self.firmware);
         command.env("HIVTAC_BUG_ELFS", &self.bugs);
     }
 }
 
-/// The firmware, as it is flashed.
+/// Builds the firmware as it is flashed.
 pub fn firmware(board: Board) -> Result<PathBuf> {
     build(&mut firmware_command(board, ""), "hivtac-firmware")
 }
 
-/// What builds the firmware for a board, with one feature more or none.
+/// The cargo command that builds the firmware for a board, with `feature` unless it is empty.
 pub fn firmware_command(board: Board, feature: &str) -> Command {
     let mut command = build_for_target("");
     command.args(["--package", "hivtac-firmware", "--features", feature]);
@@ -87,13 +87,12 @@ pub fn firmware_command(board: Board, feature: &str) -> Command {
     command
 }
 
-/// The host tool, as it is installed.
+/// Builds the host tool as it is installed.
 pub fn host_tool() -> Result<PathBuf> {
     kept(host_command("hivtac"), "tool")
 }
 
-/// The same with all that `hivtac serve` can, which the tool of users has only when they ask for
-/// it.
+/// Builds the host tool with everything that `hivtac serve` can do, which is optional for users.
 pub fn serving_tool() -> Result<PathBuf> {
     kept(serving_command(), "serving-tool")
 }
@@ -104,20 +103,21 @@ fn serving_command() -> Command {
     command
 }
 
-/// The host tool in a folder of its own: cargo puts that with other features in its place, which
-/// another step may be running.
+/// Builds the host tool into its own folder. Otherwise cargo would replace it by a build with other
+/// features while another step runs it.
 fn kept(mut command: Command, folder: &str) -> Result<PathBuf> {
     static BUILDING: Mutex<()> = Mutex::new(());
     let _one_at_a_time = BUILDING.lock();
     let kept = work_folder(folder)?.join("hivtac");
-    // By another name first: a program that runs cannot be written over.
+    // Under another name first: a running program's file cannot be overwritten.
     let fresh = kept.with_extension("new");
     copy(&build(&mut command, "hivtac")?, &fresh)?;
     std::fs::rename(&fresh, &kept).with_context(|| format!("renaming {}", fresh.display()))?;
     Ok(kept)
 }
 
-/// A program that runs on this computer: the rig, the calibration, what writes benchmarks.
+/// Builds a program that runs on this computer: the rig, the calibration, or that of the
+/// benchmarks.
 pub fn host_program(name: &str) -> Result<PathBuf> {
     build(&mut host_command(name), name)
 }
@@ -128,15 +128,15 @@ fn host_command(program: &str) -> Command {
     command
 }
 
-/// Runs tests of the workspace past those that fail: in the profile of the programs that they run,
-/// so that dependencies are built once.
+/// The cargo command that runs tests of the workspace, including those after a failure. It uses the
+/// profile of the programs that tests run, and dependencies are built once.
 pub fn test() -> Command {
     let mut command = host_cargo("test");
     command.arg("--no-fail-fast");
     command
 }
 
-/// What builds all programs and tests that run on this computer.
+/// The cargo commands that build all programs and tests for this computer.
 pub fn everything() -> [Command; 3] {
     let [mut all, mut by_name] = [(); 2].map(|()| host_cargo("build"));
     all.arg("--all-targets");
@@ -144,19 +144,19 @@ pub fn everything() -> [Command; 3] {
     [all, by_name, serving_command()]
 }
 
-/// Whether packages of this project are linted as they are built for this computer.
+/// Whether builds for this computer also lint this project's packages.
 static LINTING: AtomicBool = AtomicBool::new(false);
 
-/// From here on, what is built for this computer is linted as it is built: it is checked once, and
-/// what its packages depend on not for itself. A lint does not keep anything from being built;
-/// [`without_warnings`] finds it.
+/// From now on, builds for this computer also lint. Each package is checked once, and no separate
+/// check of its dependencies is necessary. A lint does not stop a build; [`without_warnings`] finds
+/// it.
 pub fn lint_as_built() {
     LINTING.store(true, Ordering::Relaxed);
 }
 
-/// A cargo command for the packages that run on this computer, in the profile of [`TOOLS`]: all of
-/// them even where one program is wanted, so that what it depends on has the features with which
-/// tests build it, and is built once. The rig's emulator declares a newer compiler than it needs.
+/// A cargo command for the packages that run on this computer, in the profile of [`TOOLS`]. It
+/// covers all of them even for one program: dependencies then have the features that tests need,
+/// and are built once. The rig's emulator declares a newer compiler than it needs.
 fn host_cargo(verb: &str) -> Command {
     let mut command = cargo(verb, "");
     command.args(["--profile", TOOLS, "--ignore-rust-version", "--workspace"]);
@@ -167,7 +167,7 @@ fn host_cargo(verb: &str) -> Command {
     command
 }
 
-/// Runs `cargo build`.
+/// Runs `cargo build`; an error if it gives warnings.
 pub fn without_warnings(mut command: Command) -> Result<()> {
     let mut warnings = 0;
     for_each_message(command.arg("--message-format=json"), |message| {
@@ -181,17 +181,17 @@ pub fn without_warnings(mut command: Command) -> Result<()> {
     Ok(())
 }
 
-/// The sensing as a Cortex-M7 program for QEMU.
+/// Builds the sensing as a Cortex-M7 program for QEMU.
 pub fn qemu_image() -> Result<PathBuf> {
     build(&mut qemu_image_command(), "hivtac-qemu-image")
 }
 
-/// What builds it.
+/// The cargo command that builds it.
 pub fn qemu_image_command() -> Command {
     build_for_target("tests/qemu")
 }
 
-/// The plugin for QEMU that counts instructions, for a version of QEMU's plugin interface.
+/// Builds the plugin that counts instructions, for a version of QEMU's plugin interface.
 pub fn instruction_counter(version: u32) -> Result<PathBuf> {
     let mut command = cargo("build --package xtask --example instruction-counter", "");
     command.args(["--profile", TOOLS]);
@@ -201,7 +201,7 @@ pub fn instruction_counter(version: u32) -> Result<PathBuf> {
     build(&mut command, "instruction-counter")
 }
 
-/// Runs `cargo build` and gives the file it made for the target of this name.
+/// Runs `cargo build`; returns the file that it made for the target of this name.
 pub fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
     let mut found = None;
     for_each_message(
@@ -215,7 +215,7 @@ pub fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
     found.with_context(|| format!("`{command:?}` made no {target}"))
 }
 
-/// The file in one of cargo's messages, when it is the artifact of `target`.
+/// The file of a cargo message; `None` if it is not the artifact of `target`.
 fn artifact(message: &Value, target: &str) -> Option<PathBuf> {
     let is_it = reason(message) == "compiler-artifact" && message["target"]["name"] == target;
     let file = message["executable"]

@@ -1,5 +1,5 @@
-//! Debian's own Rust for the microcontroller, where rustup cannot add the target: its compiler has
-//! no library for that and builds `core` itself.
+//! Debian's Rust for the microcontroller, used where rustup cannot add the target. Its compiler
+//! lacks that target's library and builds `core` itself.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,11 +14,10 @@ const RUSTC: &str = "/usr/bin/rustc";
 const CLIPPY: &str = "/usr/bin/clippy-driver";
 const PACKAGES: &str = "rustc-web cargo-web rust-web-src lld";
 
-/// `ld.lld`, once Debian's compiler was chosen: Debian has no `rust-lld`.
+/// The path of `ld.lld`, set once Debian's compiler was chosen: Debian has no `rust-lld`.
 static LINKER: OnceLock<PathBuf> = OnceLock::new();
 
-/// From here on, what is for the microcontroller is built by Debian's compiler; installs it when it
-/// is missing.
+/// Chooses Debian's compiler for all later builds for the microcontroller; installs it if missing.
 pub fn choose() -> Result<()> {
     if !is_complete() {
         packages::install(
@@ -31,7 +30,7 @@ pub fn choose() -> Result<()> {
     Ok(())
 }
 
-/// Whether it was chosen.
+/// Whether Debian's compiler was chosen.
 pub fn is_chosen() -> bool {
     LINKER.get().is_some()
 }
@@ -51,7 +50,7 @@ pub fn rustc() -> Command {
     without_rustup(Command::new(RUSTC))
 }
 
-/// Turns a cargo command for the microcontroller into one of Debian's, if it was chosen.
+/// Changes a cargo command for the microcontroller to use Debian's compiler, if chosen.
 pub fn instead(command: Command) -> Command {
     let Some(linker) = LINKER.get() else {
         return command;
@@ -64,14 +63,14 @@ pub fn instead(command: Command) -> Command {
     debian
         .env("CARGO", CARGO)
         .env("RUSTC", RUSTC)
-        // A released compiler builds `core` only when told that it is the one meant to.
+        // A released compiler builds `core` only with this permission.
         .env("RUSTC_BOOTSTRAP", "1")
         .env("CARGO_TARGET_THUMBV7EM_NONE_EABIHF_LINKER", linker)
         .arg("-Zbuild-std=core");
     debian
 }
 
-/// The linter of what it builds.
+/// The path of the linter for Debian's compiler.
 pub fn linter() -> Result<&'static str> {
     if !Path::new(CLIPPY).is_file() {
         packages::install("rust-web-clippy", "Debian's clippy is missing")?;
@@ -79,7 +78,7 @@ pub fn linter() -> Result<&'static str> {
     Ok(CLIPPY)
 }
 
-/// Forgets what the cargo that runs this program has set for its own toolchain.
+/// Removes the variables that the running cargo has set for its own toolchain.
 fn without_rustup(mut command: Command) -> Command {
     for name in ["RUSTUP_TOOLCHAIN", "LD_LIBRARY_PATH", "CARGO", "RUSTC"] {
         command.env_remove(name);

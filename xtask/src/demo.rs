@@ -1,4 +1,4 @@
-//! `cargo xtask demo`: the firmware on the emulated board, a simulated tip that presses it, and the
+//! `cargo xtask demo`: runs the firmware on the emulated board with a simulated tip, and shows the
 //! forces.
 
 use std::collections::BTreeMap;
@@ -26,8 +26,8 @@ pub struct Demo {
 }
 
 impl Demo {
-    /// Builds what is needed, runs the rig, and shows what the host tool says; names the rig's log
-    /// when something fails.
+    /// Builds the programs, runs the rig, and shows the host tool's output; names the rig's log
+    /// after a failure.
     pub fn run(&self) -> Result<()> {
         let start = Instant::now();
         let programs = self.build()?;
@@ -49,7 +49,7 @@ impl Demo {
         Ok(())
     }
 
-    /// Builds the firmware beside the rig, whose emulator takes longest, and the host tool.
+    /// Builds the firmware while the rig is built, whose emulator takes longest, and the host tool.
     fn build(&self) -> Result<[PathBuf; 3]> {
         eprintln!(
             "Building the firmware, the emulated board and the host tool: some four minutes the \
@@ -91,15 +91,15 @@ impl Demo {
     }
 }
 
-/// A running rig. Killed when this is dropped.
+/// A running rig, which is killed when this value is dropped.
 struct Rig {
     process: Child,
-    /// The pseudo-terminal that is its serial port.
+    /// The pseudo-terminal of its serial port.
     port: String,
 }
 
 impl Rig {
-    /// Starts the rig and waits until its serial port is there. What it says goes to the log.
+    /// Starts the rig and waits for its serial port. Its messages go to the log.
     fn start(command: &mut Command, log: &Path) -> Result<Rig> {
         process::say(&format!("+ {command:?}"));
         let file = File::create(log).with_context(|| format!("creating {}", log.display()))?;
@@ -117,7 +117,7 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Waits for the rig to end by itself, as it does when its client has left.
+    /// Waits until the rig ends, as it does after its client has left.
     fn finish(mut self) -> Result<()> {
         let status = self.process.wait()?;
         ensure!(status.success(), "the rig failed ({status})");
@@ -127,16 +127,16 @@ impl Rig {
 
 impl Drop for Rig {
     fn drop(&mut self) {
-        // Fails only when it has ended already.
+        // Fails only if it has ended already.
         let _ = self.process.kill();
         let _ = self.process.wait();
     }
 }
 
-/// When, by frame.
+/// A time for each frame.
 type Times = BTreeMap<u64, f64>;
 
-/// As a log of the rig says it.
+/// Reads the times from a log of the rig.
 fn times(log: &Path) -> Result<Times> {
     let mut times = Times::new();
     for line in process::read(log)?.lines() {
@@ -148,8 +148,8 @@ fn times(log: &Path) -> Result<Times> {
     Ok(times)
 }
 
-/// Frames a second that samples arrived of, by the middles of their exposures, and the mean time
-/// from there to the last byte of a sample on USB, ms.
+/// The rate of the frames whose samples arrived, by the middles of their exposures, Hz. And the
+/// mean time from there to the last byte of a sample on USB, ms.
 fn rate_and_latency(exposed: &Times, arrived: &Times) -> Result<(f64, f64)> {
     let both = |(frame, there): (&u64, &f64)| Some((*exposed.get(frame)?, *there));
     let both: Vec<(f64, f64)> = arrived.iter().filter_map(both).collect();

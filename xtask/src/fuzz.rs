@@ -1,4 +1,4 @@
-//! The attacks of `tests/fuzz/`, some seconds each.
+//! Runs the attacks of `tests/fuzz/`, some seconds each.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,29 +9,28 @@ use rayon::prelude::*;
 use crate::toolchain::{self, cargo};
 use crate::{artifacts, process};
 
-/// Limits of each attack: seconds in all, and seconds and MiB of memory of one input. A recording
-/// and its gauge may differ by half a day, all of which is searched: that takes seconds, and more
-/// beside other tests.
+/// Limits of each attack: seconds in total; then seconds and MiB of memory for one input. A
+/// recording and its gauge may differ by half a day, and the search of that whole range takes
+/// seconds, or more while other tests run.
 const LIMITS: [&str; 3] = ["-max_total_time=10", "-timeout=100", "-rss_limit_mb=2048"];
-/// What has the compiler tell libFuzzer which parts of a program an input reaches, and what it
-/// compares: as cargo-fuzz does it without a sanitizer, which only a nightly compiler has; no
-/// attacked code is `unsafe`.
+/// Compiler flags that report to libFuzzer the reached code and its comparisons. They are
+/// cargo-fuzz's without a sanitizer, which needs a nightly compiler; no attacked code is `unsafe`.
 const COVERAGE: &str = "--cfg=fuzzing -Cpasses=sancov-module \
     -Cllvm-args=-sanitizer-coverage-level=4 \
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
     -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares";
-/// What libFuzzer writes before the number of inputs that it tried.
+/// The text before libFuzzer's number of tried inputs.
 const TRIED: &str = "stat::number_of_executed_units:";
 
-/// Why there can be no attacks here; nothing when there can.
+/// Why attacks cannot run here; `None` if they can.
 pub fn obstacle() -> Option<&'static str> {
     let has_compiler = process::find_program("c++").is_some();
     (!has_compiler).then_some("there is no C++ compiler, which libFuzzer needs")
 }
 
-/// Builds and runs every attack, as many at a time as there are cores. When one finds something,
-/// its input is saved, and what it met is shown.
+/// Builds and runs every attack, as many at a time as there are cores. If one finds a fault, its
+/// input is saved and the fault is shown.
 pub fn run() -> Result<()> {
     let programs = build()?;
     let attacks = targets()?.into_par_iter();
@@ -47,8 +46,8 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Gives the folder of the programs. They are for a named target, so that what is built to run
-/// while building is not attacked, and is that of the other tests.
+/// Builds the attacks; returns the folder of the programs. With a named target, build scripts are
+/// not instrumented, and are shared with other tests.
 fn build() -> Result<PathBuf> {
     let mut command = cargo("build --package hivtac-fuzz --bins --profile", "");
     command.args([
@@ -60,7 +59,7 @@ fn build() -> Result<PathBuf> {
     Ok(program.with_file_name(""))
 }
 
-/// Names of the targets.
+/// The names of the attacks.
 fn targets() -> Result<Vec<String>> {
     let folder = toolchain::at("tests/fuzz/targets").read_dir();
     let paths = folder.context("reading tests/fuzz/targets")?.flatten();
@@ -70,8 +69,8 @@ fn targets() -> Result<Vec<String>> {
     Ok(names)
 }
 
-/// Runs one; gives how many inputs the target withstood. New inputs that reach further go to
-/// `found`, not into the corpus, and so does what fails.
+/// Runs one attack; returns the number of inputs that the target withstood. New inputs that reach
+/// further, and inputs that fail, go to `found`, not into the corpus.
 fn attack(programs: &Path, target: &str) -> Result<String> {
     let found = toolchain::work_folder(&format!("fuzz/found/{target}"))?;
     let mut command = Command::new(programs.join(target));

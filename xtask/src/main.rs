@@ -34,7 +34,7 @@ enum Task {
 }
 
 fn main() -> ExitCode {
-    // Whoever reads the output may have enough of it.
+    // The reader of the output may end early.
     sigpipe::reset();
     match run(Task::parse()) {
         Ok(()) => ExitCode::SUCCESS,

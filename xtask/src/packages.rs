@@ -1,4 +1,4 @@
-//! Debian packages: installed when missing and allowed, named plainly when not.
+//! Installs missing Debian packages if allowed, or else names them.
 
 use std::path::PathBuf;
 
@@ -6,8 +6,8 @@ use anyhow::{Context, Result, bail};
 
 use crate::process::{self, command};
 
-/// Installs Debian packages as root or through sudo. Called only when something is missing, so that
-/// a machine that has everything needs no network.
+/// Installs Debian packages as root or through sudo. Called only if something is missing: a
+/// complete machine needs no network.
 pub fn install(packages: &str, why: &str) -> Result<()> {
     process::say(&format!("{why}: installing the Debian packages {packages}"));
     let sudo = match process::output(&mut command("id -u"))?.trim() {
@@ -21,7 +21,7 @@ pub fn install(packages: &str, why: &str) -> Result<()> {
         bail!("{why}; this system has no apt-get: install what your system calls {packages}");
     }
     let apt_get = |words: &str| {
-        // Waits while somebody else installs, such as another step or the system itself.
+        // Waits during another installation, such as by another step or by the system.
         let apt_get = format!("{sudo}apt-get -o DPkg::Lock::Timeout=300 {words}");
         process::run(command(&apt_get).env("DEBIAN_FRONTEND", "noninteractive"))
     };
@@ -29,12 +29,12 @@ pub fn install(packages: &str, why: &str) -> Result<()> {
     if apt_get(&install).is_ok() {
         return Ok(());
     }
-    // The list of packages may be missing or out of date, as in a fresh container.
+    // The list of packages may be missing or out of date, as in a new container.
     let installed = apt_get("update").and_then(|()| apt_get(&install));
     installed.with_context(|| format!("{why}, and installing {packages} failed"))
 }
 
-/// QEMU's Cortex-M7 machine, for the tests and the benchmark.
+/// Installs QEMU's Cortex-M7 machine for tests and benchmark, if missing.
 pub fn ensure_qemu() -> Result<()> {
     if process::find_program("qemu-system-arm").is_none() {
         install("qemu-system-arm", "the Cortex-M7 emulator is missing")?;
@@ -42,7 +42,7 @@ pub fn ensure_qemu() -> Result<()> {
     Ok(())
 }
 
-/// A browser for the test of the page of `hivtac view`.
+/// The path of a browser for the test of `hivtac view`'s page.
 pub fn chromium() -> Result<PathBuf> {
     let names = "chromium chromium-browser google-chrome google-chrome-stable";
     let find = || names.split(' ').find_map(process::find_program);

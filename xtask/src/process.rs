@@ -1,4 +1,4 @@
-//! Running other programs: every command is shown first, and an error names the one that failed.
+//! Runs other programs: it shows every command first, and an error names the failed one.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -9,11 +9,11 @@ use std::process::{Command, ExitStatus, Stdio};
 use anyhow::{Context, Result, ensure};
 
 thread_local! {
-    /// Where this thread and the programs that it runs print, where that is not the terminal.
+    /// The output of this thread and of its programs, if it is not the terminal.
     static LOG: RefCell<Option<File>> = const { RefCell::new(None) };
 }
 
-/// Does `work` on this thread, with what it and its programs print put into a file.
+/// Runs `work` on this thread, with the output of it and its programs written to a file.
 pub fn logged<T>(file: File, work: impl FnOnce() -> T) -> T {
     LOG.set(Some(file));
     let done = work();
@@ -21,7 +21,7 @@ pub fn logged<T>(file: File, work: impl FnOnce() -> T) -> T {
     done
 }
 
-/// What a program's standard output or error becomes.
+/// The standard output or error of a program.
 fn printed() -> Stdio {
     LOG.with_borrow(|log| {
         let file = log.as_ref().and_then(|file| file.try_clone().ok());
@@ -29,7 +29,7 @@ fn printed() -> Stdio {
     })
 }
 
-/// Says a line on standard error, or in the log.
+/// Prints a line to standard error, or to the log.
 pub fn say(line: &str) {
     let written = LOG.with_borrow_mut(|log| log.as_mut().map(|file| writeln!(file, "{line}")));
     if written.is_none() {
@@ -37,7 +37,7 @@ pub fn say(line: &str) {
     }
 }
 
-/// Prints text on standard output, or in the log.
+/// Prints text to standard output, or to the log.
 pub fn print(text: &str) {
     match LOG.with_borrow(Option::is_some) {
         true => say(text),
@@ -45,7 +45,7 @@ pub fn print(text: &str) {
     }
 }
 
-/// A command of words without spaces.
+/// A command from words that have no spaces in them.
 pub fn command(words: &str) -> Command {
     let (program, arguments) = words.split_once(' ').unwrap_or((words, ""));
     let mut command = Command::new(program);
@@ -61,7 +61,7 @@ pub fn run(command: &mut Command) -> Result<()> {
     check(status, command)
 }
 
-/// Runs the command quietly and gives its standard output.
+/// Runs the command without showing it; returns its standard output.
 pub fn output(command: &mut Command) -> Result<String> {
     let output = command.stderr(printed()).output();
     let output = output.with_context(|| cannot_start(command))?;
@@ -69,13 +69,13 @@ pub fn output(command: &mut Command) -> Result<String> {
     Ok(String::from_utf8(output.stdout)?)
 }
 
-/// True when the command can be started and succeeds; its output is thrown away.
+/// True if the command can be started and succeeds; its output is discarded.
 pub fn succeeds(command: &mut Command) -> bool {
     let output = command.stdin(Stdio::null()).output();
     output.is_ok_and(|output| output.status.success())
 }
 
-/// Shows and runs the command, and hands every line of its standard output to `each`.
+/// Shows and runs the command; passes every line of its standard output to `each`.
 pub fn for_each_line(command: &mut Command, mut each: impl FnMut(&str)) -> Result<()> {
     say(&format!("+ {command:?}"));
     let child = command.stdout(Stdio::piped()).stderr(printed()).spawn();

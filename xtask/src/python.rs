@@ -1,4 +1,4 @@
-//! Tests that are written in Python, in environments of their own with packages of PyPI.
+//! Runs the tests in Python, each in its own environment with packages of PyPI.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,15 +9,15 @@ use crate::artifacts::{self, Board};
 use crate::report::{Tally, run_tests};
 use crate::{process, toolchain};
 
-/// What building and testing Python's `hivtac` need: a folder below `target/`, what is imported,
-/// and the packages as pip knows them.
+/// For Python's `hivtac`: the environment's folder below `target/`, the imported modules, and the
+/// packages by their names for pip.
 const PACKAGE: [&str; 3] = [
     "python",
     "maturin, mypy, numpy",
     "maturin>=1.9,<2 mypy numpy",
 ];
 
-/// Who receives what `hivtac serve` sends: Cyclone DDS, which ROS 2 itself uses, a WebSocket
+/// The same for a receiver of `hivtac serve`: Cyclone DDS, which ROS 2 itself uses, a WebSocket
 /// client, and a reader of ROS 2's messages.
 const SERVE: [&str; 3] = [
     "python-serve",
@@ -25,7 +25,7 @@ const SERVE: [&str; 3] = [
     "cyclonedds mcap-ros2-support websockets",
 ];
 
-/// Makes the package's environment when it is not there; says what keeps it from that.
+/// Makes the package's environment if missing; returns the obstacle, if there is one.
 pub fn no_package() -> Option<&'static str> {
     obstacle(
         PACKAGE,
@@ -34,7 +34,7 @@ pub fn no_package() -> Option<&'static str> {
     )
 }
 
-/// The same of `hivtac serve`.
+/// Makes the environment for `hivtac serve` if missing; returns the obstacle, if there is one.
 pub fn no_serve() -> Option<&'static str> {
     obstacle(
         SERVE,
@@ -51,7 +51,7 @@ fn obstacle(environment: [&str; 3], missing: &'static str) -> Option<&'static st
     })
 }
 
-/// An environment's Python, with the packages.
+/// The Python of an environment, with the packages installed.
 fn python([folder, modules, packages]: [&str; 3]) -> Result<PathBuf> {
     let folder = toolchain::at("target").join(folder);
     let python = folder.join("bin/python");
@@ -63,20 +63,20 @@ fn python([folder, modules, packages]: [&str; 3]) -> Result<PathBuf> {
     Ok(python)
 }
 
-/// `pip install`, without a word.
+/// The quiet command `pip install`.
 fn pip(python: &Path) -> Command {
     let mut command = Command::new(python);
     command.args("-m pip install --quiet --disable-pip-version-check".split(' '));
     command
 }
 
-/// Installs Python's `hivtac` as a user does, but in the profile of the other tests' programs, and
-/// runs its tests on the firmware in the rig; its annotations are checked, too.
+/// Installs Python's `hivtac` as a user does, but in the profile of the tests' other programs. Runs
+/// its tests on the firmware in the rig, and checks its annotations.
 pub fn test_package(tally: &mut Tally) -> Result<()> {
     let python = python(PACKAGE)?;
     let mut install = pip(&python);
     install.args("--no-build-isolation --force-reinstall --no-deps ./host-tool/python".split(' '));
-    // Where maturin is found by its build backend.
+    // The build backend finds maturin in this folder.
     let path = std::env::var("PATH").unwrap_or_default();
     let programs = python.with_file_name("");
     install.env("PATH", format!("{}:{path}", programs.display()));
@@ -93,7 +93,7 @@ pub fn test_package(tally: &mut Tally) -> Result<()> {
     )
 }
 
-/// Serves the firmware in the rig, and looks at what arrives.
+/// Serves the firmware in the rig, and tests what a receiver gets.
 pub fn test_serve(tally: &mut Tally) -> Result<()> {
     let (python, tool) = (python(SERVE)?, artifacts::serving_tool()?);
     test(&python, "tests/python/test_serve.py", &tool, tally)

@@ -1,4 +1,4 @@
-//! How the steps of `cargo xtask test` go: a line when each begins and ends, and a table of all.
+//! Reports the steps of `cargo xtask test`: a line at each start and end, and a table of all.
 
 use std::fs::File;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use anyhow::{Context, Result, ensure};
 
 use crate::process;
 
-/// Tests that passed and failed.
+/// Number of tests that passed and failed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     passed: u64,
@@ -19,9 +19,9 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Adds what a line of a test runner says; gives whether it sums up others: Rust's
-    /// `test result: ok. 6 passed; 0 failed; …`, or of Python's unittest `NAME ... ok`, one test a
-    /// line, and at last `Ran 6 tests in 1.2s`.
+    /// Adds a test runner's line; returns whether it sums up others. Rust's is `test result: ok. 6
+    /// passed; 0 failed; …`. Python's unittest prints `NAME ... ok` for each test, and `Ran 6 tests
+    /// in 1.2s` at the end.
     fn add_line(&mut self, line: &str) -> bool {
         if let Some((_, summary)) = line.split_once("test result: ") {
             let before = |word: &str| -> u64 {
@@ -44,8 +44,8 @@ impl Tally {
     }
 }
 
-/// Runs a test runner, whose output goes to the step's log; prints the lines that sum up, at once,
-/// and adds them to the tally. It fails, too, when it ran no test at all.
+/// Runs a test runner, with its output to the step's log. Prints its summary lines at once and adds
+/// them to the tally. An error if it fails or runs no tests.
 pub fn run_tests(command: &mut Command, tally: &mut Tally) -> Result<()> {
     process::for_each_line(command, |line| {
         process::say(line);
@@ -60,25 +60,25 @@ pub fn run_tests(command: &mut Command, tally: &mut Tally) -> Result<()> {
 struct Done {
     name: &'static str,
     result: &'static str,
-    /// Why it failed or was not run.
+    /// Why it failed or was not run; empty if it passed.
     why: String,
     seconds: f64,
     tally: Tally,
 }
 
-/// The steps so far, of all threads.
+/// The steps of all threads until now.
 pub struct Report {
     start: Instant,
-    /// How many steps there are.
+    /// Number of steps.
     all: usize,
-    /// Where each step's output goes, in a file of its name.
+    /// Folder of the logs; each step writes a file with its name.
     logs: PathBuf,
     begun: AtomicUsize,
     done: Mutex<Vec<Done>>,
 }
 
 impl Report {
-    /// Before the first of `all` steps.
+    /// A report of `all` steps, none of them run yet.
     pub fn new(all: usize, logs: PathBuf) -> Report {
         Report {
             start: Instant::now(),
@@ -89,8 +89,8 @@ impl Report {
         }
     }
 
-    /// Runs a step on this thread and keeps what became of it, unless something keeps it from
-    /// running here. Its output goes to its log, which is shown when it fails.
+    /// Runs a step on this thread and keeps its result, unless an obstacle prevents it. Its output
+    /// goes to its log, which is shown after a failure.
     pub fn step(
         &self,
         name: &'static str,
@@ -110,7 +110,7 @@ impl Report {
         let (result, why) = done.unwrap_or_else(|error| ("FAILED", format!("{error:#}")));
         if result == "FAILED" {
             let said = std::fs::read(&log).unwrap_or_default();
-            // At once, so that no line of another thread is in between.
+            // In one call, which keeps lines of other threads out.
             let said = String::from_utf8_lossy(&said);
             println!("=== {name}\n{said}\n=== {name}: {why}");
         }
@@ -127,7 +127,7 @@ impl Report {
         println!("{mark} {result}: {name}, {seconds:.1} s; so far: {so_far}");
     }
 
-    /// Which step it is, and the time since the first began.
+    /// The step's number, and the time since the first began.
     fn mark(&self, number: usize) -> String {
         let (all, seconds) = (self.all, self.start.elapsed().as_secs());
         format!("[{number}/{all} {}:{:02}]", seconds / 60, seconds % 60)
@@ -137,7 +137,7 @@ impl Report {
         self.done.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Prints the table; an error names the steps that failed.
+    /// Prints the table; an error names the failed steps.
     pub fn finish(&self) -> Result<()> {
         let steps = self.done();
         println!("\nstep                                result  seconds  passed  failed");

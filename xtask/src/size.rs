@@ -1,4 +1,4 @@
-//! `cargo xtask size`: what the firmware takes of each memory.
+//! `cargo xtask size`: measures how much of each memory the firmware takes.
 
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, SectionFlags, elf};
@@ -15,10 +15,10 @@ struct Region {
     used: u64,
 }
 
-/// A section that takes memory: its address, its size, and whether flash holds its first contents.
+/// A section that takes memory: address, size, and whether flash holds its initial contents.
 type Section = (u64, u64, bool);
 
-/// Builds the firmware, measures, and gives a table of the memories in Markdown.
+/// Builds the firmware and measures it; returns a Markdown table of the memories.
 pub fn memories() -> Result<String> {
     let elf = artifacts::firmware(Board::Weact)?;
     let bytes = std::fs::read(&elf).with_context(|| format!("reading {}", elf.display()))?;
@@ -26,7 +26,7 @@ pub fn memories() -> Result<String> {
     table(&script, &sections(&bytes)?)
 }
 
-/// Sections that lie in the chip's memory, with something in them.
+/// Non-empty sections in the chip's memory.
 fn sections(elf: &[u8]) -> Result<Vec<Section>> {
     let file = object::File::parse(elf).context("not an ELF file")?;
     let section = |section: object::Section| {
@@ -40,7 +40,7 @@ fn sections(elf: &[u8]) -> Result<Vec<Section>> {
     Ok(file.sections().filter_map(section).collect())
 }
 
-/// A line `NAME : ORIGIN = 0x…, LENGTH = …K` of a linker script.
+/// Reads a line `NAME : ORIGIN = 0x…, LENGTH = …K` of a linker script.
 fn region(line: &str) -> Option<Region> {
     let (name, rest) = line.split_once(':')?;
     let (origin, length) = rest.split_once(',')?;
@@ -54,7 +54,7 @@ fn region(line: &str) -> Option<Region> {
     })
 }
 
-/// A number of a linker script: decimal or hexadecimal, perhaps with K.
+/// Reads a linker script's number: decimal or hexadecimal, with an optional K.
 fn number(text: &str) -> Option<u64> {
     let text = text.trim();
     let digits = text.strip_suffix('K');
@@ -67,7 +67,7 @@ fn number(text: &str) -> Option<u64> {
     Some(value.ok()? * factor)
 }
 
-/// What each memory holds. What is loaded into RAM at the start lies in flash, too.
+/// A table of the contents of each memory. Sections loaded into RAM at the start are in flash, too.
 fn table(script: &str, sections: &[Section]) -> Result<String> {
     let mut regions: Vec<Region> = script.lines().filter_map(region).collect();
     for (address, size, loaded) in sections {

@@ -1,4 +1,4 @@
-//! `cargo xtask test`: every check and every test of the project.
+//! `cargo xtask test`: runs every check and every test of the project.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Command;
@@ -23,11 +23,12 @@ pub struct Test {
     all: bool,
 }
 
-/// Its name, what it does, and for one that runs only with `--all`, why it cannot run here.
+/// A step: its name, its work, and for a step of `--all` a function that finds an obstacle to it
+/// here.
 type Step = (&'static str, Work, Option<fn() -> Option<&'static str>>);
 type Work = fn(&Shared, &mut Tally) -> Result<()>;
 
-/// What runs on this computer.
+/// The steps of the main thread.
 static FIRST: [Step; 4] = [
     ("format", |_, _| format(), None),
     ("lints: host", |_, _| host_lints(), None),
@@ -35,9 +36,9 @@ static FIRST: [Step; 4] = [
     ("tests: across rooms", cross_room_tests, None),
 ];
 
-/// About half of the work: what is for the microcontroller, attacks and the rig's tests, and around
-/// them what the others need nothing of. What is for the microcontroller is first: it is built in a
-/// folder of its own while the lints hold the common one.
+/// The steps of the second thread, about half of the work: builds for the microcontroller, attacks
+/// and the rig's tests, between steps on which no others depend. Builds for the microcontroller
+/// come first, in their own folder, while the lints hold the common one.
 static BESIDE: [Step; 10] = [
     ("lints: microcontroller", |_, _| target_lints(), None),
     (BUILD, |shared, _| shared.build(), None),
@@ -59,23 +60,23 @@ static BESIDE: [Step; 10] = [
     ),
 ];
 
-/// It runs for the steps that need it.
+/// The build, which also runs if a chosen step needs it.
 const BUILD: &str = "build: firmware";
 const NEED_BUILD: [&str; 2] = ["tests: rig at half speed", "tests: across rooms"];
 
 /// The project's workspaces, as folders.
 const WORKSPACES: [&str; 2] = ["", "tests/qemu"];
 
-/// What the steps share.
+/// The state that the steps share.
 struct Shared {
     all: bool,
-    /// Set by the step that builds them; to nothing when that fails.
+    /// Set by the step that builds them; `None` after a failure.
     programs: OnceLock<Option<Programs>>,
 }
 
 impl Test {
-    /// Runs every step, past those that fail, and prints the table; on two threads, so that no core
-    /// waits while one of both builds or tests with the other alone.
+    /// Runs every step, including those after a failure, and prints the table. It uses two threads,
+    /// because a single build or test would leave cores idle.
     pub fn run(&self) -> Result<()> {
         let wanted = |steps: &'static [Step]| steps.iter().filter(|step| self.wants(step));
         let all = wanted(&FIRST).chain(wanted(&BESIDE)).count();
@@ -97,7 +98,7 @@ impl Test {
         let beside = thread::scope(|scope| {
             let beside = scope.spawn(|| {
                 let ended = catch_unwind(AssertUnwindSafe(|| run(&BESIDE)));
-                // Who still waits for them waits no longer.
+                // Ends the wait of any step for the programs.
                 shared.programs.get_or_init(|| None);
                 ended
             });
@@ -126,7 +127,7 @@ impl Shared {
         problem.map_or(Ok(()), Err)
     }
 
-    /// What tests with these programs, once they are built.
+    /// The cargo command of tests with these programs, once they are built.
     fn tests(&self, which: [&str; 2]) -> Result<Command> {
         let programs = self.programs.wait().as_ref();
         let programs = programs.context("not run: the firmware could not be built")?;
@@ -136,7 +137,7 @@ impl Shared {
         Ok(command)
     }
 
-    /// Has a test runner run what it would leave out for its time, if asked to.
+    /// Runs a test runner, with the slow tests if `all` is set.
     fn run(&self, mut command: Command, tally: &mut Tally) -> Result<()> {
         if self.all {
             command.args(["--", "--include-ignored"]);
@@ -153,7 +154,7 @@ fn format() -> Result<()> {
     Ok(())
 }
 
-/// Of what [`artifacts::lint_as_built`] had linted, and of what is only checked.
+/// Checks the builds that [`artifacts::lint_as_built`] linted, and lints the rest.
 fn host_lints() -> Result<()> {
     toolchain::ensure_component("clippy", "clippy")?;
     for command in artifacts::everything() {
@@ -162,8 +163,8 @@ fn host_lints() -> Result<()> {
     Ok(())
 }
 
-/// Both boards' firmware and the image for QEMU are built for this alone, with what they depend on
-/// as it is built for those that run: what is flashed does not depend on a linter.
+/// Lints both boards' firmware and the image for QEMU. They are built only for this, with
+/// dependencies as in the programs that run: a linter must not change what is flashed.
 fn target_lints() -> Result<()> {
     toolchain::ensure_component("clippy", "clippy")?;
     let firmware = |board| artifacts::firmware_command(board, "");
@@ -185,7 +186,7 @@ fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
     command.env("HIVTAC_TOOL", artifacts::host_tool()?);
     command.env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image()?);
     if shared.all {
-        // Only slow tests run these.
+        // Only slow tests run these programs.
         command.env(
             "HIVTAC_CALIBRATE",
             artifacts::host_program("hivtac-calibrate")?,
@@ -199,8 +200,8 @@ fn rig_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
     shared.run(shared.tests(artifacts::RIG_TESTS)?, tally)
 }
 
-/// Those in which it matters how fast the core is, at half of the speed that the rig assumes, and
-/// on a busy bus.
+/// The tests that depend on the core's speed, at half of the speed that the rig assumes, and on a
+/// busy bus.
 fn rig_tests_at_half_speed(shared: &Shared, tally: &mut Tally) -> Result<()> {
     let mut command = shared.tests(artifacts::RIG_TESTS)?;
     command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");
@@ -214,9 +215,9 @@ fn no_cargo_deny() -> Option<&'static str> {
     (!toolchain::has("deny")).then_some(missing)
 }
 
-/// Licences and sources of packages from elsewhere, as `deny.toml` allows them. Known flaws
-/// (`cargo deny check advisories`) are left out: which there are needs the network, and changes
-/// from day to day.
+/// Checks licences and sources of foreign packages against `deny.toml`. Known flaws (`cargo deny
+/// check advisories`) are left out, because their list needs the network and changes from day to
+/// day.
 fn licences() -> Result<()> {
     for folder in WORKSPACES {
         let mut command = cargo("deny --log-level error --config", folder);

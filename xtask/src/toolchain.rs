@@ -1,4 +1,4 @@
-//! The compiler and where things lie: cargo for this computer and for the microcontroller.
+//! The compiler and the project's paths: cargo for this computer and for the microcontroller.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -12,14 +12,14 @@ use crate::process::{self, command};
 /// The microcontroller's target: Cortex-M7 with a double-precision FPU.
 const TARGET: &str = "thumbv7em-none-eabihf";
 
-/// A folder or file of the project, named from its root.
+/// A folder or file of the project, by its path from the root.
 pub fn at(name: &str) -> PathBuf {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     here.parent().unwrap_or(here).join(name)
 }
 
-/// A folder for what `cargo xtask` makes, below the target directory in use: this program lies in
-/// its folder `tools`.
+/// A folder for the files of `cargo xtask`, below the target directory in use. This program itself
+/// is in its folder `tools`.
 pub fn work_folder(name: &str) -> Result<PathBuf> {
     let program = std::env::current_exe().context("this program's own path")?;
     let target = program
@@ -31,7 +31,7 @@ pub fn work_folder(name: &str) -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// A cargo command of words without spaces, run in a folder of the project by the toolchain that
+/// A cargo command from words without spaces, in a folder of the project, with the toolchain that
 /// runs this program.
 pub fn cargo(words: &str, folder: &str) -> Command {
     let program = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
@@ -40,22 +40,22 @@ pub fn cargo(words: &str, folder: &str) -> Command {
     command
 }
 
-/// `cargo build` for the microcontroller, as it is flashed.
+/// `cargo build` for the microcontroller, as for flashing.
 pub fn build_for_target(folder: &str) -> Command {
     let mut command = cargo("build --release --target", folder);
     command.arg(TARGET);
     debian::instead(command)
 }
 
-/// What runs in the compiler's place for the project's own packages.
+/// The variable with the program that replaces the compiler for the project's own packages.
 const WRAPPER: &str = "RUSTC_WORKSPACE_WRAPPER";
 
-/// Has a cargo command for this computer lint the packages of this project that it builds.
+/// Makes a cargo command for this computer lint this project's packages that it builds.
 pub fn lint(command: &mut Command) {
     command.env(WRAPPER, "clippy-driver");
 }
 
-/// The same of a command for the microcontroller.
+/// Makes a cargo command for the microcontroller lint.
 pub fn lint_for_target(command: &mut Command) -> Result<()> {
     match debian::is_chosen() {
         true => drop(command.env(WRAPPER, debian::linter()?)),
@@ -64,7 +64,7 @@ pub fn lint_for_target(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
-/// What the compiler for the microcontroller calls itself: `rustc 1.95.0 (59807616e 2026-04-14)`.
+/// The version of the compiler for the microcontroller: `rustc 1.95.0 (59807616e 2026-04-14)`.
 pub fn target_compiler() -> Result<String> {
     match debian::is_chosen() {
         true => Ok(process::output(debian::rustc().arg("-V"))?
@@ -74,7 +74,7 @@ pub fn target_compiler() -> Result<String> {
     }
 }
 
-/// What the compiler for this computer says.
+/// The output of the compiler for this computer.
 pub fn rustc(words: &str) -> Result<String> {
     let program = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let said = process::output(Command::new(program).args(words.split(' ')))?;
@@ -88,8 +88,8 @@ fn has_target() -> Result<bool> {
     Ok(files.is_ok_and(|files| files.flatten().any(is_core)))
 }
 
-/// Adds the target to the toolchain in use where it is missing, and moves that to no other version;
-/// where rustup cannot, Debian's own compiler builds for the microcontroller.
+/// Adds the target to the current toolchain if missing, without a change of version. If rustup
+/// cannot, Debian's own compiler is chosen for the microcontroller.
 pub fn ensure_target() -> Result<()> {
     if has_target()? {
         return Ok(());
@@ -107,12 +107,12 @@ pub fn ensure_target() -> Result<()> {
     })
 }
 
-/// Whether cargo knows a command, such as `clippy`.
+/// Whether cargo has a command, such as `clippy`.
 pub fn has(verb: &str) -> bool {
     process::succeeds(cargo(verb, "").arg("--version"))
 }
 
-/// `cargo fmt` or `cargo clippy`; rustup adds it when it can.
+/// Ensures that `cargo fmt` or `cargo clippy` exists; rustup adds it if possible.
 pub fn ensure_component(verb: &str, component: &str) -> Result<()> {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _one = ONE_AT_A_TIME.lock();

@@ -1,4 +1,4 @@
-//! `cargo xtask bench --board`: the same items from the cycle counter of a real STM32H743.
+//! `cargo xtask bench --board`: measures the same items with the cycle counter of a real STM32H743.
 
 use std::process::Command;
 
@@ -10,7 +10,7 @@ use crate::{artifacts, process, toolchain};
 
 const PACKAGE: &str = "hivtac-board";
 
-/// Builds the image, flashes it, and prints what the board says.
+/// Builds the image, flashes it, and prints the board's output.
 pub fn run() -> Result<()> {
     let image = artifacts::build(&mut command()?, PACKAGE)?;
     let list = process::output(&mut process::command("probe-rs list"));
@@ -32,7 +32,7 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Builds the image and lints it; nothing has to be attached.
+/// Builds the image and lints it, without a board.
 pub fn lint() -> Result<()> {
     let mut command = command()?;
     toolchain::lint_for_target(&mut command)?;
@@ -48,7 +48,7 @@ fn command() -> Result<Command> {
     Ok(command)
 }
 
-/// `frame full|320x240|rgb565|200000`, whatever stands around it.
+/// Finds a row such as `frame full|320x240|rgb565|200000` in a line.
 fn row(line: &str) -> Option<String> {
     let words: Vec<&str> = line.trim().split('|').collect();
     let [item, frame, format, cycles] = words[..] else {

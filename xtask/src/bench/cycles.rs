@@ -1,10 +1,10 @@
-//! Cycles of blocks of instructions on LLVM's model of the Cortex-M7 (`llvm-mca`).
+//! Computes the cycles of blocks of instructions with LLVM's model of the Cortex-M7 (`llvm-mca`).
 //!
-//! The core issues in order, so a block's cost is by how much later the instruction after it issues
-//! when the block is there: cycles(before + block + tail) − cycles(before + tail), where *before*
-//! is what usually ran before it and the tail waits for nothing. Since two instructions may issue
-//! in a cycle, this is the mean over both ways in which the pairs can fall. A block that follows
-//! itself is timed as the loop that it is.
+//! The core issues in order. A block's cost is therefore the delay that it causes to the
+//! instruction after it: cycles(before + block + tail) − cycles(before + tail). *Before* is the
+//! code that usually ran before it, and the tail waits for nothing. Two instructions may issue in a
+//! cycle, and the result is the mean over both possible pairings. A block that follows itself is
+//! timed as a loop.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -18,26 +18,26 @@ use crate::process;
 const MCA: &str = "llvm-mca -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7 -iterations=1 \
     -instruction-info=0 -resource-pressure=0";
 
-/// How much of what came before a block is timed with it, in instructions.
+/// Instructions before a block that are timed with it.
 const CONTEXT: usize = 24;
-/// Repetitions of a loop: the difference between the two is what is timed.
+/// Two numbers of repetitions of a loop; the difference of their times is the result.
 const LOOPS: (usize, usize) = (8, 24);
-/// Instructions of the tail: longer than any latency.
+/// Instructions of the tail, more than any latency.
 const TAIL: usize = 24;
-/// Regions that one run of the analyzer takes.
+/// Most regions in one run of the analyzer.
 const BATCH: usize = 500;
 
-/// LLVM's analyzer, with what it has said so far.
+/// LLVM's analyzer, with its results until now.
 pub struct Model {
-    /// What each instruction of the image is to it, by the address.
+    /// The analyzer's text for each instruction of the image, by address.
     lines: BTreeMap<u64, Vec<String>>,
-    /// Where its input is written.
+    /// The file with the analyzer's input.
     file: PathBuf,
-    /// Cycles by the text of the instructions.
+    /// Known cycles, by the text of the instructions.
     known: HashMap<String, f64>,
 }
 
-/// Texts whose mean cycles differ by so many times what is looked for.
+/// Texts whose mean cycles differ by `times` times the wanted number.
 struct Timing {
     with: [String; 2],
     without: [String; 2],
@@ -45,7 +45,7 @@ struct Timing {
 }
 
 impl Model {
-    /// For an image; `file` is written to. `None` without LLVM.
+    /// The model of an image; `file` is overwritten. `None` without LLVM.
     pub fn new(image: &Path, file: PathBuf) -> Result<Option<Model>> {
         let programs = ["llvm-mca", "llvm-objdump"].map(process::find_program);
         if programs.iter().any(Option::is_none) {
@@ -70,7 +70,7 @@ impl Model {
         self.evaluate(&timings.collect::<Vec<_>>())
     }
 
-    /// Asks the analyzer for what is not known yet.
+    /// Runs the analyzer for all texts with unknown cycles; returns the cycles of the timings.
     fn evaluate(&mut self, timings: &[Timing]) -> Result<Vec<f64>> {
         let texts = timings.iter().flat_map(|it| [&it.with, &it.without]);
         let unknown = texts.flatten().filter(|it| !self.known.contains_key(*it));
@@ -97,7 +97,7 @@ impl Model {
     }
 }
 
-/// The block that most often came right before each one.
+/// For each block, the block that ran most often right before it.
 fn usual_predecessors(record: &Record) -> Vec<Option<usize>> {
     let mut steps = BTreeMap::<_, u64>::new();
     for (_, before, block, count) in &record.runs {
@@ -133,7 +133,7 @@ fn timing(index: usize, texts: &[Vec<String>], before: &[Option<usize>]) -> Timi
     }
 }
 
-/// What usually ran before a block: its last instructions.
+/// The last instructions that usually ran before a block.
 fn context(index: usize, texts: &[Vec<String>], before: &[Option<usize>]) -> Vec<String> {
     let mut context = Vec::new();
     let mut at = index;
@@ -144,7 +144,7 @@ fn context(index: usize, texts: &[Vec<String>], before: &[Option<usize>]) -> Vec
     context.split_off(context.len().saturating_sub(CONTEXT))
 }
 
-/// The lines and the tail, beginning with the first or the second instruction of a pair.
+/// The lines and the tail, starting with the first or the second instruction of a pair.
 fn both_ways(lines: &[String]) -> [String; 2] {
     let text = lines.join("\n") + if lines.is_empty() { "" } else { "\n" };
     let tail = format!("{FILLER}\n").repeat(TAIL);
@@ -155,7 +155,7 @@ fn both_ways(lines: &[String]) -> [String; 2] {
 mod tests {
     use super::*;
 
-    /// Block 0 runs three times, then comes block 1.
+    /// Block 0 runs three times, then block 1.
     #[test]
     fn a_block_is_timed_behind_what_usually_precedes_it_and_a_loop_as_such() {
         let blocks = vec![Vec::new(); 2];

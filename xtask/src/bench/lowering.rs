@@ -1,13 +1,14 @@
-//! The image's instructions as LLVM's machine-code analyzer takes them: what it does not know or
-//! counts too low is written as what the core does instead.
+//! Rewrites the image's instructions for LLVM's machine-code analyzer. Instructions that it does
+//! not know or counts too low are replaced by what the core does.
 //!
-//! - Branches, calls and returns go nowhere and take one slot of the branch unit: the core's branch
-//!   target cache turns a correctly predicted one around in a cycle.
-//! - `it` takes one slot; what it makes conditional takes its own whether it is executed or not.
-//! - A comparison of floating-point numbers is a subtraction, and reading its flags a move to the
-//!   core's registers.
-//! - Loads and stores of several registers (`ldm`, `push` …), one cycle to the analyzer, are one
-//!   load or store each.
+//! - Branches, calls and returns have no target and take one slot of the branch unit: the core's
+//!   branch target cache handles a correctly predicted one in a cycle.
+//! - `it` takes one slot. Each conditional instruction after it takes its own, whether or not it is
+//!   executed.
+//! - A comparison of floating-point numbers becomes a subtraction; reading its flags becomes a move
+//!   to the core's registers.
+//! - Loads and stores of several registers (`ldm`, `push` …), one cycle in the analyzer, become one
+//!   load or store for each register.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,19 +17,19 @@ use anyhow::Result;
 
 use crate::process;
 
-/// Takes one slot and waits for nothing.
+/// An instruction that takes one slot and waits for nothing.
 pub const FILLER: &str = "mov.w r8, #0";
 
-/// Takes the difference that a comparison is.
+/// The register for the difference that replaces a comparison.
 const SCRATCH: &str = "s31";
 
 /// Conditional branches.
 const CONDITIONS: &str = "beq bne bhs bcs blo bcc bmi bpl bvs bvc bhi bls bge blt bgt ble";
 
-/// What LLVM's analyzer cannot take, and no hot loop has.
+/// Instructions that the analyzer cannot process; no hot loop has them.
 const UNMODELLED: &str = "bkpt svc udf cpsid cpsie msr mrs dsb isb dmb wfi";
 
-/// The lines that stand for each instruction of an ELF, by its address.
+/// The lines that replace each instruction of an ELF, by its address.
 pub fn disassemble(image: &Path) -> Result<BTreeMap<u64, Vec<String>>> {
     let objdump = "llvm-objdump --disassemble --no-show-raw-insn --mcpu=cortex-m7";
     let mut command = process::command(objdump);
@@ -53,7 +54,8 @@ fn parse(text: &str) -> BTreeMap<u64, Vec<String>> {
     instructions.collect()
 }
 
-/// An address, a colon, the mnemonic and the operands, separated by tabs, and a comment.
+/// Splits a line into address, mnemonic and operands. A colon follows the address, tabs separate
+/// the rest, and a comment may follow.
 fn instruction(line: &str) -> Option<(u64, &str, &str)> {
     let (address, rest) = line.split_once(':')?;
     let address = u64::from_str_radix(address.trim(), 16).ok()?;
@@ -63,8 +65,8 @@ fn instruction(line: &str) -> Option<(u64, &str, &str)> {
     (!mnemonic.is_empty()).then_some((address, mnemonic, operands))
 }
 
-/// `it`, `ite`, `itett` …: as many conditional instructions follow as it has letters after the
-/// first.
+/// Whether a mnemonic is `it`, `ite`, `itett` …, which is followed by as many conditional
+/// instructions as it has letters after the first.
 fn is_it(mnemonic: &str) -> bool {
     let rest = mnemonic.strip_prefix("it");
     rest.is_some_and(|rest| rest.chars().all(|c| c == 't' || c == 'e'))
@@ -75,11 +77,11 @@ fn lower(mnemonic: &str, operands: &str) -> Vec<String> {
     let (first, rest) = operands.split_once(", ").unwrap_or((operands, ""));
     match mnemonic.split('.').next().unwrap_or("") {
         "b" | "bl" => one("b #-8"),
-        // The return stack knows where to.
+        // The return stack knows the target.
         "bx" if operands == "lr" => one("b #-8"),
         "bx" | "blx" => one(&format!("bx {operands}")),
         name @ ("cbz" | "cbnz") => one(&format!("{name} {first}, #4")),
-        // `[pc, r1]`: a load, and a branch to what it gave.
+        // `[pc, r1]` is a load, and a branch to the loaded address.
         "tbb" | "tbh" => {
             let index = rest.split(", ").next().unwrap_or("").trim_end_matches(']');
             vec![format!("ldrb r12, [sp, {index}]"), "bx r12".to_owned()]
@@ -102,8 +104,8 @@ fn is_one_of(names: &str, name: &str) -> bool {
     names.split(' ').any(|it| it == name)
 }
 
-/// One access for each register of `{r4, r5, pc}`; two words for one of the floating-point unit's.
-/// What loads `pc`, always the last, returns.
+/// One access for each register of `{r4, r5, pc}`, two words for a double register of the
+/// floating-point unit. A load of `pc`, which is always the last, returns.
 fn several(verb: &str, base: &str, registers: &str) -> Vec<String> {
     let base = base.trim_end_matches('!');
     let registers = registers.trim_matches(['{', '}']).split(", ");

@@ -1,4 +1,4 @@
-//! The cases that `benchmark-cases` (in `tests`) writes, each in QEMU: what its stages cost.
+//! Measures the costs of stages in QEMU, for each case that `benchmark-cases` (in `tests`) writes.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,36 +11,36 @@ use super::stages::Stages;
 use crate::process::{self, command};
 use crate::{artifacts, toolchain};
 
-/// The emulator, up to how scripts are handed to the image.
+/// The emulator's command line, up to the script for the image.
 const QEMU: &str = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial none \
     -d plugin -semihosting-config";
 
-/// One script, as `benchmark-cases` describes it.
+/// One script, as described by `benchmark-cases`.
 #[derive(Deserialize)]
 pub struct Case {
     pub work: Work,
     file: PathBuf,
-    /// Columns and rows of the frame, or of the frames that the model is for.
+    /// Columns and rows of the frame, or of the frames for which the model was made.
     pub size: [u64; 2],
     /// Pixel format of that frame: `rgb565`, `yuv422` or `mono`.
     pub format: String,
 }
 
-/// What a case runs.
+/// The work of a case.
 #[derive(Deserialize)]
 pub enum Work {
-    /// One frame, from its first row to the force; what is special about it, empty for the usual
-    /// one.
+    /// One frame, from its first row to the force, with a name for what is special about it; the
+    /// name is empty for the usual frame.
     Frame(String),
     /// One inference of a model with these layer widths.
     Network(Vec<u64>),
-    /// The network of a model that tells places, and so many steps from its answer.
+    /// The network of a model that gives places, and this number of steps from its answer.
     Steps(u64),
-    /// The threshold's table of 64 KiB, made once for each threshold.
+    /// The threshold's table of 64 KiB, which is made once for each threshold.
     Table,
 }
 
-/// Writes all scripts into a folder.
+/// Writes all scripts into a folder; returns their cases.
 pub fn cases(folder: &Path) -> Result<Vec<Case>> {
     let mut command = std::process::Command::new(artifacts::host_program("benchmark-cases")?);
     let lines = process::output(command.current_dir(toolchain::at("")).arg(folder))?;
@@ -48,8 +48,8 @@ pub fn cases(folder: &Path) -> Result<Vec<Case>> {
     cases.context("what benchmark-cases says")
 }
 
-/// Executed instructions, exactly, and what LLVM's model of the core makes of them in memory
-/// without wait states: not a number without LLVM.
+/// The exact number of executed instructions, and their cycles by LLVM's model of the core in
+/// memory without wait states. The cycles are NaN without LLVM.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cost {
     pub instructions: u64,
@@ -59,7 +59,7 @@ pub struct Cost {
 /// The costs of stages.
 pub type Costs = BTreeMap<&'static str, Cost>;
 
-/// Of some stages together, or of all when none is named.
+/// The sum of some stages, or of all stages for an empty list.
 pub fn sum(costs: &Costs, stages: &[&str]) -> Cost {
     let mut sum = Cost::default();
     for (stage, cost) in costs {
@@ -77,29 +77,29 @@ impl Cost {
     }
 }
 
-/// What one case took.
+/// The results of one case.
 pub struct Measured {
     pub case: Case,
     pub stages: Costs,
-    /// What happens once the last band of rows is there.
+    /// The cost after the last band of rows has arrived.
     pub last_band: Cost,
-    /// What runs more often than a network has neurons: its multiplications.
+    /// The cost of the code that runs more often than a network has neurons: its multiplications.
     pub inner_loop: Cost,
 }
 
-/// What the plugin (`xtask/instruction-counter`) recorded of one run.
+/// The plugin's record (`xtask/instruction-counter`) of one run.
 #[derive(Deserialize)]
 pub struct Record {
-    /// The instructions of each block, by their addresses, in order.
+    /// The addresses of each block's instructions, in order.
     pub blocks: Vec<Vec<u64>>,
-    /// Whether the last band of rows was there, the block before, the block, and how often it ran
-    /// after that; the first after a call has none before.
+    /// Whether the last band of rows had arrived, the block before, the block, and the number of
+    /// its executions. The first block after a call has no block before.
     pub runs: Vec<(bool, Option<usize>, usize, u64)>,
 }
 
 impl Record {
-    /// How often each instruction ran. It may lie in several blocks: the first round of a loop is
-    /// one with what comes before it.
+    /// Number of executions of each instruction. It may be in several blocks: the first round of a
+    /// loop forms one with the code before it.
     fn executions(&self) -> BTreeMap<u64, u64> {
         let mut executions = BTreeMap::new();
         for (_, _, block, count) in &self.runs {
@@ -111,7 +111,7 @@ impl Record {
     }
 }
 
-/// The image with all that is needed to measure cases on it.
+/// The image and the programs for measurements on it.
 pub struct Bench {
     image: PathBuf,
     plugin: PathBuf,
@@ -122,7 +122,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Measures on `image`; writes what it needs into `folder`.
+    /// Measures on `image`; writes its files into `folder`.
     pub fn new(image: PathBuf, folder: PathBuf) -> Result<Bench> {
         Ok(Bench {
             plugin: artifacts::instruction_counter(plugin_version()?)?,
@@ -133,7 +133,7 @@ impl Bench {
         })
     }
 
-    /// Runs one case.
+    /// Measures one case.
     pub fn measure(&mut self, case: Case) -> Result<Measured> {
         let record = self.record(&case)?;
         let cycles = match &mut self.model {
@@ -153,7 +153,8 @@ impl Bench {
         let executions = record.executions();
         for &(is_last_band, _, block, instructions) in &record.runs {
             let addresses = &record.blocks[block];
-            // A block that the compiler made of several stages is shared by their instructions.
+            // If the compiler merged several stages into a block, its cost is divided by their
+            // instructions.
             let cycles = cycles[block] * instructions as f64 / addresses.len() as f64;
             for address in addresses {
                 let Some(stage) = self.stages.stage(*address)? else {
@@ -189,7 +190,7 @@ impl Bench {
     }
 }
 
-/// The version of the plugin interface that this QEMU accepts: 1 before QEMU 9, 2 from then on.
+/// The plugin interface's version that this QEMU accepts: 1 before QEMU 9, 2 from then on.
 fn plugin_version() -> Result<u32> {
     let text = process::output(&mut command("qemu-system-arm --version"))?;
     // `QEMU emulator version 7.2.22 (Debian …`

@@ -1,6 +1,6 @@
-//! `cargo xtask bench`: what a frame and an inference cost on the microcontroller: instructions,
-//! counted in QEMU, exactly and repeatably, and cycles that follow from them by LLVM's model of the
-//! core.
+//! `cargo xtask bench`: measures the cost of a frame and of an inference on the microcontroller.
+//! Instructions are counted in QEMU, exactly and repeatably; LLVM's model of the core gives the
+//! cycles.
 
 pub mod board;
 mod cycles;
@@ -39,7 +39,7 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// Measures and prints every case, and holds the counts to the baseline.
+    /// Measures and prints every case, and compares the counts with the baseline.
     pub fn run(&self) -> Result<()> {
         if self.board {
             return board::run();
@@ -72,12 +72,12 @@ impl Bench {
     }
 }
 
-/// Counts that were measured, and by which compiler's image.
+/// Measured counts, with the compiler that built the image.
 #[derive(Debug, Serialize, Deserialize)]
 struct Baseline {
-    /// As `rustc -V` says it.
+    /// The output of `rustc -V`.
     compiler: String,
-    /// Instructions by the item's label.
+    /// Instructions, by the item's label.
     instructions: BTreeMap<String, f64>,
 }
 
@@ -94,7 +94,7 @@ impl Baseline {
         })
     }
 
-    /// Compares what was measured now with this, the committed one, and prints every difference.
+    /// Compares new counts with this committed baseline, and prints every difference.
     fn check(&self, now: &Baseline) -> Result<()> {
         let labels = self.instructions.keys().chain(now.instructions.keys());
         let mut changes = 0;
@@ -126,7 +126,7 @@ impl Baseline {
     }
 }
 
-/// A document with a text between the lines `<!-- NAME: begin … -->` and `<!-- NAME: end -->`.
+/// Replaces the text between `<!-- NAME: begin … -->` and `<!-- NAME: end -->` in a document.
 fn replaced(document: &str, name: &str, text: &str) -> Result<String> {
     let parts = || {
         let begin = document.find(&format!("<!-- {name}: begin"))?;

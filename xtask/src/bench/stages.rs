@@ -1,5 +1,4 @@
-//! Which stage of the sensing an instruction belongs to, told by the source file that it was made
-//! from.
+//! Assigns each instruction to a stage of the sensing, by the source file that it comes from.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -7,10 +6,10 @@ use std::path::Path;
 use addr2line::Loader;
 use anyhow::{Result, anyhow};
 
-/// The modules of each stage, a line each.
+/// The modules of each stage, one stage a line.
 const LISTED: &str = include_str!("../../../sensor/stages.txt");
 
-/// The folders whose modules are the sensing, and what their names begin with: the innermost first.
+/// The folders with the sensing's modules, and the prefix of the modules' names; innermost first.
 const FOLDERS: [(&str, &str); 4] = [
     ("sensor/terms/src", "terms/"),
     ("sensor/src/markers", "markers/"),
@@ -18,7 +17,7 @@ const FOLDERS: [(&str, &str); 4] = [
     ("sensor/src", ""),
 ];
 
-/// The stages, in the order in which a frame goes through them, and at last what is a library's.
+/// The stages in a frame's order, with that of library functions at the end.
 pub fn order() -> impl Iterator<Item = &'static str> {
     let lines = LISTED.lines().filter(|line| !line.starts_with('#'));
     let names = lines.filter_map(|line| Some(line.rsplit_once(':')?.0));
@@ -27,17 +26,17 @@ pub fn order() -> impl Iterator<Item = &'static str> {
 
 /// The stages of an image's instructions.
 ///
-/// An instruction belongs to the innermost function of the sensing that it was inlined from, so
-/// that what the compiler made one function of is still told apart, and what comes from a library
-/// counts for the stage that uses it. Library functions that were not inlined, such as `memset`,
-/// are a stage of their own. What belongs to the harness is left out.
+/// An instruction belongs to the innermost function of the sensing that it was inlined from. Stages
+/// thus stay separate when the compiler merges functions, and inlined library code counts for the
+/// stage that uses it. Library functions that were not inlined, such as `memset`, form their own
+/// stage. Code of the harness is left out.
 pub struct Stages {
     loader: Loader,
     known: HashMap<u64, Option<&'static str>>,
 }
 
 impl Stages {
-    /// Of the image in this file.
+    /// The stages of the image in this file.
     pub fn of_image(image: &Path) -> Result<Stages> {
         let loader = Loader::new(image).map_err(|error| anyhow!("{}: {error}", image.display()))?;
         let known = HashMap::new();
@@ -51,7 +50,7 @@ impl Stages {
         }
         let files = self.files(address);
         let files = files.map_err(|error| anyhow!("{address:#x}: {error}"))?;
-        // Assembly has no line table; its names say what it is.
+        // Assembly has no line table; its function's name gives the stage.
         let named = || stage_of_name(self.loader.find_symbol(address)?);
         let stage = match stage(&files) {
             Some("library") => named().or(Some("library")),
@@ -73,7 +72,7 @@ impl Stages {
     }
 }
 
-/// The stage, or `None` for the harness.
+/// The stage of these source files; `None` for the harness.
 fn stage(files: &[String]) -> Option<&'static str> {
     let known = files.iter().find_map(|file| stage_of_file(file));
     let is_harness = || files.iter().any(|file| file.contains("tests/"));
@@ -97,7 +96,7 @@ fn modules_of(stage: &str) -> impl Iterator<Item = &'static str> {
     of_it.flat_map(|(_, modules)| modules.split_whitespace())
 }
 
-/// Functions in assembly are called `hivtac_` and what they do.
+/// The stage of an assembly function, whose name is `hivtac_` and its work.
 fn stage_of_name(name: &str) -> Option<&'static str> {
     let work = name.strip_prefix("hivtac_")?;
     let stages = [
@@ -150,7 +149,7 @@ mod tests {
                 found.push(format!("{begin}{}", path.file_stem().unwrap().display()));
             }
         }
-        // Folders of their own.
+        // Modules that are folders.
         found.retain(|module| !["markers", "force"].contains(&module.as_str()));
         found.sort();
         assert_eq!(listed, found);

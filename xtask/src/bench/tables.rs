@@ -1,4 +1,4 @@
-//! What was measured, as items, and as tables in Markdown: for people, and for
+//! Formats the measurements as items and as tables in Markdown, for people and for
 //! `docs/results/performance.md`.
 
 use std::fmt::Write;
@@ -12,13 +12,12 @@ use crate::size::grouped;
 /// The core's clock, in MHz.
 const CLOCK_MHZ: f64 = 480.0;
 
-/// One measured item. Its three numbers are per frame, or per inference; those of `mac` are per
+/// One measured item. Its three numbers are for a frame or an inference; those of `mac` are for a
 /// multiplication.
 #[derive(Serialize)]
 pub struct Item {
     /// `threshold`, `blobs`, `frame full`, `latency`, `network …`, `mac` or `table` (the
-    /// threshold's, of 256 × 256 values); of a frame that is not the usual one, what it is follows
-    /// after a comma.
+    /// threshold's, of 256 × 256 values). For a special frame its name follows after a comma.
     pub item: String,
     /// Columns and rows: `320x240`.
     pub frame: String,
@@ -26,7 +25,7 @@ pub struct Item {
     pub format: String,
     /// Executed instructions, exact; also the cycles of a core that issues one at a time.
     pub instructions: f64,
-    /// Cycles by LLVM's model of the Cortex-M7, in memory without wait states; none without LLVM.
+    /// Cycles by LLVM's model of the Cortex-M7, in memory without wait states; NaN without LLVM.
     pub modelled_cycles: f64,
     /// Cycles of a core that always issues two.
     pub floor_cycles: f64,
@@ -34,7 +33,7 @@ pub struct Item {
 
 impl Item {
     fn new(measured: &Measured, item: String, cost: Cost, count: u64) -> Item {
-        // Whole cycles, or thousandths of them for one multiplication.
+        // Whole cycles, or thousandths of a cycle for one multiplication.
         let steps = if count > 1 { 1000.0 } else { 1.0 };
         let each = |number: f64| (number / count as f64 * steps).round() / steps;
         let instructions = cost.instructions as f64;
@@ -90,7 +89,7 @@ pub fn items(measured: &Measured) -> Vec<Item> {
         Work::Network(widths) => {
             let names: Vec<String> = widths.iter().map(u64::to_string).collect();
             let mut items = vec![whole(format!("network {}", names.join("-")))];
-            // The loops of narrow layers say little about the loop.
+            // In narrow layers the loop's cost is mostly overhead.
             if widths.iter().any(|&width| width >= 128) {
                 let count = widths.windows(2).map(|pair| pair[0] * pair[1]).sum();
                 let name = "mac".to_owned();
@@ -101,7 +100,7 @@ pub fn items(measured: &Measured) -> Vec<Item> {
     }
 }
 
-/// Everything: items, and the stages of the frame that the firmware takes.
+/// The tables of all items, and of the stages of the firmware's frame.
 pub fn all(items: &[Item], measured: &[Measured]) -> String {
     let mut text = "| item | frame | format | instructions = single issue | modelled cycles | \
                     floor | per pixel | µs at 480 MHz | per second |\n\
@@ -121,7 +120,7 @@ pub fn all(items: &[Item], measured: &[Measured]) -> String {
     text
 }
 
-/// What follows the moments, and all calls of a library, of which some belong to what comes before.
+/// The stages after the moments. Of the calls of a library some belong to earlier stages.
 const FROM_MOMENTS: [&str; 5] = ["markers", "features", "network", "angles, force", "library"];
 
 fn stages(measured: &Measured) -> String {
@@ -147,8 +146,7 @@ fn cells(numbers: [f64; 3]) -> String {
         .concat()
 }
 
-/// A number that is not negative, with a comma after each three digits, and with up to three
-/// decimals if it has some.
+/// A non-negative number with a comma after each three digits, and up to three decimals.
 pub fn decimal(number: f64) -> String {
     if number.is_nan() {
         return "–".to_owned();
