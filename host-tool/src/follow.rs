@@ -78,7 +78,7 @@ fn connect(address: &Address, patience: Duration, follower: &mut impl Follower) 
             follower.connected_again(hello);
             Some(link)
         }
-        // The loss was reported already; another firmware release was not.
+        // The loss was reported already; a changed version of the firmware was not.
         Err(failure) if failure.kind == Kind::Version => {
             follower.trouble(failure.to_string());
             None

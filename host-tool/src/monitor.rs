@@ -93,7 +93,7 @@ impl Silence {
         self.since + SILENCE
     }
 
-    /// Notes that the device answered: the first time with a message, and starts the time anew.
+    /// Notes that the device answered, with a message the first time, and restarts the time.
     fn tell(&mut self) {
         if !std::mem::replace(&mut self.told, true) {
             let seconds = SILENCE.as_secs();

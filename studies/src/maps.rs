@@ -27,7 +27,7 @@ const DOWN: usize = TOP + SIDE + 54;
 
 /// A map: values at all places, row by row.
 pub struct Map {
-    /// What it shows.
+    /// The text above it.
     pub title: String,
     /// The value where each colour ends and the next begins.
     pub levels: &'static [f64; COLOURS.len() - 1],

@@ -62,7 +62,7 @@ struct Cell {
     place_mm: [f64; 2],
     /// The largest displacement of a marker that is not refused, px.
     off_px: f64,
-    /// The largest errors at such displacements: direction, degrees; |F|, mN; place, mm.
+    /// The largest errors that are not refused: direction, degrees; |F|, mN; place, mm.
     errors: [f64; 3],
     matter: u32,
     refused: u32,

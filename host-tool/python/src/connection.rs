@@ -44,7 +44,7 @@ struct Talk {
 /// A log level and a line.
 type LeveledLine = (u8, String);
 
-/// Messages that arrived while another one was awaited.
+/// Messages that arrived during the wait for another message.
 #[derive(Default)]
 struct Heard {
     samples: VecDeque<SampleNumbers>,

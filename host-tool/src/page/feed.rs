@@ -86,7 +86,7 @@ impl Feed {
         }
     }
 
-    /// The news since the cursor, at most [`AT_ONCE`] samples; moves the cursor.
+    /// The news since the cursor, at most `AT_ONCE` samples; moves the cursor.
     pub fn news(&self, cursor: &mut Cursor) -> News {
         let contents = self.contents();
         let skipped = contents.before.saturating_sub(cursor.sample);

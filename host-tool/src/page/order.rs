@@ -35,7 +35,7 @@ pub enum Answer {
 
 /// An order on its way to the device's thread.
 pub struct Posted {
-    /// What to do.
+    /// The order.
     pub order: Order,
     answer: SyncSender<Answer>,
 }

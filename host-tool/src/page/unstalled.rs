@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 /// Longest time of one write.
 const PATIENCE: Duration = Duration::from_secs(3);
 
-/// A writer that fails with a timeout when a single write takes [`PATIENCE`], even if part of it
+/// A writer that fails with a timeout when a single write takes `PATIENCE`, even if part of it
 /// succeeded.
 pub struct Unstalled<'s>(&'s TcpStream);
 

@@ -7,7 +7,7 @@ use hivtac_terms::down::Down;
 /// Reads a direction of three numbers, `none` or `fixed`.
 ///
 /// # Errors
-/// When it is none of these forms.
+/// When the words have another form.
 pub fn down(words: &[String]) -> Result<Down, Failure> {
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let parsed = match words.as_slice() {

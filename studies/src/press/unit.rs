@@ -123,7 +123,7 @@ impl TestedUnit {
         let camera = self.scene.camera();
         let sides = [camera.width(), camera.height()].map(f64::from);
         let inside = truth.markers.iter().flatten().filter(|marker| {
-            // Largest length of a marker's image, compared with a round one.
+            // A marker's image is at most 1.2 times as long as a round one of its area.
             let far = 1.2 * (marker.area_px2 / std::f64::consts::PI).sqrt() + 2.0;
             let within = |at: f64, side: f64| (far..side - 1.0 - far).contains(&at);
             let [x, y] = marker.centroid_px;

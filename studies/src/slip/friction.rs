@@ -40,7 +40,7 @@ impl Friction {
         }
     }
 
-    /// Its state after a short time, for a force of the tip and the tip's place along its way, mm.
+    /// Its state after `step_s`, s, for the tip's force into the film, N, and place, mm.
     pub fn step(&mut self, normal_n: f64, tip_mm: f64, step_s: f64) -> Meeting {
         let pulled_n = STIFFNESS * (tip_mm - self.now.slipped_mm);
         let holds_n = self.ratio * normal_n;
@@ -57,7 +57,7 @@ impl Friction {
             let moved_mm = beyond_n / STIFFNESS * part;
             self.now.slipped_mm += moved_mm;
             pull_n = STIFFNESS * (tip_mm - self.now.slipped_mm);
-            // Friction cannot hold more than that.
+            // Friction holds no larger force.
             pull_n = pull_n.clamp(-holds_n, holds_n);
             slips = moved_mm.abs() > STICKS * step_s;
         }

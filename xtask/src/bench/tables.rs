@@ -89,7 +89,7 @@ pub fn items(measured: &Measured) -> Vec<Item> {
         Work::Network(widths) => {
             let names: Vec<String> = widths.iter().map(u64::to_string).collect();
             let mut items = vec![whole(format!("network {}", names.join("-")))];
-            // In narrow layers the loop's cost is mostly overhead.
+            // Narrow layers show little of the inner loop's cost.
             if widths.iter().any(|&width| width >= 128) {
                 let count = widths.windows(2).map(|pair| pair[0] * pair[1]).sum();
                 let name = "mac".to_owned();
