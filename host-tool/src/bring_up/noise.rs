@@ -19,7 +19,7 @@ const TARE_FRAMES: u16 = 32;
 const LEAST_FRAMES: usize = 16;
 /// Time for which frames are watched.
 const WATCH: Duration = Duration::from_secs(5);
-/// Times the simulated noise from which noise is reported.
+/// Multiple of the simulated sensor's noise from which noise is reported.
 const MOST_TIMES: f64 = 3.0;
 
 /// Takes a tare, and measures how far the markers of single frames lie from their mean.

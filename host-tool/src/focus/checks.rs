@@ -19,8 +19,8 @@ const RIM_OF_PAIRS_PX: f64 = 4.0;
 /// what the sensing accepts; the other half is for threshold and light.
 const WIDTH_PART: f64 = 0.19;
 /// Least margin of a marker's colour above its threshold, in levels. It is eight standard
-/// deviations (2.5 levels each) of the simulated camera's noise, and no pixel inside a marker is
-/// lost.
+/// deviations (2.5 levels each) of the simulated camera's noise, which keeps every pixel inside a
+/// marker.
 const COLOUR_MARGIN: f64 = 20.0;
 /// Value of the darkest marker, as a multiple of the threshold's lowest value. At half of that
 /// light a marker loses two thirds of its mask and, without a warning, its place.
@@ -28,8 +28,8 @@ pub const DARKEST_VALUES: f64 = 2.0;
 /// Brightest level: RGB565's last but one. Beyond it, levels are not proportional to light, and
 /// rims are weighed by levels.
 const BRIGHTEST: f64 = 247.0;
-/// Largest distance of the pattern's middle from the picture's, px, and largest turn, degrees. They
-/// are three standard deviations of the units for which calibration compensates
+/// Largest distance of the pattern's middle from the picture's, px, and largest turn, degrees. Both
+/// are three standard deviations of the units for which calibration was shown to compensate
 /// (`docs/results/units.md`).
 const SHIFT_PX: f64 = 9.0;
 /// See [`SHIFT_PX`].
