@@ -1,5 +1,5 @@
-//! `hivtac-studies`: runs the project's studies, which compare its results with what is possible,
-//! with units drawn at random, and with the paper's pipeline.
+//! `hivtac-studies`: runs the project's studies. They compare its results with what is possible and
+//! with the paper's pipeline, and test units drawn at random.
 
 mod anywhere;
 mod maps;

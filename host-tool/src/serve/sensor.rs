@@ -45,7 +45,7 @@ pub type Answer = Result<String, String>;
 /// An order to take a tare, with the sender of its answer.
 pub struct TareOrder(pub SyncSender<Answer>);
 
-/// The last direction of gravity for a device that was not passed on yet; `None` if there is none.
+/// The last direction of gravity set for a device; `None` once it was passed on.
 pub type Told = Arc<Mutex<Option<Down>>>;
 
 /// A device that is served.
