@@ -21,7 +21,7 @@ import numpy as np
 
 import hivtac
 
-sys.path.append(str(Path(__file__).parents[2] / "tests/python"))
+sys.path.append(str(Path(__file__).parents[3] / "tests/python"))
 from rig import PATIENCE, Rig, true_force  # noqa: E402
 
 

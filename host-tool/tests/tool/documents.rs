@@ -101,7 +101,7 @@ fn every_refusal_has_its_words_and_what_to_do() {
 /// By the table at the head of the source file with the patterns.
 #[test]
 fn every_pattern_of_the_led_has_its_meaning() {
-    let source = root_file("firmware/src/health.rs");
+    let source = root_file("firmware/src/led.rs");
     let table = source
         .lines()
         .filter_map(|line| line.strip_prefix("//! | "));
