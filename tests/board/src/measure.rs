@@ -5,14 +5,11 @@ use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network as Inference;
 use hivtac_sensor::markers::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::Pixels;
-use hivtac_sensor::pipeline;
 use hivtac_terms::threshold::ByteOrder;
 
 use crate::data::{Frame, Network};
 use crate::dtcm_table::Sensor;
 use crate::meter::Meter;
-
-/// The same type as in the firmware.
 
 /// Widest row, in pixels.
 const ROW: usize = MAX_WIDTH as usize;
