@@ -73,7 +73,7 @@ fn a_recording_is_read_by_pypis_readers_and_played_as_it_was() {
         (&read["profile"], &read["markers"]),
         (&"ros2".into(), &4.into())
     );
-    assert_eq!(read["frame_id"], "hivtac_twin::film");
+    assert_eq!(read["frame_id"], "hivtac_film");
     let samples: usize = read["summary"]["samples"]
         .as_str()
         .unwrap()

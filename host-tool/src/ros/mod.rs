@@ -347,7 +347,7 @@ mod tests {
 
     #[test]
     fn a_stamped_vector_is_read_and_nothing_else() {
-        for frame in ["", "hivtac_twin::film", "hivtac_thumb_film"] {
+        for frame in ["", "hivtac_film", "hivtac_thumb_film"] {
             let mut cdr = Cdr::new();
             cdr.header(1_500_000_000, frame);
             cdr.vector([0.5, -9.0, 1e-3]);
