@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn loads_that_scatter_tell_less() {
         let recipe = Recipe {
-            loads: Loads::Random(10),
+            loads: Loads::Random(5),
             rest: 4,
             ..Recipe::default()
         };

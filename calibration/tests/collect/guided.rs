@@ -121,7 +121,7 @@ fn number(text: &str, words: &str) -> f64 {
 }
 
 #[test]
-#[ignore = "slow: 900 rendered frames and six fits"]
+#[ignore = "slow: 900 rendered frames and a fit"]
 fn a_person_is_led_to_a_units_own_model() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
