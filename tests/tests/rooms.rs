@@ -94,6 +94,42 @@ fn every_package_has_a_room() {
     }
 }
 
+/// Returns the modules of its package that a source names by `crate::`.
+fn modules_used(text: &str) -> BTreeSet<String> {
+    let is_of_name = |c: char| c.is_alphanumeric() || c == '_';
+    let after = text.split("crate::").skip(1);
+    let names = after.map(|rest| rest.chars().take_while(|c| is_of_name(*c)).collect());
+    names.collect()
+}
+
+/// Borders between folders of one package hold, too.
+#[test]
+fn folders_use_only_the_modules_that_the_table_allows() {
+    let text = fs::read_to_string(root().join("docs/architecture.md")).unwrap();
+    let (_, borders) = text.split_once("\n| folder | may use |\n").unwrap();
+    let rows = borders.lines().skip(1).map_while(|line| {
+        let cells: Vec<&str> = line.strip_prefix('|')?.split('|').collect();
+        Some((code_words(cells[0]).first()?.clone(), code_words(cells[1])))
+    });
+    let rows: Vec<_> = rows.collect();
+    assert!(rows.len() >= 5, "{rows:?}");
+    let sources = workspaces::files(".rs");
+    for (folder, mut allowed) in rows {
+        allowed.extend(folder.rsplit('/').next().map(str::to_owned));
+        let is_inside = |file: &&String| file.starts_with(&format!("{folder}/"));
+        let mut used = BTreeSet::new();
+        for file in sources.iter().filter(is_inside) {
+            used.extend(modules_used(
+                &fs::read_to_string(root().join(file)).unwrap(),
+            ));
+        }
+        let own = allowed.last().unwrap();
+        assert!(used.contains(own), "the test can see what {folder} uses");
+        let others: Vec<_> = used.iter().filter(|it| !allowed.contains(it)).collect();
+        assert!(others.is_empty(), "{folder} must not use {others:?}");
+    }
+}
+
 /// Returns the packages that a package's build includes, one per line.
 fn tree_of(package: &str, features: &str) -> String {
     let arguments = [
