@@ -114,12 +114,14 @@ impl Truth {
 
     /// The same film with gravity in another direction.
     fn turned(&self, down: [f64; 3]) -> Truth {
-        let mut design = mounted();
-        design.down = down;
-        let mut truth = Truth::of(&design);
-        truth.film = self.film.changed(&design).unwrap();
-        truth.rest = truth.film.rest();
-        truth
+        let design = Design { down, ..mounted() };
+        let film = self.film.changed(&design).unwrap();
+        Truth {
+            rest: film.rest(),
+            film,
+            made: self.made.clone(),
+            camera: self.camera,
+        }
     }
 
     /// Shift of the dots from their rest position, x and y of each, px.
