@@ -30,6 +30,7 @@ pub use again::Again;
 use again::{BLUR, Look};
 use ahead::Ahead;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::Marker;
@@ -68,6 +69,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     model: Option<Model<'m>>,
     tare: Option<Tare>,
     down: Down,
+    contact_shape: ContactShape,
     pixels: Formats<T>,
     scanner: Scanner<BLOBS>,
     network: Network,
@@ -109,6 +111,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             model: None,
             tare: None,
             down: Down::Fixed,
+            contact_shape: ContactShape::Needle,
             pixels: Formats::CLOSED,
             scanner: Scanner::new(),
             network: Network::new(),
@@ -216,6 +219,21 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             tare.begin_anew();
         }
         self.prepare();
+    }
+
+    /// Sets the shape of what presses from the next frame on; call it between two frames. A radius
+    /// outside [`ContactShape::RADII`] counts as [`ContactShape::Unknown`]. Initially it is
+    /// [`ContactShape::Needle`].
+    pub fn set_contact_shape(&mut self, shape: ContactShape) {
+        self.contact_shape = match shape.is_sound() {
+            true => shape,
+            false => ContactShape::Unknown,
+        };
+    }
+
+    /// The shape of what presses, as far as it is known.
+    pub fn contact_shape(&self) -> ContactShape {
+        self.contact_shape
     }
 
     fn apply_drift(&mut self) {

@@ -11,6 +11,7 @@ extern crate std;
 
 pub mod camera;
 pub mod conditions;
+pub mod contact_shape;
 pub mod down;
 pub mod force;
 pub mod geometry;

@@ -78,6 +78,11 @@ bits! {
     /// gravity or its effect is unknown. If the model knows the effect, standard uncertainties
     /// include it.
     WEIGHT_UNKNOWN = 24, "weight_unknown";
+    /// One contact explains the markers' positions badly, so standard uncertainties are widened by
+    /// what is left over.
+    LOOSELY_EXPLAINED = 25, "loosely_explained";
+    /// One marker is not seen. The force is that of the other three, which nothing checks.
+    MARKER_LOST = 26, "marker_lost";
 }
 
 impl Status {
