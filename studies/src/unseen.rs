@@ -127,6 +127,7 @@ impl<'m> Film<'m> {
         let variances = noise.map(|noise| noise * noise);
         let observed = Observed {
             hanging: None,
+            pressing: None,
             drift: None,
             moved: shown.moved,
             noise: std::array::from_fn(|k| forward.rest_image.noise(k, variances)),

@@ -7,7 +7,7 @@ use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 use super::matrix::cholesky;
 
 /// Places range to this, ±, mm.
-const END_MM: f64 = 4.2;
+pub const END_MM: f64 = 4.2;
 /// Knots along the size, along y and along x, for a calibrated unit.
 pub const KNOTS: [u8; 3] = [5, 5, 5];
 /// The same where covariances do not depend on the place.

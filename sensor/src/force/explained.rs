@@ -8,6 +8,7 @@ use crate::force::forward::{
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
 use crate::force::rest::Rest;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
@@ -26,12 +27,16 @@ pub struct Resting {
     drift: Option<Covariance>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     hanging: Option<Hanging>,
+    shape: ContactShape,
 }
 
 /// Largest usual residual of markers that are known less well, relative to its variance. Their
 /// uncertainty is stated for the worst of them, which are few: at a fifth of the light, 1 of 1,000
 /// frames exceeds this.
 const UNEXPLAINED_BLURRED: f32 = 5.0;
+/// Largest standard uncertainties of a force that is still of use: of the direction, m°; of |F|, in
+/// parts of it; and of the place, µm.
+const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
 /// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
@@ -61,6 +66,11 @@ impl Resting {
         let mut resting = Resting::new(forward, rest, &flat, &model.rest, !model.is_simulated());
         resting.hanging = turned.and_then(|turned| forward.hanging(turned, resting.is_own));
         Some(resting)
+    }
+
+    /// Sets the shape of what presses. Initially it is the tip of the model's tables.
+    pub fn set_contact_shape(&mut self, shape: ContactShape) {
+        self.shape = shape;
     }
 
     /// Sets how far the film may rest from this rest position.
@@ -110,6 +120,7 @@ impl Resting {
             areas: rest.areas.map(|area| area as f32),
             drift: None,
             hanging: None,
+            shape: ContactShape::Needle,
         }
     }
 
@@ -168,12 +179,12 @@ impl Resting {
 
     /// How the markers moved from rest. Compiled once, because the near memory is scarce.
     #[inline(never)]
-    fn observed(
-        &self,
-        forward: &Forward<'_>,
+    fn observed<'a>(
+        &'a self,
+        forward: &Forward<'a>,
         markers: &[Marker; 4],
         frame: FrameNoise,
-    ) -> Observed<'_> {
+    ) -> Observed<'a> {
         let (mut moved, mut noise) = (Column::default(), [[0.0; 3]; DOTS]);
         let scale = self.mounting.scale();
         let blur = scale * frame.blur.to_f32();
@@ -205,6 +216,7 @@ impl Resting {
             noise,
             drift,
             hanging,
+            pressing: (forward.shapes).and_then(|shapes| shapes.pressing(self.shape)),
         }
     }
 
@@ -228,9 +240,10 @@ impl Resting {
         )
     }
 
-    /// Returns the force of a load that was found in a frame of this noise, and its status. The
-    /// status is [`Status::UNEXPLAINED`] if the load explains the markers badly, or is the largest
-    /// in the tables.
+    /// Returns the force of a load that was found in a frame of this noise, and its status. If the
+    /// load explains the markers badly, its uncertainties are widened and the status is
+    /// [`Status::LOOSELY_EXPLAINED`]. It is [`Status::UNEXPLAINED`] if these are then too large to
+    /// be of use, or the load is the largest in the tables.
     pub fn told(
         &self,
         forward: &Forward<'_>,
@@ -241,8 +254,10 @@ impl Resting {
         let (force, by_noise) = force(&forward.strength(self.is_own), estimate);
         let mut status = trust(&force, by_noise, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
-        if is_blurred || !estimate.is_explained() {
+        if is_blurred || !estimate.is_explained() && !is_of_use(&force) {
             status |= Status::UNEXPLAINED;
+        } else if !estimate.is_explained() {
+            status |= Status::LOOSELY_EXPLAINED;
         }
         // Where the tables end, a larger force may explain the markers better.
         if estimate.pose.size >= forward.limits.size {
@@ -250,7 +265,7 @@ impl Resting {
         }
         // A load that does not explain the markers is no evidence of a contact.
         if status.contains(Status::UNEXPLAINED) {
-            status.0 &= !Status::CONTACT.0;
+            status.0 &= !(Status::CONTACT | Status::LOOSELY_EXPLAINED).0;
         }
         (force, status)
     }
@@ -267,6 +282,13 @@ impl Resting {
         let estimate = self.estimate(forward, markers, noise, output);
         self.told(forward, range, noise, &estimate)
     }
+}
+
+fn is_of_use(force: &Force) -> bool {
+    let (direction, magnitude, place) = OF_USE;
+    force.direction_sigma.0 <= direction
+        && force.magnitude_sigma.0 <= force.magnitude.0.unsigned_abs() / magnitude
+        && force.place.is_some_and(|at| at.sigma.0 <= place)
 }
 
 /// Returns the force of a load, and the standard uncertainty of |F| by noise.

@@ -29,8 +29,10 @@ const AGAIN: Status = Status(
         | Status::MARKERS_IMPLAUSIBLE.0
         | Status::IMAGE_SATURATED.0
         | Status::IMAGE_DARK.0
-        | Status::UNEXPLAINED.0,
+        | BADLY.0,
 );
+/// One contact does not explain the markers, or badly.
+const BADLY: Status = Status(Status::UNEXPLAINED.0 | Status::LOOSELY_EXPLAINED.0);
 /// Reasons for which no second look helps.
 const NEVER: Status = Status(Status::NO_FORCE.0 & !AGAIN.0);
 /// A frame has specks if at least one pixel in this many is removed from its mask: 32 at 320×240.
@@ -130,7 +132,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let is_dim = 4 * first.set_pixels < DIM_FOURTHS * set_pixels
             && !status.contains(Status::BLOB_OVERFLOW);
         let is_noisy = self.noise.of_frame(Px(0)).times >= NOISY;
-        (has_specks || (is_dim || is_noisy) && !status.contains(Status::UNEXPLAINED))
+        (has_specks || (is_dim || is_noisy) && !status.intersects(BADLY))
             && specks <= pixels / MOST_SPECKS_PART
             && holes <= set_pixels / HOLES_PART
     }

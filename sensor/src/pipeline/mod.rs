@@ -229,6 +229,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             true => shape,
             false => ContactShape::Unknown,
         };
+        self.apply_contact_shape();
+    }
+
+    fn apply_contact_shape(&mut self) {
+        let prepared = self.prepared.as_mut();
+        if let Some(resting) = prepared.and_then(|prepared| prepared.resting.as_mut()) {
+            resting.set_contact_shape(self.contact_shape);
+        }
     }
 
     /// The shape of what presses, as far as it is known.
@@ -411,6 +419,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             rest,
         });
         self.apply_drift();
+        self.apply_contact_shape();
     }
 
     fn standing_status(&self) -> Status {

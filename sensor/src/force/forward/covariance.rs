@@ -77,20 +77,36 @@ impl<'a> CovarianceGrid<'a> {
     /// k of n+1 is at (k/n)² of the largest size. Factors, not covariances, are interpolated: any
     /// sum of factors is the factor of a covariance.
     pub fn at(&self, pose: &Pose, limits: &Limits) -> Covariance {
+        let mut factor = Covariance::default();
+        self.around(pose, limits, |knot, part| {
+            add(&mut factor, self.knots.get(knot), part);
+        });
+        squared(&factor)
+    }
+
+    /// Calls `each` with the number and the weight of every knot around a load.
+    pub(super) fn around(&self, pose: &Pose, limits: &Limits, mut each: impl FnMut(usize, f32)) {
         let [sizes, lines, places] = self.counts.map(usize::from);
         let along = |at_mm: f32| 0.5 + 0.5 * at_mm / self.end_mm;
         let [x, y] = pose.place_mm.map(along);
         let size = sqrt(limited(pose.size / limits.size, 0.0, 1.0));
-        let mut factor = Covariance::default();
         for (i, of_size) in between(size, sizes) {
             for (j, of_y) in between(y, lines) {
                 for (k, of_x) in between(x, places) {
-                    let knot = self.knots.get((i * lines + j) * places + k);
-                    add(&mut factor, knot, of_size * of_y * of_x);
+                    each((i * lines + j) * places + k, of_size * of_y * of_x);
                 }
             }
         }
-        squared(&factor)
+    }
+
+    /// The largest place, mm.
+    pub(super) fn end_mm(&self) -> f32 {
+        self.end_mm
+    }
+
+    /// Number of knots.
+    pub fn knots(&self) -> usize {
+        self.knots.len()
     }
 }
 
@@ -149,6 +165,15 @@ fn squared(factor: &Covariance) -> Covariance {
     covariance
 }
 
+/// Adds the covariance of a motion along a column with a standard uncertainty.
+pub(super) fn add_square(covariance: &mut Covariance, along: &Column, sigma: f32) {
+    for (i, row) in covariance.iter_mut().enumerate() {
+        for (sum, part) in row[..=i].iter_mut().zip(along) {
+            *sum += sigma * along[i] * (sigma * part);
+        }
+    }
+}
+
 /// Returns the two of `count` evenly spaced knots from 0 to 1 around a value, each with its weight.
 pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
     let last = count - 1;
@@ -199,18 +224,18 @@ fn less(whole: f32, parts: &[f32], others: &[f32]) -> f32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use proptest::prelude::*;
     use std::vec::Vec;
 
-    const LIMITS: Limits = Limits {
+    pub const LIMITS: Limits = Limits {
         size: 0.8,
         tilt: 0.67,
     };
-    const COUNTS: [u8; 3] = [3, 2, 4];
+    pub const COUNTS: [u8; 3] = [3, 2, 4];
 
-    fn pose(size: f32, place_mm: [f32; 2]) -> Pose {
+    pub fn pose(size: f32, place_mm: [f32; 2]) -> Pose {
         Pose {
             size,
             tilt: [0.1, -0.2],
@@ -219,7 +244,7 @@ mod tests {
     }
 
     /// Bytes of knots whose entries `entry(knot, index)` gives, in steps of 10⁻⁵.
-    fn knots(entry: impl Fn(usize, usize) -> i16) -> Vec<u8> {
+    pub fn knots(entry: impl Fn(usize, usize) -> i16) -> Vec<u8> {
         let mut bytes = Vec::new();
         for knot in 0..COUNTS.map(usize::from).iter().product() {
             bytes.extend(1e-5f32.to_le_bytes());

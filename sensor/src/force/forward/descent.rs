@@ -205,6 +205,9 @@ impl Linearization {
             let stiffness = &forward.stiffness;
             hanging.add_to(&pose, stiffness, limits, &mut prediction, &mut covariance);
         }
+        if let Some(pressing) = &observed.pressing {
+            pressing.add_to(&pose, limits, &mut prediction, &mut covariance);
+        }
         let Prediction { moved, slopes } = prediction;
         let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
         let white = White::new(&covariance, &slopes, &left, &pose);

@@ -5,6 +5,7 @@ use super::descent::Descent;
 use super::mounting::Mounting;
 use super::pose::{Pose, sine_over_angle_and_cosine};
 use super::predict::DOTS;
+use super::shapes::Pressing;
 use super::solve::{Column, Solved};
 use super::weight::Hanging;
 use super::{Forward, Strength};
@@ -31,6 +32,8 @@ pub struct Observed<'a> {
     pub drift: Option<&'a Covariance>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     pub hanging: Option<&'a Hanging>,
+    /// What presses; `None` for the tables' tip.
+    pub pressing: Option<Pressing<'a>>,
 }
 
 impl Observed<'_> {

@@ -20,6 +20,7 @@
 //! | `descent` | steps downhill from a guess |
 //! | `covariance` | what is unknown of the unit, in addition to the noise |
 //! | `weight` | the effect of the film's own weight |
+//! | `shapes` | the effect of the shape of what presses |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 
 use covariance::between;
@@ -33,6 +34,7 @@ mod estimate;
 mod mounting;
 mod pose;
 mod predict;
+mod shapes;
 mod solve;
 mod table;
 mod terms;
@@ -46,6 +48,7 @@ pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED, stated
 pub use mounting::{CameraMotion, Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
 pub use predict::{DOTS, MOST_FUNCTIONS, Markers, Prediction, Tables};
+pub use shapes::{Pressing, SHIFT_KNOT, SHIFTS, Shapes, span};
 pub(crate) use solve::square;
 pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
 pub use table::{Answer, OUTPUTS, Place, Table};
@@ -86,6 +89,8 @@ pub struct Forward<'a> {
     pub other: Option<Others<'a>>,
     /// The effect of the film's own weight; `None` if the file has no such section.
     pub weight: Option<Weight<'a>>,
+    /// The effect of the shape of what presses; `None` if the file has no such section.
+    pub shapes: Option<Shapes<'a>>,
 }
 
 /// What is known of units other than the one that a model was made on.

@@ -6,7 +6,7 @@
 //! Δ and of gravity along the film are computed once, when gravity changes. Each frame sums the
 //! rest over the load.
 
-use super::covariance::{Covariance, between};
+use super::covariance::{Covariance, add_square, between};
 use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, limited};
 use super::predict::Prediction;
@@ -367,14 +367,5 @@ impl Hanging {
             *by_size = softer * value + steeper * (to - from);
         }
         (more, by_size)
-    }
-}
-
-/// Adds the covariance of a motion along a column with a standard uncertainty.
-fn add_square(covariance: &mut Covariance, along: &Column, sigma: f32) {
-    for (i, row) in covariance.iter_mut().enumerate() {
-        for (sum, part) in row[..=i].iter_mut().zip(along) {
-            *sum += sigma * along[i] * (sigma * part);
-        }
     }
 }

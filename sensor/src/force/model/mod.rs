@@ -29,7 +29,9 @@ pub use aligned::AlignedFile;
 pub use conditions::{Conditions, Origin};
 pub use error::ModelError;
 #[cfg(any(test, feature = "encode"))]
-pub use forward::{CovarianceSpec, ForwardSpec, OthersSpec, TableSpec, TablesSpec, WeightSpec};
+pub use forward::{
+    CovarianceSpec, ForwardSpec, OthersSpec, ShapesSpec, TableSpec, TablesSpec, WeightSpec,
+};
 pub(crate) use uncertainty::{LARGEST_PLACE_UNCERTAINTY, NO_DIRECTION};
 pub use uncertainty::{LARGEST_UNCERTAINTY, Uncertainty, UncertaintyKnot};
 
