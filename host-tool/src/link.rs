@@ -248,7 +248,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::Inspect => "inspect",
         Request::GetSettings => "get settings",
         Request::SetName(_) => "set name",
-        Request::SetTemporal(_) => "set limits of contact, slip, filter and re-zeroing",
+        Request::SetTemporal(_) => "set limits of touch, slip, filter and re-zeroing",
         Request::SetTare(_) => "set tare",
         Request::Keep(_) => "keep settings",
         Request::BeginModel { .. } => "begin model",

@@ -82,9 +82,9 @@ pub enum SetCommand {
     /// A contact also begins only with three times the force's standard uncertainty, and ends below
     /// half of that.
     ///
-    /// Example: hivtac settings set contact --begins 5 --ends 3
+    /// Example: hivtac settings set touch --begins 5 --ends 3
     #[command(group = clap::ArgGroup::new("limit").required(true).multiple(true))]
-    Contact {
+    Touch {
         #[command(flatten)]
         target: Target,
         /// |F| with which it begins, mN; 2 by default
@@ -295,13 +295,13 @@ impl SetCommand {
             SetCommand::Rate { target, rate } => {
                 return Conversation::begin(&target)?.set_camera(camera::Change::Rate(rate));
             }
-            SetCommand::Contact {
+            SetCommand::Touch {
                 target,
                 begins,
                 ends,
             } => {
                 let [begins, ends] = [begins, ends].map(|limit| limit.map(UnsignedMicroNewtons));
-                (target, Change::Contact { begins, ends })
+                (target, Change::Touch { begins, ends })
             }
             SetCommand::Slip {
                 target,

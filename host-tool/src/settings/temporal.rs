@@ -1,4 +1,4 @@
-//! Contact, slip, filter, re-zeroing and creep as JSON, as lines, and as changes by `settings set`.
+//! Touch, slip, filter, re-zeroing and creep as JSON, as lines, and as changes by `settings set`.
 //! They decide how forces are followed from frame to frame.
 
 use hivtac_host::decimal::Decimal;
@@ -172,7 +172,7 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
     };
     [
         (
-            "contact",
+            "touch",
             format!(
                 "from {} mN on, until below {} mN",
                 Decimal::thousandths(contact.begins.0),
@@ -207,7 +207,7 @@ fn creep_text(creep: &Creep) -> String {
 #[derive(Clone, Copy, Debug)]
 pub enum Change {
     /// A change of [`ContactLimits`].
-    Contact {
+    Touch {
         /// The force with which a contact begins.
         begins: Option<UnsignedMicroNewtons>,
         /// The force below which it ends.
@@ -246,7 +246,7 @@ impl Change {
     pub fn of(self, mut settings: TemporalSettings) -> TemporalSettings {
         let TemporalSettings { contact, slip, .. } = &mut settings;
         match self {
-            Change::Contact { begins, ends } => {
+            Change::Touch { begins, ends } => {
                 contact.begins = begins.unwrap_or(contact.begins);
                 contact.ends = ends.unwrap_or(contact.ends);
             }
@@ -276,7 +276,7 @@ impl Change {
     /// The name of the changed setting, as in [`texts`].
     pub fn name(self) -> &'static str {
         match self {
-            Change::Contact { .. } => "contact",
+            Change::Touch { .. } => "touch",
             Change::Slip { .. } => "slip",
             Change::Filter(_) => "filter",
             Change::Rezero(_) => "rezero",
@@ -336,7 +336,7 @@ mod tests {
             total: None,
         };
         let changes = [
-            Change::Contact {
+            Change::Touch {
                 begins: Some(UnsignedMicroNewtons(3_500)),
                 ends: None,
             },
@@ -389,8 +389,8 @@ mod tests {
 
     #[test]
     fn a_person_reads_units() {
-        let [contact, slip, filter, rezero, creep] = texts(&unusual()).map(|(_, text)| text);
-        assert_eq!(contact, "from 3.500 mN on, until below 1.000 mN");
+        let [touch, slip, filter, rezero, creep] = texts(&unusual()).map(|(_, text)| text);
+        assert_eq!(touch, "from 3.500 mN on, until below 1.000 mN");
         assert_eq!(
             slip,
             "60 µm within 30 ms, from 0.100 of the normal force on"

@@ -37,7 +37,7 @@ fn settings_for_a_person() {
         "name       thumb (kept)\n\
          threshold  rgb565, H 170–10, S 100–255, V 45–255 (kept)\n\
          tare       taken (until restart)\n\
-         contact    from 2.000 mN on, until below 1.000 mN (kept)\n\
+         touch      from 2.000 mN on, until below 1.000 mN (kept)\n\
          slip       60 µm within 50 ms, from 0.100 of the normal force on (kept)\n\
          filter     none: each frame's own force (kept)\n\
          rezero     after 10.000 s without a contact, by 0.005 px a second, 0.200 px in all \
@@ -245,14 +245,14 @@ fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
 #[test]
 fn limits_are_changed_one_by_one_and_kept() {
     let usual = TemporalSettings::default();
-    let (contact, text) = changed(&["settings", "set", "contact", "--begins", "3.5"]);
+    let (touch, text) = changed(&["settings", "set", "touch", "--begins", "3.5"]);
     assert_eq!(
         text,
-        "contact set and kept: from 3.500 mN on, until below 1.000 mN\n"
+        "touch set and kept: from 3.500 mN on, until below 1.000 mN\n"
     );
     let mut expected = usual;
     expected.contact.begins.0 = 3_500;
-    assert_eq!(contact, expected);
+    assert_eq!(touch, expected);
     let (slip, _) = changed(&[
         "settings",
         "set",
@@ -291,7 +291,7 @@ fn limits_are_changed_one_by_one_and_kept() {
 #[test]
 fn a_limit_out_of_its_range_changes_nothing() {
     for (arguments, word) in [
-        (["contact", "--ends", "3"], "0.001 mN to where it begins"),
+        (["touch", "--ends", "3"], "0.001 mN to where it begins"),
         (["slip", "--within", "5"], "10 to 100 ms"),
         (["filter", "low-pass", "--ms=0"], "1 to 10000 ms"),
         (["creep", "0.1,0.2", "--json"], "0 to 15 %"),
@@ -304,7 +304,7 @@ fn a_limit_out_of_its_range_changes_nothing() {
         assert_eq!(commands(&device), [Request::GetSettings]);
     }
     for arguments in [
-        ["contact", "--begins", "0.0001"],
+        ["touch", "--begins", "0.0001"],
         ["filter", "low-pass", "--ms=x"],
         ["filter", "median-of-three", "--ms=3"],
         ["rezero", "off", "--rate=0.01"],
