@@ -72,6 +72,10 @@ async fn carry_out(id: u16, request: Request) -> Option<Outcome> {
             settings::set_name(name);
             Some(Outcome::Done)
         }
+        Request::SetContactShape(shape) => {
+            let set = settings::set_contact_shape(shape);
+            Some(set.err().unwrap_or(Outcome::Done))
+        }
         Request::SetTemporal(settings) => order(Order::SetTemporal { id, settings }),
         // The memory task is reading the last upload.
         Request::BeginModel { .. } if memory::is_ordered() => Some(Outcome::Busy),

@@ -156,6 +156,10 @@ fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
     sensor.set_motion(camera::MOTION);
     settings::set_down(kept.down);
     sensor.set_down(settings::down());
+    if settings::set_contact_shape(kept.contact_shape).is_err() {
+        defmt::warn!("the kept radius of what presses is out of range");
+    }
+    sensor.set_contact_shape(settings::contact_shape());
     let tare = kept.tare.as_ref();
     match tare.map(|tare| settings::rest(tare, sensor.settings())) {
         Some(Ok(rest)) => {

@@ -21,6 +21,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_wire::kept::{KeptModel, MAX_BYTES, Record};
 use hivtac_wire::message::{DeviceMessage, LogLevel, ModelSource, Outcome};
@@ -185,6 +186,7 @@ impl Memory {
             rezeroed,
             seen,
             down,
+            contact_shape,
             ..
         } = used;
         let drift = tare.zip(self.record.tare);
@@ -204,6 +206,7 @@ impl Memory {
                 drift,
                 camera: camera::report(),
                 down,
+                contact_shape,
             }));
         }
         Outcome::Done
@@ -218,6 +221,7 @@ impl Memory {
             temporal: used.temporal == self.record.temporal,
             camera: camera::report().settings == self.record.camera,
             down: used.down == self.record.down,
+            contact_shape: used.contact_shape == self.record.contact_shape,
         }
     }
 
@@ -243,6 +247,9 @@ impl Memory {
         }
         if selection.down {
             record.down = used.down;
+        }
+        if selection.contact_shape {
+            record.contact_shape = used.contact_shape;
         }
         if record == self.record && self.is_kept {
             return Outcome::Done;
@@ -302,6 +309,8 @@ impl Memory {
         self.save_or_say(Record::default()).await?;
         settings::set_name(Name::new());
         settings::set_down(Down::default());
+        // A new device's shape has no radius that could be out of range.
+        let _ = settings::set_contact_shape(ContactShape::default());
         if camera::report().settings != CameraSettings::default() {
             capture_task::set_afresh();
         }

@@ -163,6 +163,7 @@ impl PipelineTask {
                 self.sensor.forget_frame();
             }
             self.sensor.set_down(settings::down());
+            self.sensor.set_contact_shape(settings::contact_shape());
             self.sensor.begin_frame();
         }
         let fetched = self.bands.fetch(band, capture::finished);

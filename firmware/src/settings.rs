@@ -9,6 +9,7 @@ use hivtac_sensor::force::forward::CameraMotion;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_terms::angle::atan2;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
@@ -31,6 +32,11 @@ static NAME: CriticalSectionMutex<Cell<Name>> = CriticalSectionMutex::new(Cell::
 /// reset to a new device's settings. Read by the memory task and, before each frame, by the
 /// pipeline.
 static DOWN: CriticalSectionMutex<Cell<Down>> = CriticalSectionMutex::new(Cell::new(Down::Fixed));
+
+/// The shape of what presses. Written at boot, by the USB tasks, and by the memory task on a reset
+/// to a new device's settings. Read by the memory task and, before each frame, by the pipeline.
+static CONTACT_SHAPE: CriticalSectionMutex<Cell<ContactShape>> =
+    CriticalSectionMutex::new(Cell::new(ContactShape::Unknown));
 
 /// The pipeline's settings.
 #[derive(Clone)]
@@ -96,6 +102,23 @@ pub fn down() -> Down {
     DOWN.lock(Cell::get)
 }
 
+/// Sets the shape of what presses, from the next frame on.
+///
+/// # Errors
+/// [`Outcome::InvalidArgument`] if its radius is out of range; then nothing changes.
+pub fn set_contact_shape(shape: ContactShape) -> Result<(), Outcome> {
+    if !shape.is_sound() {
+        return Err(Outcome::InvalidArgument);
+    }
+    CONTACT_SHAPE.lock(|cell| cell.set(shape));
+    Ok(())
+}
+
+/// Returns the shape of what presses.
+pub fn contact_shape() -> ContactShape {
+    CONTACT_SHAPE.lock(Cell::get)
+}
+
 fn copy<T: Clone + Default>(cell: &Cell<T>) -> T {
     let value = cell.take();
     cell.set(value.clone());
@@ -118,6 +141,8 @@ pub struct InUse {
     pub temporal: TemporalSettings,
     /// The known direction of gravity.
     pub down: Down,
+    /// The shape of what presses.
+    pub contact_shape: ContactShape,
     /// The threshold of the model.
     of_model: Option<Threshold>,
 }
@@ -144,6 +169,7 @@ pub fn in_use() -> Option<InUse> {
         threshold: settings.threshold,
         tare: tare.map(|(rest, down)| position(&rest, down, &settings)),
         down: down(),
+        contact_shape: contact_shape(),
         rezeroed,
         seen,
         temporal,

@@ -2,10 +2,11 @@
 //!
 //! Connection: addresses ([`port`]), conversation ([`link`]), sensors by name ([`named`]),
 //! interruption ([`stop`]), errors ([`failure`]). Pictures: of the device ([`frame`], [`look`]), in
-//! files ([`picture`], [`raw`], [`files`]). Values: direction of gravity ([`down`]), thresholds
-//! ([`threshold`]), forces ([`force_fields`], [`decimal`]), texts ([`shown`]). Also the live page
-//! ([`page`]) and recordings ([`recording`]).
+//! files ([`picture`], [`raw`], [`files`]). Values: direction of gravity ([`down`]), shape of what
+//! presses ([`contact_shape`]), thresholds ([`threshold`]), forces ([`force_fields`], [`decimal`]),
+//! texts ([`shown`]). Also the live page ([`page`]) and recordings ([`recording`]).
 
+pub mod contact_shape;
 pub mod decimal;
 pub mod down;
 pub mod failure;

@@ -260,6 +260,7 @@ fn name_of(request: &Request) -> &'static str {
         Request::GetHealth => "get health",
         Request::StartLoader => "start loader",
         Request::SetCamera(_) => "set the camera",
+        Request::SetContactShape(_) => "set the shape of what presses",
     }
 }
 

@@ -207,7 +207,8 @@ impl Player {
             | Request::TareAnyway { .. }
             | Request::GetHealth
             | Request::StartLoader
-            | Request::SetCamera(_) => Outcome::Unsupported,
+            | Request::SetCamera(_)
+            | Request::SetContactShape(_) => Outcome::Unsupported,
         };
         self.send(&DeviceMessage::Reply(Reply { id, outcome }));
     }

@@ -4,6 +4,7 @@
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
@@ -257,6 +258,9 @@ fn rest() -> RestPosition {
 /// Direction of gravity.
 const DOWN: Direction = Direction([0, 600, -800]);
 
+const ROUND: ContactShape = ContactShape::Round(Micrometres(1_500));
+const FLAT: ContactShape = ContactShape::Flat(Micrometres(2_000));
+
 const NAME_AND_TARE: Selection = Selection {
     name: true,
     threshold: false,
@@ -264,6 +268,7 @@ const NAME_AND_TARE: Selection = Selection {
     temporal: true,
     camera: true,
     down: false,
+    contact_shape: true,
 };
 
 const CAMERA: CameraSettings = CameraSettings {
@@ -300,6 +305,7 @@ fn settings() -> DeviceMessage {
         drift: Some(Px(20_316)),
         camera: camera(),
         down: Down::Told(DOWN),
+        contact_shape: FLAT,
     })
 }
 
@@ -484,6 +490,22 @@ fn host_messages() -> BTreeMap<String, HostMessage> {
             command(23, Request::SetCamera(CameraSettings::default())),
         ),
         (
+            "set-contact-shape-needle",
+            command(24, Request::SetContactShape(ContactShape::Needle)),
+        ),
+        (
+            "set-contact-shape-round",
+            command(24, Request::SetContactShape(ROUND)),
+        ),
+        (
+            "set-contact-shape-flat",
+            command(24, Request::SetContactShape(FLAT)),
+        ),
+        (
+            "set-contact-shape-unknown",
+            command(24, Request::SetContactShape(ContactShape::Unknown)),
+        ),
+        (
             "tare-anyway",
             command(7, Request::TareAnyway { frames: 128 }),
         ),
@@ -547,7 +569,7 @@ fn every_kind_of_message_has_a_vector() {
             HostMessage::Hello(_) | HostMessage::Down(_) => None,
         })
         .collect();
-    assert_eq!(requests.len(), 23);
+    assert_eq!(requests.len(), 24);
 }
 
 /// The hellos are of an earlier and of a later version: both sides read the sender's version, and

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x16857A083232EB66
+SCHEMA = 0x1D09520C05A29EFE
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -135,6 +135,8 @@ REST = [
 ]
 
 
+# Name, threshold, tare, temporal, camera, down, contact_shape.
+KEPT = [1, 0, 1, 1, 1, 0, 1]
 NO_FILTER = [raw("filter: None", [0])]
 LOW_PASS = [raw("filter: LowPass", [1]), unsigned("time_constant_ms", 20)]
 LIMITS = [
@@ -313,7 +315,7 @@ DEVICE = {
         string("name", "thumb"),
         *RED,
         *REST,
-        raw("kept: name, not threshold, tare, temporal, camera, not down", [1, 0, 1, 1, 1, 0]),
+        raw("kept: all but threshold and down", KEPT),
         raw("found: Settings", [1]),
         unsigned("erases", 3),
         unsigned("failures", 0),
@@ -331,6 +333,8 @@ DEVICE = {
         *at_rate("quarter", 39, 93, 25_620),
         raw("down: Told", [2]),
         *DOWN,
+        raw("contact_shape: Flat", [2]),
+        unsigned("radius_um", 2_000),
     ],
     "health": [
         raw("Health", [10]),
@@ -388,7 +392,7 @@ HOST = {
     "set-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), *REST],
     "forget-tare": COMMAND + [unsigned("id", 13), raw("SetTare", [11]), raw("tare: None", [0])],
     "keep": COMMAND + [unsigned("id", 14), raw("Keep", [12])]
-    + [raw("name, not threshold, tare, temporal, camera, not down", [1, 0, 1, 1, 1, 0])],
+    + [raw("all but threshold and down", KEPT)],
     "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
@@ -406,6 +410,16 @@ HOST = {
     "set-camera": COMMAND + [unsigned("id", 23), raw("SetCamera", [22]), *CAMERA],
     "set-camera-automatic": COMMAND + [unsigned("id", 23), raw("SetCamera", [22])]
     + [raw("exposure: None", [0]), raw("gain: None", [0]), raw("rate: Full", [0])],
+    "set-contact-shape-needle": COMMAND
+    + [unsigned("id", 24), raw("SetContactShape", [23]), raw("Needle", [0])],
+    "set-contact-shape-round": COMMAND
+    + [unsigned("id", 24), raw("SetContactShape", [23]), raw("Round", [1]),
+       unsigned("radius_um", 1_500)],
+    "set-contact-shape-flat": COMMAND
+    + [unsigned("id", 24), raw("SetContactShape", [23]), raw("Flat", [2]),
+       unsigned("radius_um", 2_000)],
+    "set-contact-shape-unknown": COMMAND
+    + [unsigned("id", 24), raw("SetContactShape", [23]), raw("Unknown", [3])],
     "reset": COMMAND + [unsigned("id", 20), raw("Reset", [18])],
 }
 

@@ -7,6 +7,7 @@ use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
@@ -109,6 +110,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             drift: Some(Px(i32::MIN)),
             camera: longest_camera_report(),
             down: LONGEST_DOWN,
+            contact_shape: LONGEST_CONTACT_SHAPE,
         }),
         DeviceMessage::Health(Health {
             reset: ResetReason::Other,
@@ -177,6 +179,9 @@ pub fn longest_rest() -> RestPosition {
 
 /// A direction, each number with its longest encoding.
 pub const LONGEST_DOWN: Down = Down::Told(Direction([i16::MIN; 3]));
+
+/// A shape of what presses, its radius with its longest encoding.
+pub const LONGEST_CONTACT_SHAPE: ContactShape = ContactShape::Flat(Micrometres(u32::MAX));
 
 /// Temporal settings, each number with its longest encoding.
 pub fn longest_temporal() -> TemporalSettings {
@@ -289,6 +294,7 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         Request::GetHealth,
         Request::StartLoader,
         Request::SetCamera(longest_camera()),
+        Request::SetContactShape(LONGEST_CONTACT_SHAPE),
     ];
     let commands = requests.map(|request| {
         HostMessage::Command(Command {
@@ -349,6 +355,7 @@ pub fn any_host_message() -> impl Strategy<Value = HostMessage> {
         Just(Request::GetHealth),
         Just(Request::StartLoader),
         any_camera().prop_map(Request::SetCamera),
+        any_contact_shape().prop_map(Request::SetContactShape),
     ];
     let command = (any::<u16>(), request)
         .prop_map(|(id, request)| HostMessage::Command(Command { id, request }));
@@ -577,14 +584,14 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
         any_temporal(),
     );
     let numbers = any::<([u32; 2], i32, Option<u16>, Option<i32>)>();
-    let camera = (any_camera_report(), any_down());
-    (used, any_selection(), found, numbers, camera).prop_map(
+    let others = (any_camera_report(), any_down(), any_contact_shape());
+    (used, any_selection(), found, numbers, others).prop_map(
         |(
             (name, threshold, tare, temporal),
             kept,
             found,
             ([erases, failures], rezeroed, seen, drift),
-            (camera, down),
+            (camera, down, contact_shape),
         )| {
             SettingsReport {
                 name,
@@ -600,6 +607,7 @@ fn any_report() -> impl Strategy<Value = SettingsReport> {
                 drift: drift.map(Px),
                 camera,
                 down,
+                contact_shape,
             }
         },
     )
@@ -645,14 +653,15 @@ fn any_tared() -> impl Strategy<Value = TareReport> {
 }
 
 fn any_selection() -> impl Strategy<Value = Selection> {
-    any::<[bool; 6]>().prop_map(
-        |[name, threshold, tare, temporal, camera, down]| Selection {
+    any::<[bool; 7]>().prop_map(
+        |[name, threshold, tare, temporal, camera, down, contact_shape]| Selection {
             name,
             threshold,
             tare,
             temporal,
             camera,
             down,
+            contact_shape,
         },
     )
 }
@@ -661,6 +670,17 @@ fn any_selection() -> impl Strategy<Value = Selection> {
 pub fn any_down() -> impl Strategy<Value = Down> {
     let told = any::<[i16; 3]>().prop_map(|parts| Down::Told(Direction(parts)));
     prop_oneof![Just(Down::Fixed), Just(Down::Unknown), told]
+}
+
+/// Any shape of what presses, including radii that are not allowed.
+pub fn any_contact_shape() -> impl Strategy<Value = ContactShape> {
+    let radius = || any::<u32>().prop_map(Micrometres);
+    prop_oneof![
+        Just(ContactShape::Needle),
+        radius().prop_map(ContactShape::Round),
+        radius().prop_map(ContactShape::Flat),
+        Just(ContactShape::Unknown),
+    ]
 }
 
 /// Any camera settings.

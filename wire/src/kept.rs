@@ -3,16 +3,17 @@
 
 use crate::settings::{Name, RestPosition};
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
 use serde::{Deserialize, Serialize};
 
 /// First byte of a record. Must be raised with every change of the layout.
-const VERSION: u8 = 4;
+const VERSION: u8 = 5;
 
 /// Longest record.
-pub const MAX_BYTES: usize = 204;
+pub const MAX_BYTES: usize = 210;
 
 /// All that a device keeps.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,6 +32,8 @@ pub struct Record {
     pub camera: CameraSettings,
     /// The known direction of gravity.
     pub down: Down,
+    /// The shape of what presses.
+    pub contact_shape: ContactShape,
 }
 
 /// A model file in flash.
@@ -71,13 +74,13 @@ impl Record {
 mod tests {
     use super::*;
     use crate::examples::{
-        LONGEST_DOWN, any_camera, any_down, any_rest, any_temporal, any_threshold, longest_camera,
-        longest_rest, longest_temporal,
+        LONGEST_CONTACT_SHAPE, LONGEST_DOWN, any_camera, any_contact_shape, any_down, any_rest,
+        any_temporal, any_threshold, longest_camera, longest_rest, longest_temporal,
     };
     use hivtac_terms::camera::Rate;
     use hivtac_terms::down::Direction;
     use hivtac_terms::threshold::HsvBox;
-    use hivtac_terms::units::Microseconds;
+    use hivtac_terms::units::{Micrometres, Microseconds};
     use proptest::prelude::*;
     use std::vec::Vec;
 
@@ -94,6 +97,7 @@ mod tests {
             temporal: longest_temporal(),
             camera: longest_camera(),
             down: LONGEST_DOWN,
+            contact_shape: LONGEST_CONTACT_SHAPE,
         }
     }
 
@@ -107,7 +111,7 @@ mod tests {
 
     /// Every firmware with this version's number must read the record of a device in use.
     #[test]
-    fn the_bytes_of_version_4() {
+    fn the_bytes_of_version_5() {
         let record = Record {
             name: Name::try_from("thumb").unwrap(),
             threshold: Some(Threshold::Rgb565(HsvBox::of_limits([
@@ -129,11 +133,12 @@ mod tests {
                 rate: Rate::Half,
             },
             down: Down::Told(Direction([0, 600, -800])),
+            contact_shape: ContactShape::Flat(Micrometres(2_000)),
         };
         let bytes = [
-            4, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
+            5, 5, b't', b'h', b'u', b'm', b'b', 1, 0, 170, 10, 100, 255, 45, 255, 0, 1, 1, 0x80,
             0x48, 0x8d, 0xe0, 0xfb, 0xd7, 0x0c, 0xd0, 0x0f, 0xe8, 0x07, 60, 50, 100, 0, 0, 0, 0, 1,
-            0xc4, 0x13, 0, 1, 2, 0, 0xb0, 0x09, 0xbf, 0x0c,
+            0xc4, 0x13, 0, 1, 2, 0, 0xb0, 0x09, 0xbf, 0x0c, 2, 0xd0, 0x0f,
         ];
         let mut buffer = [0; MAX_BYTES];
         assert_eq!(record.to_bytes(&mut buffer), bytes);
@@ -163,6 +168,7 @@ mod tests {
             temporal in any_temporal(),
             camera in any_camera(),
             down in any_down(),
+            contact_shape in any_contact_shape(),
         ) {
             let record = Record {
                 name: Name::try_from(name.as_str()).unwrap(),
@@ -172,6 +178,7 @@ mod tests {
                 temporal,
                 camera,
                 down,
+                contact_shape,
             };
             let mut buffer = [0; MAX_BYTES];
             prop_assert_eq!(Record::of_bytes(record.to_bytes(&mut buffer)), Ok(record));

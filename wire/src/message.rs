@@ -5,6 +5,7 @@ use crate::settings::{Name, RestPosition, Selection, SettingsReport, TareReport}
 use heapless::{String, Vec};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::Force;
@@ -344,6 +345,8 @@ pub enum Request {
     StartLoader,
     /// Set the camera. Answered when it sends frames with these settings.
     SetCamera(CameraSettings),
+    /// Set the shape of what presses, from the next frame on.
+    SetContactShape(ContactShape),
 }
 
 /// Most bytes of an uploaded model file.

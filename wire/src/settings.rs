@@ -3,6 +3,7 @@
 use heapless::String;
 use hivtac_terms::camera::{CameraLimits, CameraSettings};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
@@ -72,6 +73,8 @@ pub struct SettingsReport {
     pub camera: CameraReport,
     /// The known direction of gravity.
     pub down: Down,
+    /// The shape of what presses.
+    pub contact_shape: ContactShape,
 }
 
 /// The camera's settings and limits.
@@ -128,6 +131,8 @@ pub struct Selection {
     pub camera: bool,
     /// The known direction of gravity.
     pub down: bool,
+    /// The shape of what presses.
+    pub contact_shape: bool,
 }
 
 impl Selection {
@@ -139,6 +144,7 @@ impl Selection {
         temporal: false,
         camera: false,
         down: false,
+        contact_shape: false,
     };
     /// All of them.
     pub const ALL: Selection = Selection {
@@ -148,6 +154,7 @@ impl Selection {
         temporal: true,
         camera: true,
         down: true,
+        contact_shape: true,
     };
 }
 

@@ -8,7 +8,9 @@ use super::name::name;
 use super::temporal::{self, RezeroChange, small_thousandths, thousandths, two_thousandths};
 use crate::device::{Device, Target};
 use clap::Subcommand;
+use hivtac_host::contact_shape;
 use hivtac_host::failure::Failure;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::temporal::{Creep, Filter};
 use hivtac_terms::units::{
     Micrometres, Microseconds, MilliPx, Milliseconds, Permille, Sixteenths, SmallPermille,
@@ -139,6 +141,25 @@ pub enum SetCommand {
         #[arg(value_name = "X Y Z|none|fixed", num_args = 1..=3, required = true,
               allow_negative_numbers = true)]
         down: Vec<String>,
+    },
+    /// The shape of what presses the film
+    ///
+    /// How the film moves depends on it. `needle` is a tip like the model's. `round:R` is a soft or
+    /// rounded tip and `flat:R` a rigid face, R being the radius of its contact in mm, 0.25 to 4.
+    /// `unknown`, as a new device has it, is any of these up to 4 mm, which the uncertainties then
+    /// include. It holds until the device restarts, with --keep longer.
+    ///
+    /// Example: hivtac settings set contact flat:2 --keep
+    Contact {
+        #[command(flatten)]
+        target: Target,
+        /// The shape: `needle`, `round:R`, `flat:R` or `unknown`
+        #[arg(value_name = "needle|round:R_MM|flat:R_MM|unknown",
+              value_parser = contact_shape::parse)]
+        shape: ContactShape,
+        /// Keep it through restarts
+        #[arg(long)]
+        keep: bool,
     },
     /// How much the film remembers of its loads
     ///
@@ -285,6 +306,13 @@ impl SetCommand {
             } => {
                 let down = down(&words)?;
                 return Conversation::begin(&target)?.set_down(down);
+            }
+            SetCommand::Contact {
+                target,
+                shape,
+                keep,
+            } => {
+                return Conversation::begin(&target)?.set_contact_shape(shape, keep);
             }
             SetCommand::Exposure { target, time } => {
                 return Conversation::begin(&target)?.set_camera(camera::Change::Exposure(time));

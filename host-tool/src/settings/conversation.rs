@@ -7,6 +7,7 @@ use super::temporal::{self, Change};
 use crate::device::Target;
 use crate::output::{self, note};
 use crate::request::{KEEP_PATIENCE, keep, send, show_log};
+use hivtac_host::contact_shape::text as text_of_shape;
 use hivtac_host::down::text as text_of_down;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
@@ -14,6 +15,7 @@ use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
 use hivtac_terms::camera::CameraSettings;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::units::MilliPx;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
@@ -106,7 +108,7 @@ impl Conversation {
         let named = |(name, _): &(&str, String)| *name == change.name();
         let texts = temporal::texts(&settings).into_iter().find(named);
         let (name, text) = texts.unwrap_or_default();
-        self.tell_set(name, &text)
+        self.tell_set(name, &text, true)
     }
 
     /// Sets the camera, and keeps that.
@@ -123,7 +125,7 @@ impl Conversation {
         let named = |(name, _): &(&str, String)| *name == change.name();
         let texts = camera::texts(&self.settings()?.camera);
         let (name, text) = texts.into_iter().find(named).unwrap_or_default();
-        self.tell_set(name, &text)
+        self.tell_set(name, &text, true)
     }
 
     /// Sets the direction of gravity, and keeps it.
@@ -142,15 +144,29 @@ impl Conversation {
                  it anew",
             );
         }
-        self.tell_set("down", &text_of_down(report.down))
+        self.tell_set("down", &text_of_down(report.down), true)
     }
 
-    /// Prints what was set and kept.
-    fn tell_set(&self, name: &str, text: &str) -> Result<(), Failure> {
-        let line = format!("{name} set and kept: {text}");
+    /// Sets the shape of what presses, and keeps it if `is_kept`.
+    pub fn set_contact_shape(&mut self, shape: ContactShape, is_kept: bool) -> Result<(), Failure> {
+        self.send(Request::SetContactShape(shape))?;
+        if is_kept {
+            let selection = Selection {
+                contact_shape: true,
+                ..Selection::NONE
+            };
+            keep(&mut self.link, selection)?;
+        }
+        self.tell_set("contact", &text_of_shape(shape), is_kept)
+    }
+
+    /// Prints what was set, and whether it was kept.
+    fn tell_set(&self, name: &str, text: &str, is_kept: bool) -> Result<(), Failure> {
+        let and_kept = if is_kept { " and kept" } else { "" };
+        let line = format!("{name} set{and_kept}: {text}");
         self.tell(
             &line,
-            json!({ "setting": name, "text": text, "kept": true }),
+            json!({ "setting": name, "text": text, "kept": is_kept }),
         )
     }
 
@@ -215,6 +231,8 @@ impl Conversation {
         self.send(Request::SetTare(tare)).map_err(unkept)?;
         let temporal = file.temporal();
         self.send(Request::SetTemporal(temporal)).map_err(unkept)?;
+        let shape = file.contact_shape();
+        self.send(Request::SetContactShape(shape)).map_err(unkept)?;
         self.send(Request::SetName(name)).map_err(unkept)?;
         keep(&mut self.link, Selection::ALL)
     }
@@ -270,6 +288,9 @@ fn lines(report: &SettingsReport) -> Vec<String> {
     lines.extend(texts.map(|(name, text)| format!("{name:<11}{text} ({camera})")));
     let down = until(report.kept.down);
     lines.push(format!("down       {} ({down})", text_of_down(report.down)));
+    let shape = text_of_shape(report.contact_shape);
+    let is_kept = until(report.kept.contact_shape);
+    lines.push(format!("contact    {shape} ({is_kept})"));
     lines.extend([
         format!("flash      {found}"),
         format!(

@@ -8,12 +8,13 @@ use hivtac_host::files::read_at_most;
 use hivtac_host::shown::{to_json, unit_number};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
-use hivtac_terms::units::{MilliPx, Px};
+use hivtac_terms::units::{Micrometres, MilliPx, Px};
 use hivtac_wire::settings::{Found, RestPosition, Selection, SettingsReport};
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +39,8 @@ pub struct File {
     camera: CameraJson,
     #[serde(default)]
     down: DownJson,
+    #[serde(default)]
+    contact_shape: ContactShapeJson,
 }
 
 /// The direction of gravity, if known, in thousandths of a unit vector.
@@ -48,6 +51,21 @@ enum DownJson {
     Fixed,
     Unknown,
     Told([i16; 3]),
+}
+
+/// The shape of what presses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+enum ContactShapeJson {
+    Needle,
+    Round {
+        radius_um: u32,
+    },
+    Flat {
+        radius_um: u32,
+    },
+    #[default]
+    Unknown,
 }
 
 /// A threshold, as in all JSON of the tool.
@@ -119,6 +137,7 @@ struct KeptParts {
     temporal: bool,
     camera: bool,
     down: bool,
+    contact_shape: bool,
 }
 
 impl Kept {
@@ -131,6 +150,7 @@ impl Kept {
             temporal,
             camera,
             down,
+            contact_shape,
         } = report.kept;
         Kept {
             file: File::new(device_id, report),
@@ -143,6 +163,7 @@ impl Kept {
                 temporal,
                 camera,
                 down,
+                contact_shape,
             },
             found: match report.found {
                 Found::Nothing => "nothing",
@@ -173,6 +194,7 @@ impl File {
                 Down::Unknown => DownJson::Unknown,
                 Down::Told(Direction(parts)) => DownJson::Told(parts),
             },
+            contact_shape: ContactShapeJson::new(report.contact_shape),
         }
     }
 
@@ -229,9 +251,34 @@ impl File {
         }
     }
 
+    /// The shape of what presses.
+    pub fn contact_shape(&self) -> ContactShape {
+        self.contact_shape.shape()
+    }
+
     /// The rest position.
     pub fn rest(&self) -> Option<RestPosition> {
         self.tare.as_ref().map(Rest::position)
+    }
+}
+
+impl ContactShapeJson {
+    fn new(shape: ContactShape) -> ContactShapeJson {
+        match shape {
+            ContactShape::Needle => ContactShapeJson::Needle,
+            ContactShape::Round(Micrometres(radius_um)) => ContactShapeJson::Round { radius_um },
+            ContactShape::Flat(Micrometres(radius_um)) => ContactShapeJson::Flat { radius_um },
+            ContactShape::Unknown => ContactShapeJson::Unknown,
+        }
+    }
+
+    fn shape(self) -> ContactShape {
+        match self {
+            ContactShapeJson::Needle => ContactShape::Needle,
+            ContactShapeJson::Round { radius_um } => ContactShape::Round(Micrometres(radius_um)),
+            ContactShapeJson::Flat { radius_um } => ContactShape::Flat(Micrometres(radius_um)),
+            ContactShapeJson::Unknown => ContactShape::Unknown,
+        }
     }
 }
 
@@ -331,6 +378,9 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
     {
         return Err("down is no direction: its length is not 1000 thousandths".to_owned());
     }
+    if !file.contact_shape().is_sound() {
+        return Err("contact_shape has a radius that is not 250 to 4000 µm".to_owned());
+    }
     Ok(file)
 }
 
@@ -392,6 +442,7 @@ mod tests {
             drift: None,
             camera: camera(),
             down: Down::Told(Direction([0, 600, -800])),
+            contact_shape: ContactShape::Flat(Micrometres(2_000)),
         }
     }
 
@@ -409,7 +460,34 @@ mod tests {
             assert_eq!((read.threshold(), read.rest()), (threshold, report.tare));
             assert_eq!(read.camera(), report.camera.settings);
             assert_eq!(read.down(), report.down);
+            assert_eq!(read.contact_shape(), report.contact_shape);
             assert!(read.is_of(&[7; 12]) && !read.is_of(&[8; 12]));
+        }
+    }
+
+    #[test]
+    fn every_shape_comes_back_and_an_old_file_has_none() {
+        let radius = Micrometres(1_500);
+        for contact_shape in [
+            ContactShape::Needle,
+            ContactShape::Round(radius),
+            ContactShape::Flat(radius),
+            ContactShape::Unknown,
+        ] {
+            let report = SettingsReport {
+                contact_shape,
+                ..report(Threshold::Mono(Mono { low: 0, high: 88 }))
+            };
+            let text = to_json(&File::new(&[7; 12], &report));
+            assert_eq!(
+                parse(text.as_bytes()).unwrap().contact_shape(),
+                contact_shape
+            );
+            let old = text.replace(",\"contact_shape\":\"unknown\"", "");
+            assert_eq!(
+                parse(old.as_bytes()).unwrap().contact_shape(),
+                contact_shape
+            );
         }
     }
 
@@ -430,6 +508,7 @@ mod tests {
             ("\"thumb\"", "\"th\\u001bumb\"", "cannot be seen"),
             ("\"hue_low\":170", "\"hue_low\":200", "means nothing"),
             ("[0,600,-800]", "[0,600,-80]", "no direction"),
+            ("\"radius_um\":2000", "\"radius_um\":200", "250 to 4000"),
             ("\"hue_low\"", "\"huelow\"", "huelow"),
             ("\"within_ms\":50", "\"within_ms\":5", "10 to 100 ms"),
             ("rgb565", "rgb888", "rgb888"),

@@ -2,6 +2,7 @@
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, RateLimits};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
@@ -175,6 +176,7 @@ impl Conversation {
                     ..found
                 };
             }
+            Request::SetContactShape(shape) => self.settings.contact_shape = *shape,
             Request::Keep(_) => {
                 self.reply(id, self.flash);
                 return false;
@@ -268,6 +270,7 @@ pub fn settings() -> SettingsReport {
             temporal: true,
             camera: true,
             down: true,
+            contact_shape: true,
         },
         found: Found::Settings,
         erases: 3,
@@ -278,6 +281,7 @@ pub fn settings() -> SettingsReport {
         drift: Some(Px(20_316)),
         camera: camera(),
         down: Down::Fixed,
+        contact_shape: ContactShape::Unknown,
     }
 }
 

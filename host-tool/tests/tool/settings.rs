@@ -3,8 +3,11 @@
 use crate::fake::*;
 use crate::run::*;
 use hivtac_terms::camera::{CameraSettings, Rate};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::temporal::{Creep, Filter, Rezero, TemporalSettings};
-use hivtac_terms::units::{Microseconds, MilliPx, Milliseconds, Px, Sixteenths, SmallPermille};
+use hivtac_terms::units::{
+    Micrometres, Microseconds, MilliPx, Milliseconds, Px, Sixteenths, SmallPermille,
+};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use serde_json::Value;
@@ -47,6 +50,7 @@ fn settings_for_a_person() {
          gain       1.5, as the light needs (kept)\n\
          rate       156 frames a second (kept)\n\
          down       fixed, as when the tare was taken (kept)\n\
+         contact    unknown: it may be any up to 4 mm, and uncertainties include that (kept)\n\
          flash      settings found at the start\n\
          \x20          3 sectors erased in its life, 0 failed attempts to write since the start\n"
     );
@@ -71,6 +75,8 @@ fn settings_as_json() {
     assert_eq!(settings["camera_in_use"]["exposure_us"], 5_922);
     assert_eq!(settings["camera_in_use"]["frames_per_second"], 156);
     assert_eq!(settings["kept"]["camera"], true);
+    assert_eq!(settings["contact_shape"], "unknown");
+    assert_eq!(settings["kept"]["contact_shape"], true);
 }
 
 #[test]
@@ -155,6 +161,7 @@ fn what_was_exported_is_set_and_kept_again() {
         Request::GetSettings,
         Request::SetTare(settings.tare),
         Request::SetTemporal(settings.temporal),
+        Request::SetContactShape(settings.contact_shape),
         Request::SetName(settings.name),
         Request::Keep(ALL),
     ];
@@ -357,13 +364,14 @@ fn the_guide_shows_what_setting_prints() {
         let of_camera = ["exposure", "gain", "rate"].contains(&arguments[2]);
         let printed = match arguments[2] {
             "down" => down_changed(&arguments),
+            "contact" => shape_set(&arguments).1,
             _ if of_camera => camera_changed(&arguments).1,
             _ => changed(&arguments).1,
         };
         assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
         shown += 1;
     }
-    assert_eq!(shown, 14);
+    assert_eq!(shown, 18);
 }
 
 /// The camera settings that a device received, and the tool's output.
@@ -474,6 +482,51 @@ fn down_changed(arguments: &[&str]) -> String {
         run.stderr
     );
     run.stdout
+}
+
+/// The shape of what presses that a device received, and the tool's output. It is kept only when
+/// asked for.
+fn shape_set(arguments: &[&str]) -> (ContactShape, String) {
+    let (commands, text) = told(arguments);
+    let [Request::SetContactShape(shape), kept @ ..] = &commands[..] else {
+        panic!("{commands:?}");
+    };
+    let only_shape = Selection {
+        contact_shape: true,
+        ..Selection::NONE
+    };
+    let is_kept = arguments.contains(&"--keep");
+    let expected = is_kept.then_some(Request::Keep(only_shape));
+    assert_eq!(kept, expected.as_slice());
+    (*shape, text)
+}
+
+#[test]
+fn what_presses_is_set_and_kept_when_asked_for() {
+    let set = ["settings", "set", "contact"];
+    let (shape, text) = shape_set(&[&set[..], &["needle"]].concat());
+    assert_eq!(shape, ContactShape::Needle);
+    assert_eq!(text, "contact set: needle, a tip like the model's\n");
+    let (shape, text) = shape_set(&[&set[..], &["flat:2.5", "--keep", "--json"]].concat());
+    assert_eq!(shape, ContactShape::Flat(Micrometres(2_500)));
+    let told: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(told["setting"], "contact");
+    assert_eq!(told["kept"], true);
+    assert_eq!(told["text"], "flat, a rigid face of 2.5 mm radius");
+}
+
+#[test]
+fn what_is_no_shape_is_wrong_usage() {
+    for (shape, word) in [
+        ("round:0.1", "0.25 to 4 mm"),
+        ("round", "such as round:2"),
+        ("flat:x", "is no radius"),
+        ("ball:2", "is no shape"),
+    ] {
+        let run = run(&["settings", "set", "contact", shape]);
+        assert_eq!(run.code, Some(2), "{shape}: {}", run.stderr);
+        assert!(run.stderr.contains(word), "{shape}: {}", run.stderr);
+    }
 }
 
 #[test]
