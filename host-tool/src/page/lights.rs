@@ -140,6 +140,14 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "the film may hang otherwise than when the tare was taken",
             "say which way the sensor is held, then take a tare",
         ),
+        Status::LOOSELY_EXPLAINED => (
+            "one contact explains the markers badly: an edge, two tips or a large pad?",
+            "press with one tip, or set the shape of what presses: hivtac settings set contact",
+        ),
+        Status::MARKER_LOST => (
+            "one marker is not seen: the force is that of the other three, unchecked",
+            "look at the picture: is one covered, unlit or out of view?",
+        ),
         Status::UNEXPLAINED => (
             "no single contact explains where the markers are",
             "press with one tip; at rest, take a new tare",
