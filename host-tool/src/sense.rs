@@ -4,6 +4,7 @@ use crate::finding::Finding;
 use crate::hsv;
 use crate::output::{Reader, note, print};
 use clap::Args;
+use hivtac_host::contact_shape;
 use hivtac_host::failure::Failure;
 use hivtac_host::files::read_at_most;
 use hivtac_host::picture::Picture;
@@ -15,6 +16,7 @@ use hivtac_sensor::markers::screen::ScreenedTable;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline;
 use hivtac_sensor::tare::{Refusal, TareBuilder};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::{ByteOrder, HsvBox};
 
@@ -56,6 +58,10 @@ pub struct SenseArguments {
     /// Picture of the untouched film, to measure displacements from
     #[arg(long, value_name = "IMAGE")]
     tare: Option<String>,
+    /// The shape of what presses, as in `hivtac settings set contact`
+    #[arg(long, value_name = "SHAPE", default_value = "unknown",
+          value_parser = contact_shape::parse)]
+    contact: ContactShape,
     /// One JSON object a line
     #[arg(long)]
     json: bool,
@@ -202,6 +208,7 @@ impl<'a> Bench<'a> {
             .map_err(|error| {
                 Failure::input(format!("the picture {path} cannot be looked at: {error}"))
             })?;
+        sensor.set_contact_shape(self.arguments.contact);
         Ok(sensor)
     }
 
