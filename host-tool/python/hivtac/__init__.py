@@ -265,6 +265,18 @@ class Sensor:
         """Sets the direction of gravity as unknown: uncertainties then include that."""
         self._connection.set_down(None)
 
+    def set_contact(self, shape: str, *, keep: bool = False) -> None:
+        """Sets the shape of what presses the film, from the next frame on: "needle", a tip like the
+        model's; "round:R" or "flat:R", a soft or rounded tip or a rigid face of radius R, 0.25 to
+        4 mm; or "unknown", as a new sensor has it. `keep`: through restarts.
+
+        Raises `Error` when it is no such shape.
+        """
+        try:
+            self._connection.set_contact(shape, keep)
+        finally:
+            self._tell_log()
+
     def snapshot(self) -> npt.NDArray[np.uint8]:
         """(height, width, 3): the next whole frame as the sensing reads it, levels of red, green
         and blue.

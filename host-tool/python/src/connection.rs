@@ -3,6 +3,7 @@
 
 use crate::error::{Error, raised};
 use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
+use hivtac_host::contact_shape;
 use hivtac_host::down::direction;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame;
@@ -10,6 +11,7 @@ use hivtac_host::link::{Link, log_text};
 use hivtac_host::look;
 use hivtac_host::named;
 use hivtac_host::port::Address;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel, Request};
 use hivtac_wire::settings::Selection;
@@ -124,6 +126,23 @@ impl Talk {
         tared.ok_or_else(|| self.link.lost("what the tare gave did not come"))
     }
 
+    fn set_contact(
+        &mut self,
+        shape: ContactShape,
+        keep: bool,
+        patience: Duration,
+    ) -> Result<(), Failure> {
+        self.request(Request::SetContactShape(shape), patience)?;
+        if keep {
+            let selection = Selection {
+                contact_shape: true,
+                ..Selection::NONE
+            };
+            self.request(Request::Keep(selection), PATIENCE)?;
+        }
+        Ok(())
+    }
+
     fn rest(&mut self, patience: Duration) -> Result<RestNumbers, Failure> {
         let mut rest = None;
         let Talk { link, heard, .. } = self;
@@ -206,6 +225,12 @@ impl Connection {
             Some(vector) => Down::Told(direction(vector).map_err(Error::new_err)?),
         };
         self.with(py, |talk| talk.link.set_down(down))
+    }
+
+    /// Sets the shape of what presses: `needle`, `round:R`, `flat:R` or `unknown`, R in mm.
+    fn set_contact(&self, py: Python<'_>, shape: &str, keep: bool) -> PyResult<()> {
+        let shape = contact_shape::parse(shape).map_err(Error::new_err)?;
+        self.with(py, |talk| talk.set_contact(shape, keep, self.patience))
     }
 
     /// Number of a frame, its device time (s), columns, rows, and levels of red, green and blue.
