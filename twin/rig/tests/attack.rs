@@ -7,10 +7,11 @@
 use crate::common::{Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
 use hivtac_terms::camera::{CameraSettings, Rate};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
-use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_terms::units::{Micrometres, Microseconds, Sixteenths};
 use hivtac_wire::message::{MODEL_BYTES, ModelPart, Request};
 use hivtac_wire::settings::Selection;
 use serde_json::Value;
@@ -127,6 +128,8 @@ fn request(numbers: &mut Numbers) -> Request {
         Request::Tare { frames },
         Request::SetThreshold(Threshold::red(PixelFormat::Rgb565)),
         Request::SetCamera(camera_settings(numbers)),
+        Request::SetContactShape(ContactShape::Needle),
+        Request::SetContactShape(ContactShape::Round(Micrometres(u32::MAX))),
         Request::BeginModel { bytes },
         Request::ModelPart(model_part(numbers)),
         Request::UseModel,

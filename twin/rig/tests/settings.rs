@@ -7,9 +7,11 @@ use crate::common::{Setup, command, down, firmware};
 use crate::cuts::{self, Start};
 use hivtac_rig::peripherals::flash::{Contents, Cut, Leaves};
 use hivtac_rig::script::Action;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
+use hivtac_terms::units::Micrometres;
 use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample};
 use hivtac_wire::settings::{Found, Name, RestPosition, Selection, SettingsReport};
 
@@ -41,6 +43,7 @@ fn setup(flash: &Path, virtual_ms: u64) -> Setup {
     let setup = setup.at(virtual_ms - 20, send(REPORT, Request::GetSettings));
     Setup {
         scene: "rest",
+        shape: None,
         flash: Some(flash.to_owned()),
         ..setup
     }
@@ -96,6 +99,7 @@ fn old() -> (Vec<u8>, SettingsReport) {
     let kept = run.settings().clone();
     assert_eq!(kept.kept, Selection::ALL);
     assert_eq!((kept.found, kept.erases), (Found::Nothing, 1));
+    assert_eq!(kept.contact_shape, ContactShape::Unknown);
     (std::fs::read(&flash).unwrap(), kept)
 }
 
@@ -185,6 +189,51 @@ fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     assert_eq!(run.missing_frames(), [0; 0], "forces go on");
 }
 
+/// A radius out of range is refused, and what was set before stays.
+#[test]
+fn what_presses_is_set_reported_kept_and_reset() {
+    let Device { flash, kept, .. } = &Device::new();
+    let only_shape = Selection {
+        contact_shape: true,
+        ..Selection::NONE
+    };
+    let [flat, round] = [
+        ContactShape::Flat(Micrometres(4_000)),
+        ContactShape::Round(Micrometres(249)),
+    ];
+    let setting = |shape| Request::SetContactShape(shape);
+    let run = setup(flash, 260)
+        .at(SET_MS, send(SET, setting(flat)))
+        .at(SET_MS + 5, send(SET + 1, setting(round)))
+        .at(KEEP_MS, send(KEEP, Request::Keep(only_shape)))
+        .run();
+    let outcomes = [SET, SET + 1, KEEP].map(|id| run.outcome(id));
+    let expected = [Outcome::Done, Outcome::InvalidArgument, Outcome::Done];
+    assert_eq!(outcomes, expected);
+    assert_eq!(run.settings().contact_shape, flat);
+    assert_eq!(run.settings().kept, Selection::ALL);
+    run.assert_only_setup_drops();
+    assert_eq!(run.missing_frames(), [0; 0], "forces go on");
+    let found = restarted(flash);
+    assert_eq!((found.contact_shape, found.tare), (flat, kept.tare));
+    let needle = send(SET, setting(ContactShape::Needle));
+    let report = setup(flash, 240)
+        .at(SET_MS, needle)
+        .run()
+        .settings()
+        .clone();
+    assert_eq!(report.contact_shape, ContactShape::Needle);
+    assert!(!report.kept.contact_shape, "until restart");
+    assert_eq!(restarted(flash).contact_shape, flat);
+    let run = setup(flash, 280)
+        .at(SET_MS, send(SET, Request::Reset))
+        .run();
+    assert_eq!(run.outcome(SET), Outcome::Done);
+    let report = run.settings();
+    assert_eq!(report.contact_shape, ContactShape::Unknown);
+    assert!(report.kept.contact_shape);
+}
+
 /// Cuts the power at each operation of a change of the name, in each way. The device has the old or
 /// the new name and its tare, and reports the same at the next start.
 fn every_cut_of_a_new_name(before: &Contents) {
@@ -263,7 +312,7 @@ pub fn of_another_version(flash: &Path) {
         record.extend(&word[1..]);
     }
     record.truncate(length);
-    assert_eq!(record[0], 4, "the version");
+    assert_eq!(record[0], 5, "the version");
     sector[10] = 200;
     record[0] = 200;
     let mut checked = sector[2..6].to_vec();

@@ -24,6 +24,7 @@ use hivtac_rig::report::Report;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::{Action, Script};
 use hivtac_rig::truth::TruthLog;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
@@ -39,6 +40,9 @@ use serde_json::Value;
 
 /// Time at which the host says hello, ms: the port exists from about 140 ms on.
 pub const HELLO_MS: u64 = 160;
+
+/// Number of the command that sets the shape of what presses.
+const SHAPE: u16 = u16::MAX;
 
 /// Returns the firmware under test.
 pub fn firmware() -> PathBuf {
@@ -107,8 +111,8 @@ pub fn instructions_per_second() -> u64 {
     }
 }
 
-/// A run under a scripted host, which opens the port, says hello, starts the stream, and asks for
-/// counters at the end.
+/// A run under a scripted host, which opens the port, says hello, sets the shape of what presses,
+/// starts the stream, and asks for counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
     pub board: board::Kind,
@@ -116,6 +120,8 @@ pub struct Setup {
     /// A scene's name, or its file relative to the package's folder.
     pub scene: &'static str,
     pub seed: u64,
+    /// The shape of what presses; `None` leaves the device's own. Scenes press with a needle.
+    pub shape: Option<ContactShape>,
     pub faults: Vec<&'static str>,
     pub actions: Vec<(u64, Action)>,
     /// File with the flash's second bank.
@@ -136,6 +142,7 @@ impl Setup {
             camera: part::Kind::Ov7725,
             scene: "demo",
             seed: 1,
+            shape: Some(ContactShape::Needle),
             faults: (std::env::var_os("HIVTAC_BUSY_BUS").iter())
                 .map(|_| "bus-busy")
                 .collect(),
@@ -197,6 +204,10 @@ impl Setup {
                 Action::Send(command(2, Request::GetInfo)),
             ),
         ];
+        actions.extend(self.shape.map(|shape| {
+            let request = Request::SetContactShape(shape);
+            (ms(HELLO_MS + 1), Action::Send(command(SHAPE, request)))
+        }));
         let source = Box::new(self.source()?);
         let seed = self.seed;
         actions.extend(self.actions);
