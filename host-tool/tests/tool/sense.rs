@@ -2,8 +2,10 @@
 
 use crate::run::*;
 use hivtac_sensor::force::model::Model;
-use hivtac_sensor::pipeline::Sensor;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::threshold::ByteOrder;
+use hivtac_terms::units::Micrometres;
 use hivtac_twin::{Frame, Load, MARKERS, Options, Paint, Patch, Preset, Scene};
 use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
@@ -137,22 +139,44 @@ fn small_blobs_are_shown_on_request() {
     assert_eq!((blobs(&[]), blobs(&["--min-area", "1"])), (0, 1));
 }
 
-/// The numbers are those of the sensing code on the same pixels, to the last digit.
-#[test]
-fn the_force_is_that_of_the_sensing_code() {
-    let folder = Folder::new();
-    let frame = frame(true);
-    let found = json_of(&run(&[
-        "sense",
-        "--json",
-        &folder.save("pressed.png", &photograph(&frame)),
-    ]));
+/// Measures a frame with the sensing code and this shape of what presses.
+fn measured(frame: &Frame, shape: ContactShape) -> Measurement {
     let model = Model::parse(MODEL).unwrap();
     let mut sensor: Box<Sensor> = Box::default();
     sensor
         .configure(model.conditions.settings(ByteOrder::Native), Some(model))
         .unwrap();
-    let measurement = sensor.measure_frame(&frame.to_rgb565());
+    sensor.set_contact_shape(shape);
+    sensor.measure_frame(&frame.to_rgb565())
+}
+
+/// The numbers are those of the sensing code on the same pixels, to the last digit.
+#[test]
+fn the_force_is_that_of_the_sensing_code() {
+    let folder = Folder::new();
+    let frame = frame(true);
+    let picture = folder.save("pressed.png", &photograph(&frame));
+    for (options, shape) in [
+        (&[][..], ContactShape::Unknown),
+        (&["--contact", "needle"], ContactShape::Needle),
+        (
+            &["--contact", "flat:2"],
+            ContactShape::Flat(Micrometres(2_000)),
+        ),
+    ] {
+        let found = json_of(&run(&[&["sense", "--json", &picture], options].concat()));
+        check_found(&found, &measured(&frame, shape));
+    }
+    let refused = run(&["sense", "--contact", "round:9", &picture]);
+    assert_eq!(refused.code, Some(2));
+    assert!(
+        refused.stderr.contains("0.25 to 4 mm"),
+        "{}",
+        refused.stderr
+    );
+}
+
+fn check_found(found: &Value, measurement: &Measurement) {
     let force = measurement.force.unwrap_or_else(|| panic!("{found}"));
     let micro = |number: i32| f64::from(number) / 1e6;
     let milli = |number: i32| f64::from(number) / 1e3;
