@@ -74,13 +74,17 @@ impl Demo {
         let board = board.context("a board without a name")?;
         eprintln!("The board boots, and {frames} frames pass: some half a minute.");
         let mut command = Command::new(rig);
-        command.args("--scene demo --pty --exit-on-hangup --board".split(' '));
+        command.args("--scene demo --pty --board".split(' '));
         command.arg(board.get_name()).arg("--truth").arg(truth);
         let rig = Rig::start(command.arg("--arrivals").arg(arrivals).arg(firmware), log)?;
-        let mut monitor = Command::new(tool);
-        monitor.args(["monitor", "--port", &rig.port, "--frames", &frames]);
         // The emulated board boots slower than a real one.
-        process::run(monitor.args(["--timeout", "120", "--truth"]).arg(truth))?;
+        let at = ["--port", &rig.port, "--timeout", "120"];
+        // The demo's tip is a needle; on a new device it could be anything.
+        let needle = ["settings", "set", "contact", "needle"];
+        process::run(Command::new(tool).args(needle).args(at))?;
+        let mut monitor = Command::new(tool);
+        monitor.arg("monitor").args(at).args(["--frames", &frames]);
+        process::run(monitor.arg("--truth").arg(truth))?;
         rig.finish()?;
         let (rate_hz, latency_ms) = rate_and_latency(&times(truth)?, &times(arrivals)?)?;
         println!(
@@ -117,8 +121,11 @@ impl Rig {
         Ok(rig)
     }
 
-    /// Waits until the rig ends, as it does after its client has left.
+    /// Makes the rig end, and waits for that.
     fn finish(mut self) -> Result<()> {
+        let id = self.process.id().to_string();
+        let told = process::succeeds(Command::new("kill").args(["-TERM", &id]));
+        ensure!(told, "the rig is gone");
         let status = self.process.wait()?;
         ensure!(status.success(), "the rig failed ({status})");
         Ok(())
