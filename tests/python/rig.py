@@ -43,6 +43,20 @@ class Rig:
         self._process.stdout.close()
         self._folder.cleanup()
 
+    def set_needle(self):
+        """Tells the firmware that a needle presses, as it does in the scenes."""
+        subprocess.run(
+            [
+                os.environ["HIVTAC_TOOL"],
+                *"settings set contact needle --timeout".split(),
+                str(PATIENCE),
+                "--port",
+                self.port,
+            ],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+
     def kill(self):
         self._process.kill()
         self._process.wait()

@@ -194,6 +194,7 @@ class OnTheRig(unittest.TestCase):
         self.diagnostics = node.reader("rt/diagnostics", DiagnosticArray)
         begun = time.time()
         with Rig() as rig:
+            rig.set_needle()
             with Serve(*ROS2, *FOXGLOVE, *port(rig)) as serve:
                 self.assertEqual(serve.told["ros2"], "/hivtac")
                 self.assertEqual(serve.told["domain"], str(DOMAIN))

@@ -9,6 +9,7 @@ use crate::rig::{Rig, ToolOutput, json_lines, tool};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::artifact;
@@ -28,7 +29,8 @@ enum Before<'a> {
     Frame(&'a [u16]),
 }
 
-/// Measures a frame after the one before it on this computer, with the firmware's model.
+/// Measures a frame after the one before it on this computer, with the firmware's model and the
+/// shape of a new device.
 fn on_this_computer(model: &[u8], before: Before<'_>, pixels: &[u16]) -> Measurement {
     let model = Model::parse(model).unwrap();
     let mut sensor = Box::new(Sensor::<64>::new());
@@ -36,6 +38,7 @@ fn on_this_computer(model: &[u8], before: Before<'_>, pixels: &[u16]) -> Measure
     sensor.configure(settings, Some(model)).unwrap();
     // A frame of the OV7725 has 278 lines.
     sensor.set_motion(Motion::rolling(278));
+    sensor.set_contact_shape(ContactShape::default());
     match before {
         Before::Nothing => {}
         Before::First(before) => _ = sensor.measure_frame_closely(before),

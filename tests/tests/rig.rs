@@ -180,6 +180,16 @@ pub fn tool_waiting(
     Ok(result)
 }
 
+/// Tells the firmware that a needle presses, as it does in most scenes.
+///
+/// # Errors
+/// As [`tool`], or if the tool fails.
+pub fn set_needle(rig: &Rig) -> Result<()> {
+    let set = tool(rig, "settings set contact needle", &[])?;
+    ensure!(set.code == Some(0), "{set:?}");
+    Ok(())
+}
+
 /// Reads one JSON value per line.
 ///
 /// # Errors

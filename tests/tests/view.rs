@@ -7,7 +7,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 
-use crate::rig::{Rig, TIMEOUT_S};
+use crate::rig::{Rig, TIMEOUT_S, set_needle};
 use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
 use serde_json::Value;
@@ -195,6 +195,7 @@ fn the_page_shows_the_truth_and_does_what_it_is_told() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("sensor");
     let first = rig(&link);
+    set_needle(&first).unwrap();
     let view = View::of(folder.path());
     let mut browser = Browser::open(&view.address, PAGE).unwrap();
     (0..5).for_each(|_| check_arrow(&mut browser, &first));

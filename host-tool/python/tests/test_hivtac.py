@@ -28,6 +28,7 @@ from rig import PATIENCE, Rig, true_force  # noqa: E402
 class OnTheRig(unittest.TestCase):
     def test_samples_are_those_of_the_scene(self):
         with Rig() as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:
+            sensor.set_contact("needle")
             samples = []
             for sample in sensor:
                 samples.append(sample)
@@ -73,6 +74,9 @@ class OnTheRig(unittest.TestCase):
             after = next(sensor)
             with self.assertRaisesRegex(hivtac.RefusedError, "outside its range"):
                 sensor.tare(frames=0)
+            with self.assertRaisesRegex(hivtac.Error, "0.25 to 4 mm"):
+                sensor.set_contact("flat:5")
+            sensor.set_contact("flat:2")
         self.assertEqual(after.sequence, before.sequence + 1)
         self.assertEqual(tare.markers.shape, (4, 2))
         self.assertLess(tare.spread, 0.5)
