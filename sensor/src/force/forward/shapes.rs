@@ -25,9 +25,11 @@ const LARGEST_STEP: f32 = 1e-3;
 const TIP_MM: f32 = 0.5;
 const LARGEST_MM: f32 = 4.0;
 /// Uncertainty of a contact whose shape and radius are set: of its own motion, in parts of that;
-/// and of any motion, in parts of what all shapes leave, at radius 0 and more per mm.
-const OF_OWN: f32 = 0.25;
-const OF_ALL: [f32; 2] = [0.1, 0.05];
+/// and of any motion, in parts of what all shapes leave, at radius 0 and more per mm. A flat face is
+/// less certain, as it may be tilted.
+const OF_OWN: f32 = 0.4;
+const OF_ALL: [f32; 2] = [0.15, 0.1];
+const OF_ALL_FLAT: [f32; 2] = [0.4, 0.15];
 
 /// The motions of all shapes, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,9 +84,11 @@ impl<'a> Shapes<'a> {
             ContactShape::Round(_) => [0.0, part, square, 0.0, 0.0],
             ContactShape::Flat(_) => [0.0, 0.0, 0.0, part, square],
         };
+        let of_all = |[least, more]: [f32; 2]| least + more * radius_mm;
         let (of_own, of_all) = match shape {
-            ContactShape::Unknown => (0.0, 1.0),
-            _ => (OF_OWN, OF_ALL[0] + OF_ALL[1] * radius_mm),
+            ContactShape::Flat(_) => (OF_OWN, of_all(OF_ALL_FLAT)),
+            ContactShape::Round(_) => (OF_OWN, of_all(OF_ALL)),
+            ContactShape::Needle | ContactShape::Unknown => (0.0, 1.0),
         };
         Some(Pressing {
             shapes: *self,
@@ -233,9 +237,12 @@ mod tests {
         assert_eq!(added(ContactShape::Needle), None);
         near(added(ContactShape::Unknown), 1e-3, 1e-2);
         let largest = Micrometres(4000);
-        let root = |moved: f32| (OF_OWN * moved).hypot((OF_ALL[0] + 4.0 * OF_ALL[1]) * 1e-2);
-        near(added(ContactShape::Round(largest)), 5e-3, root(5e-3));
-        near(added(ContactShape::Flat(largest)), 9e-3, root(9e-3));
+        let root = |moved: f32, of_all: [f32; 2]| {
+            (OF_OWN * moved).hypot((of_all[0] + 4.0 * of_all[1]) * 1e-2)
+        };
+        let [round, flat] = [ContactShape::Round(largest), ContactShape::Flat(largest)];
+        near(added(round), 5e-3, root(5e-3, OF_ALL));
+        near(added(flat), 9e-3, root(9e-3, OF_ALL_FLAT));
         let [tip, _] = added(ContactShape::Round(Micrometres(500))).unwrap();
         assert_eq!(tip, 0.0);
     }
