@@ -13,6 +13,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
 use hivtac_shell::{Design, Film};
+use hivtac_terms::contact_shape::ContactShape;
 
 use crate::anywhere::WEIGHTS;
 use crate::page;
@@ -73,25 +74,78 @@ impl Contacts {
             return page::print_rows(&presses);
         }
         let mut reader = Reader::new(model, &weights, seeded(self.seed))?;
-        let rows = KINDS
-            .into_iter()
-            .map(|kind| self.row(&mut reader, kind, &presses));
-        let rows = rows.collect::<Result<Vec<Row>>>()?;
+        let mut rows = Vec::new();
+        for setting in Setting::ALL {
+            rows.extend(self.rows(&mut reader, setting, &presses)?);
+        }
         if self.json {
             return page::print_rows(&rows);
         }
-        print!("{}", row::table(&rows));
-        Ok(())
+        let table = row::table(&rows);
+        print!("{table}");
+        page::write("contacts.md", include_str!("page.md"), &table)
     }
 
-    fn row(&self, reader: &mut Reader<'_>, kind: Kind, presses: &[Press]) -> Result<Row> {
-        let mut row = Row::new(kind.name());
-        for press in presses.iter().filter(|press| press.kind == kind) {
-            row.begin_press();
-            for _ in 0..self.frames {
-                row.add(reader.read(press)?.as_ref(), press)?;
+    /// The rows of all kinds under a setting, then one of all of them but the longest.
+    fn rows(
+        &self,
+        reader: &mut Reader<'_>,
+        setting: Setting,
+        presses: &[Press],
+    ) -> Result<Vec<Row>> {
+        let mut rows = Vec::new();
+        let mut all = Row::new("all but cylinders of 12 mm".into(), setting.name());
+        for kind in KINDS {
+            let mut row = Row::new(kind.name(), setting.name());
+            for press in presses.iter().filter(|press| press.kind == kind) {
+                let Some(shape) = setting.shape(press) else {
+                    continue;
+                };
+                row.begin_press();
+                for _ in 0..self.frames {
+                    let (force, status) = reader.read(press, shape)?;
+                    row.add(&force, status, press)?;
+                }
+            }
+            if !row.is_empty() {
+                if kind != Kind::Cylinder(12.0) {
+                    all.extend(&row);
+                }
+                rows.push(row);
             }
         }
-        Ok(row)
+        rows.push(all);
+        Ok(rows)
+    }
+}
+
+/// What the sensor is told of what presses.
+#[derive(Clone, Copy)]
+enum Setting {
+    /// Nothing.
+    Unknown,
+    /// The shape, of presses that have one.
+    Set,
+    /// That it is a needle, whatever it is.
+    Needle,
+}
+
+impl Setting {
+    const ALL: [Setting; 3] = [Setting::Unknown, Setting::Set, Setting::Needle];
+
+    fn name(self) -> &'static str {
+        match self {
+            Setting::Unknown => "unknown",
+            Setting::Set => "its own",
+            Setting::Needle => "needle",
+        }
+    }
+
+    fn shape(self, press: &Press) -> Option<ContactShape> {
+        match self {
+            Setting::Unknown => Some(ContactShape::Unknown),
+            Setting::Set => press.shape,
+            Setting::Needle => Some(ContactShape::Needle),
+        }
     }
 }

@@ -2,7 +2,10 @@
 
 use anyhow::Result;
 use hivtac_shell::{Body, Ends, Patch, Shape};
+use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::units::Micrometres;
 use hivtac_twin::Load;
+use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -20,6 +23,8 @@ const CYLINDER_MM: f64 = 0.8;
 /// A kind of objects.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub enum Kind {
+    /// The model's own tip.
+    Needle,
     /// A soft disc with Hertz's pressure, with a radius in this range, mm.
     Disc([f64; 2]),
     /// A rigid flat face, straight.
@@ -35,7 +40,8 @@ pub enum Kind {
 }
 
 /// All kinds.
-pub const KINDS: [Kind; 10] = [
+pub const KINDS: [Kind; 11] = [
+    Kind::Needle,
     Kind::Disc([0.25, 1.0]),
     Kind::Disc([1.0, 2.5]),
     Kind::Disc([2.5, 4.0]),
@@ -64,6 +70,8 @@ pub struct Drawn {
     pub name: String,
     /// The object.
     pub object: Object,
+    /// Its shape, if the sensor can be told.
+    pub shape: Option<ContactShape>,
     /// The force on the film, N, film frame.
     pub force_n: [f64; 3],
 }
@@ -72,6 +80,7 @@ impl Kind {
     /// Returns the kind in words.
     pub fn name(self) -> String {
         match self {
+            Kind::Needle => "needle".into(),
             Kind::Disc([from, to]) => format!("soft disc, {from} to {to} mm"),
             Kind::Face => format!("flat face, {} to {} mm", FACES_MM[0], FACES_MM[1]),
             Kind::TiltedFace => format!("the same, tilted to {TILT_DEG}°"),
@@ -97,45 +106,58 @@ impl Kind {
         let [alpha_deg, beta_deg] = [(); 2].map(|()| between([-ANGLE_DEG, ANGLE_DEG]));
         let place_mm = [(); 2].map(|()| between([-REACH_MM, REACH_MM]));
         let load = Load::from_angles(force_n, alpha_deg, beta_deg)?;
-        let (name, object) = self.object(place_mm, &mut random)?;
+        let (name, object, shape) = self.object(place_mm, &mut random)?;
         let [x, y] = place_mm;
         Ok(Drawn {
             name: format!("{name} over ({x:.2}, {y:.2}) mm, {:.0} mN", 1e3 * force_n),
             object,
+            shape,
             force_n: load.vector_n(),
         })
     }
 
     /// Draws an object over a point of the film, mm.
-    fn object(self, place_mm: [f64; 2], random: &mut ChaCha8Rng) -> Result<(String, Object)> {
+    fn object(
+        self,
+        place_mm: [f64; 2],
+        random: &mut ChaCha8Rng,
+    ) -> Result<(String, Object, Option<ContactShape>)> {
         let mut between = |[from, to]: [f64; 2]| random.random_range(from..=to);
         let turned = |shape, turned_deg| Body {
             turned_deg,
             ..Body::rigid(shape, place_mm)
         };
         let body = |body: Body| Object::Body(body);
+        let micrometres = |mm: f64| Micrometres((1e3 * mm).round() as u32);
+        let flat = |radius_mm| Some(ContactShape::Flat(micrometres(radius_mm)));
         Ok(match self {
+            Kind::Needle => {
+                let tip = Object::Patch(Patch::tip(place_mm, NOMINAL_RADIUS_MM)?);
+                ("needle".into(), tip, Some(ContactShape::Needle))
+            }
             Kind::Disc(range) => {
                 let radius = between(range);
                 let name = format!("soft disc of {radius:.2} mm");
-                (name, Object::Patch(Patch::disc(place_mm, radius)?))
+                let disc = Object::Patch(Patch::disc(place_mm, radius)?);
+                (name, disc, Some(ContactShape::Round(micrometres(radius))))
             }
             Kind::Face => {
                 let radius_mm = between(FACES_MM);
                 let name = format!("flat face of {radius_mm:.2} mm");
-                (name, body(turned(Shape::Face { radius_mm }, 0.0)))
+                let face = body(turned(Shape::Face { radius_mm }, 0.0));
+                (name, face, flat(radius_mm))
             }
             Kind::TiltedFace => {
                 let radius_mm = between(FACES_MM);
                 let (turned_deg, tilt_deg) = (between([0.0, 360.0]), between([0.0, TILT_DEG]));
                 let face = turned(Shape::Face { radius_mm }, turned_deg);
                 let name = format!("flat face of {radius_mm:.2} mm, tilted by {tilt_deg:.1}°");
-                (name, body(Body { tilt_deg, ..face }))
+                (name, body(Body { tilt_deg, ..face }), flat(radius_mm))
             }
             Kind::Pad => {
                 let turned_deg = between([0.0, 180.0]);
                 let name = format!("pad at {turned_deg:.0}°");
-                (name, body(Body::pad(place_mm, turned_deg)))
+                (name, body(Body::pad(place_mm, turned_deg)), None)
             }
             Kind::Cylinder(length_mm) => {
                 let turned_deg = between([0.0, 180.0]);
@@ -145,12 +167,12 @@ impl Kind {
                     ends: Ends::Rounded,
                 };
                 let name = format!("cylinder of {length_mm} mm at {turned_deg:.0}°");
-                (name, body(turned(shape, turned_deg)))
+                (name, body(turned(shape, turned_deg)), None)
             }
             Kind::Ball(diameter) => {
                 let radius_mm = diameter / 2.0;
                 let name = format!("ball of {diameter} mm");
-                (name, body(turned(Shape::Sphere { radius_mm }, 0.0)))
+                (name, body(turned(Shape::Sphere { radius_mm }, 0.0)), None)
             }
         })
     }

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result};
 use hivtac_shell::{Film, markers};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_twin::Camera;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -24,6 +25,9 @@ pub struct Press {
     pub name: String,
     /// Its kind.
     pub kind: Kind,
+    /// Its shape, if the sensor can be told.
+    #[serde(skip)]
+    pub shape: Option<ContactShape>,
     /// The motion of the markers' images since rest, px of the camera, in the order of the markers.
     /// In focal lengths: divided by [`Camera::focal_px`].
     pub moved_px: [[f64; 2]; 4],
@@ -74,6 +78,7 @@ impl Press {
         let Drawn {
             name,
             object,
+            shape,
             force_n,
         } = drawn;
         let (state, centre_mm) = match object {
@@ -91,6 +96,7 @@ impl Press {
         Ok(Press {
             name,
             kind,
+            shape,
             moved_px: std::array::from_fn(moved),
             force_n,
             centre_mm,

@@ -7,6 +7,7 @@ use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
@@ -38,14 +39,15 @@ impl<'m> Reader<'m> {
         })
     }
 
-    /// Returns the force of a press, in one draw of noise; `None` if the sensor refuses it.
+    /// Returns the force of a press, with its status, in one draw of noise and with this setting of
+    /// what presses.
     ///
     /// # Errors
     /// If the centroids do not fit the chip's numbers.
-    pub fn read(&mut self, press: &Press) -> Result<Option<Force>> {
+    pub fn read(&mut self, press: &Press, shape: ContactShape) -> Result<(Force, Status)> {
         let seen = self.observation(&press.moved_px)?;
-        let (force, status) = self.chip.force(&seen)?;
-        Ok((!status.intersects(Status::NO_FORCE)).then_some(force))
+        self.chip.set_contact_shape(shape);
+        self.chip.force(&seen)
     }
 
     /// Returns what a frame shows if the markers' images move like this, px.

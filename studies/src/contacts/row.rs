@@ -1,9 +1,10 @@
-//! Sums the errors of one kind of presses.
+//! Sums the errors of one kind of presses under one setting.
 
 use anyhow::{Context, Result};
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::Force;
+use hivtac_terms::status::Status;
 use serde::Serialize;
 
 use super::presses::Press;
@@ -12,14 +13,15 @@ use super::presses::Press;
 #[derive(Debug, Default, Serialize)]
 pub struct Row {
     kind: String,
+    setting: &'static str,
     presses: u32,
     frames: u32,
-    /// Frames without a force.
-    refused: u32,
-    /// Sums over frames with a force: of squares of the direction's error, degrees; of |F|'s, in
-    /// parts of the true size; of the place's, mm.
-    squares: [f64; 3],
-    /// Sum of the errors of |F|, in parts of the true size.
+    /// Frames with a force that one contact explains loosely.
+    loosely: u32,
+    /// Errors in frames with a force: of the direction, degrees; of |F|, in parts of the true size;
+    /// of the place, mm.
+    errors: [Vec<f64>; 3],
+    /// Sum of the errors of |F| with their signs.
     stronger: f64,
     /// Frames with errors within their stated 95 % bounds, of the same three.
     within: [u32; 3],
@@ -27,11 +29,17 @@ pub struct Row {
 
 impl Row {
     /// Returns a row without presses.
-    pub fn new(kind: String) -> Row {
+    pub fn new(kind: String, setting: &'static str) -> Row {
         Row {
             kind,
+            setting,
             ..Row::default()
         }
+    }
+
+    /// Returns whether it has no presses.
+    pub fn is_empty(&self) -> bool {
+        self.presses == 0
     }
 
     /// Counts a press.
@@ -39,24 +47,19 @@ impl Row {
         self.presses += 1;
     }
 
-    /// Adds a frame of a press; `None` if the sensor refused it.
+    /// Adds a frame of a press.
     ///
     /// # Errors
     /// If the force has no place.
-    pub fn add(&mut self, force: Option<&Force>, press: &Press) -> Result<()> {
+    pub fn add(&mut self, force: &Force, status: Status, press: &Press) -> Result<()> {
         self.frames += 1;
-        let Some(force) = force else {
-            self.refused += 1;
+        if status.intersects(Status::NO_FORCE) {
             return Ok(());
-        };
+        }
+        self.loosely += u32::from(status.contains(Status::LOOSELY_EXPLAINED));
         let place = force.place.context("the model tells no places")?;
         let [x, y] = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
-        let size_n = press
-            .force_n
-            .iter()
-            .map(|part| part * part)
-            .sum::<f64>()
-            .sqrt();
+        let size_n = length(press.force_n);
         let found = force.cartesian.map(|part| f64::from(part.0));
         let stronger = f64::from(force.magnitude.0) * 1e-6 / size_n - 1.0;
         let errors = [
@@ -71,35 +74,63 @@ impl Row {
         ];
         self.stronger += stronger;
         for k in 0..3 {
-            self.squares[k] += errors[k] * errors[k];
+            self.errors[k].push(errors[k]);
             self.within[k] += u32::from(errors[k] <= bounds[k]);
         }
         Ok(())
     }
 
+    /// Adds the frames of another row to this one.
+    pub fn extend(&mut self, other: &Row) {
+        self.presses += other.presses;
+        self.frames += other.frames;
+        self.loosely += other.loosely;
+        self.stronger += other.stronger;
+        for k in 0..3 {
+            self.errors[k].extend(&other.errors[k]);
+            self.within[k] += other.within[k];
+        }
+    }
+
     fn line(&self) -> String {
-        let refused = 100.0 * f64::from(self.refused) / f64::from(self.frames);
-        let before = format!("| {} | {} | {refused:.0} % |", self.kind, self.presses);
-        let told = f64::from(self.frames - self.refused);
+        let Row { kind, setting, .. } = self;
+        let told = self.errors[0].len() as f64;
+        let [kept, loosely] =
+            [told, f64::from(self.loosely)].map(|count| 100.0 * count / f64::from(self.frames));
+        let before = format!(
+            "| {kind} | {setting} | {} | {kept:.0} % | {loosely:.0} % |",
+            self.presses
+        );
         if told == 0.0 {
             return format!("{before} – | – | – | – |\n");
         }
-        let [direction, size, place] = self.squares.map(|sum| (sum / told).sqrt());
+        let parts = self.errors.each_ref().map(|errors| {
+            let mut sorted = errors.clone();
+            sorted.sort_by(f64::total_cmp);
+            [50, 95].map(|part| sorted[(sorted.len() * part / 100).min(sorted.len() - 1)])
+        });
+        let [[angle, most_angle], [size, most_size], [place, most_place]] = parts;
         let [a, b, c] = self.within.map(|within| 100.0 * f64::from(within) / told);
         format!(
-            "{before} {direction:.2}° | {:+.1} %, {:.1} % | {place:.3} mm | {a:.0}, {b:.0}, \
-             {c:.0} % |\n",
-            100.0 * self.stronger / told,
-            100.0 * size
+            "{before} {angle:.2}° [{most_angle:.1}] | {:.1} % [{:.1}], {:+.1} % | {place:.3} mm \
+             [{most_place:.2}] | {a:.0}, {b:.0}, {c:.0} % |\n",
+            100.0 * size,
+            100.0 * most_size,
+            100.0 * self.stronger / told
         )
     }
+}
+
+fn length(vector: [f64; 3]) -> f64 {
+    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
 /// Returns the table of all kinds.
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
-        "| what presses | presses | refused | direction, rms | \\|F\\|, mean and rms | place, rms | \
-         within the stated 95 %: direction, \\|F\\|, place |\n|---|--:|--:|--:|--:|--:|--:|\n",
+        "| what presses | `contact` | presses | forces | of these loosely | direction, median \
+         [95 %] | \\|F\\|, median [95 %], mean | place, median [95 %] | within the stated 95 %: \
+         direction, \\|F\\|, place |\n|---|---|--:|--:|--:|--:|--:|--:|--:|\n",
     );
     text.extend(rows.iter().map(Row::line));
     text
@@ -114,10 +145,10 @@ mod tests {
         let row = Row {
             presses: 2,
             frames: 4,
-            refused: 4,
-            ..Row::new("pad".into())
+            ..Row::new("pad".into(), "needle")
         };
-        assert_eq!(row.line(), "| pad | 2 | 100 % | – | – | – | – |\n");
+        let line = "| pad | needle | 2 | 0 % | 0 % | – | – | – | – |\n";
+        assert_eq!(row.line(), line);
         assert_eq!(table(&[row]).lines().count(), 3);
     }
 }
