@@ -32,6 +32,7 @@ enum Command {
     #[command(subcommand)]
     Scene(scene::SceneCommand),
     Slip(slip::Slip),
+    Stretched(units::Stretched),
     Tradeoff(tradeoff::TradeoffArgs),
     Unseen(unseen::Unseen),
     Units(units::Units),
@@ -46,6 +47,7 @@ fn main() -> Result<()> {
         Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
         Command::Slip(study) => study.run(),
+        Command::Stretched(study) => study.run(),
         Command::Tradeoff(study) => study.run(),
         Command::Unseen(study) => study.run(),
         Command::Units(study) => study.run(),

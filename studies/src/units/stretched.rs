@@ -1,8 +1,10 @@
-//! Writes the files of a unit with a stretched film, for tests of the host tool.
+//! Writes the files of a unit with a stretched film, which tests of the host tool read.
 
 use std::fs;
-use std::path::Path;
+use std::path::PathBuf;
 
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
@@ -21,52 +23,58 @@ const NUMBER: u64 = 16;
 const PLACE_MM: [f64; 2] = [1.0, -0.5];
 const FORCES_N: [f64; 6] = [5e-4, 1e-3, 1.5e-3, 2e-3, 1e-2, 0.1];
 
-/// Calibrates the unit by ten loads, and writes its model and the motion of its film.
-#[test]
-#[ignore = "writes host-tool/tests/tool/stretched"]
-fn a_stretched_unit_is_written() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    let weights = Weights::load(&root.join(WEIGHTS)).unwrap();
-    let file = export(&weights).unwrap();
-    let model = Model::parse(&file).unwrap();
-    let unit = TestedUnit::with_real_film(&model.conditions, NUMBER).unwrap();
-    let mut tared = unit.tare(&model).unwrap();
-    let own = export(
-        &Bench::Ten
-            .calibrate(&weights, &unit, &mut tared, NUMBER)
-            .unwrap(),
-    )
-    .unwrap();
-    let loads = FORCES_N.map(|force_n| {
-        let load = Load::from_angles(force_n, 0.0, 0.0).unwrap();
-        load.with_offset_mm(PLACE_MM).unwrap()
-    });
-    let states = [Load::REST].iter().chain(&loads);
-    let states: Vec<Value> = states.map(|load| state(&unit, load)).collect();
-    let options = unit.scene.options();
-    let told = json!({
-        "shift_px": options.mounting.shift_px,
-        "roll_deg": options.mounting.roll_deg,
-        "pitch_um": options.lens.pitch_um,
-        "glued_mm": options.glued_mm,
-        "states": states,
-    });
-    let folder = root.join("host-tool/tests/tool/stretched");
-    fs::create_dir_all(&folder).unwrap();
-    fs::write(folder.join("model.hvtm"), own).unwrap();
-    fs::write(folder.join("film.json"), format!("{told}\n")).unwrap();
+/// Calibrate a unit with a stretched film by ten loads; write its model and the motion of its film.
+#[derive(Args)]
+pub struct Stretched {
+    /// A weights file of a network that tells places, with its film.
+    #[arg(long, default_value = WEIGHTS)]
+    weights: PathBuf,
+    /// The folder that gets `model.hvtm` and `film.json`.
+    #[arg(long, default_value = "host-tool/tests/tool/stretched")]
+    into: PathBuf,
+}
+
+impl Stretched {
+    /// Writes both files.
+    pub fn run(&self) -> Result<()> {
+        let weights = Weights::load(&self.weights)?;
+        let file = export(&weights)?;
+        let model = Model::parse(&file).map_err(|error| anyhow!("{error}"))?;
+        let unit = TestedUnit::with_real_film(&model.conditions, NUMBER)?;
+        let mut tared = unit.tare(&model)?;
+        let own = export(&Bench::Ten.calibrate(&weights, &unit, &mut tared, NUMBER)?)?;
+        let loads = FORCES_N.map(|force_n| {
+            let load = Load::from_angles(force_n, 0.0, 0.0)?;
+            load.with_offset_mm(PLACE_MM)
+        });
+        let mut states = vec![state(&unit, &Load::REST)?];
+        for load in loads {
+            states.push(state(&unit, &load?)?);
+        }
+        let options = unit.scene.options();
+        let told = json!({
+            "shift_px": options.mounting.shift_px,
+            "roll_deg": options.mounting.roll_deg,
+            "pitch_um": options.lens.pitch_um,
+            "glued_mm": options.glued_mm,
+            "states": states,
+        });
+        fs::create_dir_all(&self.into)?;
+        fs::write(self.into.join("model.hvtm"), own)?;
+        fs::write(self.into.join("film.json"), format!("{told}\n"))?;
+        Ok(())
+    }
 }
 
 /// The film's state under a load.
-fn state(unit: &TestedUnit, load: &Load) -> Value {
-    let load = unit.with_tip(*load).unwrap();
-    let pressed = unit.pressed(&load).unwrap();
-    let pressed = pressed.expect("a film that is not the scene's");
+fn state(unit: &TestedUnit, load: &Load) -> Result<Value> {
+    let load = unit.with_tip(*load)?;
+    let pressed = unit.pressed(&load)?.context("the film is the scene's")?;
     let motion = |disc: DiscMotion| [disc.moved_mm, disc.along_x, disc.along_y];
-    json!({
+    Ok(json!({
         "force_n": pressed.force_n,
         "touches_mm": pressed.touches_mm,
         "centres_mm": pressed.centres_mm,
         "discs": pressed.discs.map(motion),
-    })
+    }))
 }
