@@ -185,12 +185,18 @@ struct Nominal {
 }
 
 impl Weighed for UnitSetup<'_> {
+    type Turned = Film;
+
     fn pressed(&self) -> Vec<Pressed> {
         everywhere()
     }
 
-    fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>> {
-        let film = self.under(down)?;
+    fn turned(&self, down: [f64; 3]) -> Result<Film> {
+        let down = Some(down).filter(|down| *down != [0.0; 3]);
+        Ok(Film::of(self.unit)?.with_down(down)?)
+    }
+
+    fn moved(&self, film: &Film, pressed: &Pressed, sizes: &[f64]) -> Result<Vec<Moved>> {
         let (place_mm, tilt) = *pressed;
         let of_size = |size: &f64| {
             let pose = Pose {
@@ -198,24 +204,17 @@ impl Weighed for UnitSetup<'_> {
                 tilt,
                 place_mm,
             };
-            self.images(|marker| UnitSetup::moved(self, &film, &pose, marker))
+            self.images(|marker| UnitSetup::moved(self, film, &pose, marker))
         };
         sizes.iter().map(of_size).collect()
     }
 
-    fn hangs(&self, down: [f64; 3]) -> Result<Moved> {
-        let film = self.under(down)?;
-        self.images(|marker| self.moved_by(&film, &Load::REST, marker))
+    fn hangs(&self, film: &Film) -> Result<Moved> {
+        self.images(|marker| self.moved_by(film, &Load::REST, marker))
     }
 }
 
 impl UnitSetup<'_> {
-    /// Its film with gravity in this direction.
-    fn under(&self, down: [f64; 3]) -> Result<Film> {
-        let down = Some(down).filter(|down| *down != [0.0; 3]);
-        Ok(Film::of(self.unit)?.with_down(down)?)
-    }
-
     /// All markers' images, each computed from the marker's number.
     fn images(&self, of_marker: impl Fn(usize) -> Result<[f64; 2]>) -> Result<Moved> {
         let mut moved = Moved::default();
@@ -401,11 +400,13 @@ mod tests {
             let (z, angle) = (libm::cos(turn(3)), turn(5));
             let along = (1.0 - z * z).sqrt();
             let down = [along * libm::cos(angle), along * libm::sin(angle), z];
-            let pressed = |down| {
-                let at = (pose.place_mm, pose.tilt);
-                Weighed::moved(&setup, &at, &[pose.size], down).unwrap()[0]
+            let pressed_beside_hanging = |down| {
+                let (film, at) = (setup.turned(down).unwrap(), (pose.place_mm, pose.tilt));
+                let pressed = Weighed::moved(&setup, &film, &at, &[pose.size]).unwrap()[0];
+                let hangs = setup.hangs(&film).unwrap();
+                [0, 1, 2, 3, 4, 5, 6, 7].map(|c| pressed[c] - hangs[c])
             };
-            let hangs = |down| setup.hangs(down).unwrap();
+            let [with, without] = [down, [0.0; 3]].map(pressed_beside_hanging);
             let turned = forward::Turned::From {
                 before: [0.0; 3],
                 now: down.map(|part| part as f32),
@@ -426,9 +427,8 @@ mod tests {
                 &mut covariance,
             );
             for c in 0..8 {
-                let with = pressed(down)[c] - hangs(down)[c];
-                let without = pressed([0.0; 3])[c] - hangs([0.0; 3])[c];
-                let off = camera.focal_px() * (f64::from(told.moved[c]) - (with - without));
+                let moved = f64::from(told.moved[c]);
+                let off = camera.focal_px() * (moved - (with[c] - without[c]));
                 sum += off * off;
                 worst = worst.max(off.abs());
                 count += 1.0;

@@ -18,6 +18,14 @@ const AROUND: usize = 24;
 /// Places of the tip along each axis, and tilts of its force, in parts of the largest.
 const PLACES_MM: [f64; 7] = [-4.5, -3.2, -1.6, 0.0, 1.6, 3.2, 4.5];
 const TILTS: [[f64; 2]; 5] = [[0.0, 0.0], [0.6, 0.0], [-0.6, 0.0], [0.0, 0.6], [0.0, -0.6]];
+/// Gravity for which the effect under loads is computed: none, along −z, z, x and y.
+const DOWN: [[f64; 3]; 5] = [
+    [0.0, 0.0, 0.0],
+    [0.0, 0.0, -1.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 0.0, 0.0],
+    [0.0, 1.0, 0.0],
+];
 /// Standard uncertainty of the effect of weight, in parts of that effect: for a film that was
 /// fitted to its loads, and for any other.
 const UNSURE: [f32; 2] = [0.05, 0.5];
@@ -27,6 +35,9 @@ pub type Pressed = ([f64; 2], [f64; 2]);
 
 /// A film whose images can be computed under loads and gravity.
 pub trait Weighed: Sync {
+    /// The film with gravity in some direction.
+    type Turned: Send + Sync;
+
     /// Weight of the film, as the press that makes it sink as far, N.
     fn press_n(&self) -> f64 {
         AS_A_PRESS_N
@@ -35,18 +46,24 @@ pub trait Weighed: Sync {
     /// Where it is pressed: at least as many loads as there are terms.
     fn pressed(&self) -> Vec<Pressed>;
 
-    /// Motion of all markers' images at one place and tilt under growing sizes with gravity in this
-    /// direction, focal lengths. It counts from the untouched, weightless film.
+    /// The film with gravity in this direction.
     ///
     /// # Errors
     /// When no equilibrium is found.
-    fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>>;
+    fn turned(&self, down: [f64; 3]) -> Result<Self::Turned>;
+
+    /// Motion of all markers' images at one place and tilt under growing sizes, focal lengths. It
+    /// counts from the untouched, weightless film.
+    ///
+    /// # Errors
+    /// When no equilibrium is found.
+    fn moved(&self, film: &Self::Turned, pressed: &Pressed, sizes: &[f64]) -> Result<Vec<Moved>>;
 
     /// The same for the untouched film.
     ///
     /// # Errors
-    /// When no equilibrium is found.
-    fn hangs(&self, down: [f64; 3]) -> Result<Moved>;
+    /// When its images cannot be computed.
+    fn hangs(&self, film: &Self::Turned) -> Result<Moved>;
 }
 
 /// Places all over the film, each with five tilts.
@@ -79,7 +96,8 @@ pub fn weight(film: &impl Weighed, stiffness: Stiffness, down: [f64; 3]) -> Resu
 }
 
 fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST]> {
-    let weightless = film.hangs([0.0; 3])?;
+    let hangs = |down| film.hangs(&film.turned(down)?);
+    let weightless = hangs([0.0; 3])?;
     let around = (0..AROUND).flat_map(|k| {
         let (sin, cos) = libm::sincos(k as f64 * std::f64::consts::TAU / AROUND as f64);
         [[sin, 0.0, cos], [0.0, sin, cos]]
@@ -87,7 +105,7 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
     let around: Vec<[f64; 3]> = around.collect();
     let sides: Vec<Moved> = around
         .par_iter()
-        .map(|down| Ok(less(&film.hangs(*down)?, &weightless)))
+        .map(|down| Ok(less(&hangs(*down)?, &weightless)))
         .collect::<Result<_>>()?;
     let rows = around
         .iter()
@@ -106,10 +124,13 @@ fn under_load(
         LARGEST_SIZE * root * root
     });
     let pressed = film.pressed();
+    let turned = |down| Ok::<_, anyhow::Error>((down, film.turned(down)?));
+    let [weightless, toward, away, along_x, along_y] = DOWN.map(turned);
+    let turned = [weightless?, toward?, away?, along_x?, along_y?];
     // By place and tilt, and by size.
     let sides: Vec<Vec<[Moved; UNDER_LOAD]>> = pressed
         .par_iter()
-        .map(|pressed| added(film, functions, at_rest, pressed, &sizes))
+        .map(|pressed| added(film, &turned, functions, at_rest, pressed, &sizes))
         .collect::<Result<_>>()?;
     let rows = pressed.iter().map(|(place_mm, tilt)| {
         let [place, tilt] = [place_mm, tilt].map(|pair| pair.map(|part| part as f32));
@@ -148,18 +169,21 @@ fn fitted_parts<const N: usize>(
 
 /// What loads of these sizes add to the effect of gravity at rest, by function of gravity. Gravity
 /// along z and −z separates the parts in Δ and in its square; that along the film is proportional.
-fn added(
-    film: &impl Weighed,
+/// `turned` are the films under gravity in each direction of [`DOWN`].
+fn added<F: Weighed>(
+    film: &F,
+    turned: &[([f64; 3], F::Turned); 5],
     functions: &Functions,
     at_rest: &[Moved; AT_REST],
     pressed: &Pressed,
     sizes: &[f64],
 ) -> Result<Vec<[Moved; UNDER_LOAD]>> {
-    let weightless = film.moved(pressed, sizes, [0.0; 3])?;
-    let more = |down: [f64; 3]| -> Result<Vec<(f64, Moved)>> {
-        let moved = film.moved(pressed, sizes, down)?;
+    let [(_, weightless), toward, away, along_x, along_y] = turned;
+    let weightless = film.moved(weightless, pressed, sizes)?;
+    let more = |(down, turned): &([f64; 3], F::Turned)| -> Result<Vec<(f64, Moved)>> {
+        let moved = film.moved(turned, pressed, sizes)?;
         let of_size = |((moved, weightless), size): ((&Moved, &Moved), &f64)| {
-            let parts = functions.at(*size as f32, single(down)).map(f64::from);
+            let parts = functions.at(*size as f32, single(*down)).map(f64::from);
             let mut more = less(moved, weightless);
             for (part, column) in parts.iter().zip(at_rest) {
                 for (sum, value) in more.iter_mut().zip(column) {
@@ -175,10 +199,8 @@ fn added(
             .map(of_size)
             .collect())
     };
-    let toward = more([0.0, 0.0, -1.0])?;
-    let away = more([0.0, 0.0, 1.0])?;
-    let along_x = more([1.0, 0.0, 0.0])?;
-    let along_y = more([0.0, 1.0, 0.0])?;
+    let [toward, away] = [more(toward)?, more(away)?];
+    let [along_x, along_y] = [more(along_x)?, more(along_y)?];
     let of_size = |k: usize| {
         let ((d, toward), (e, away)) = (&toward[k], &away[k]);
         let square: Moved = std::array::from_fn(|c| (toward[c] / d - away[c] / e) / (d - e));

@@ -39,7 +39,7 @@ impl OwnWeight {
     pub fn new(problem: &Problem<'_>, found: &Found, stiffness_n: [f64; 2]) -> Result<Self> {
         let at = problem.coarse(&found.at)?;
         let weightless = turned(&at, [0.0; 3])?;
-        let film = Turned {
+        let film = Hung {
             images: images(problem, &at, &weightless, &weightless.rest()),
             problem,
             at: &at,
@@ -100,7 +100,7 @@ impl OwnWeight {
 }
 
 /// A unit's film that can be turned.
-struct Turned<'a> {
+struct Hung<'a> {
     problem: &'a Problem<'a>,
     /// With gravity as when its loads were applied.
     at: &'a At,
@@ -109,7 +109,9 @@ struct Turned<'a> {
     images: Moved,
 }
 
-impl Weighed for Turned<'_> {
+impl Weighed for Hung<'_> {
+    type Turned = Film;
+
     fn press_n(&self) -> f64 {
         let thickness = |design: &Design| design.material.thickness_mm;
         AS_A_PRESS_N * thickness(&self.at.made.design) / thickness(&Design::default())
@@ -123,9 +125,12 @@ impl Weighed for Turned<'_> {
         places.chain(tilted).collect()
     }
 
-    fn moved(&self, pressed: &Pressed, sizes: &[f64], down: [f64; 3]) -> Result<Vec<Moved>> {
+    fn turned(&self, down: [f64; 3]) -> Result<Film> {
+        turned(self.at, down)
+    }
+
+    fn moved(&self, film: &Film, pressed: &Pressed, sizes: &[f64]) -> Result<Vec<Moved>> {
         let (place_mm, tilt) = *pressed;
-        let film = turned(self.at, down)?;
         let at_mm = self.at.film.material_point(&self.at.rest, place_mm);
         let mut state = film.rest();
         let of_size = |size: &f64| -> Result<Moved> {
@@ -135,18 +140,17 @@ impl Weighed for Turned<'_> {
                 place_mm,
             };
             state = film.press_force(at_mm, force_n(self.stiffness_n, &pose), &state)?;
-            Ok(self.beside_weightless(&film, &state))
+            Ok(self.beside_weightless(film, &state))
         };
         sizes.iter().map(of_size).collect()
     }
 
-    fn hangs(&self, down: [f64; 3]) -> Result<Moved> {
-        let film = turned(self.at, down)?;
-        Ok(self.beside_weightless(&film, &film.rest()))
+    fn hangs(&self, film: &Film) -> Result<Moved> {
+        Ok(self.beside_weightless(film, &film.rest()))
     }
 }
 
-impl Turned<'_> {
+impl Hung<'_> {
     fn beside_weightless(&self, film: &Film, state: &Equilibrium) -> Moved {
         let there = images(self.problem, self.at, film, state);
         std::array::from_fn(|k| there[k] - self.images[k])
