@@ -8,7 +8,7 @@ use crate::data::dataset::Dataset;
 use crate::data::rest::Rest;
 use crate::loads::{Certainty, Rough, SeenLoad, loads_of};
 use crate::quantize::export;
-use crate::unit_fit::{Bench, Fit, OwnFilm, fit};
+use crate::unit_fit::{Bench, FINENESS, Fit, OwnFilm, fit};
 use crate::weights::Weights;
 use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::{Camera, Preset};
@@ -40,36 +40,11 @@ impl Weights {
     /// # Errors
     /// When the data set has other conditions; and as [`Self::fitted`].
     pub fn for_unit(self, dataset: &Dataset, known: Known<'_>) -> Result<(Weights, Fit)> {
-        let [own, other] = [&self.conditions, &dataset.about.conditions];
-        ensure!(
-            own.to_model()?.geometry == other.to_model()?.geometry
-                && own.centroid == other.centroid,
-            "the weights are for other frames than the data set's"
-        );
-        ensure!(
-            own.pixel_format == other.pixel_format,
-            "the weights are for {}, and the unit sends {}: take those for it \
-             (calibration/models), or `hivtac threshold --model`",
-            own.pixel_format.name(),
-            other.pixel_format.name()
-        );
-        ensure!(
-            own.contact == other.contact,
-            "the weights are for the contact reading `{}`, and the data set's is `{}`",
-            own.contact,
-            other.contact
-        );
-        let (origin, threshold, dilations) =
-            (other.origin.clone(), other.threshold, other.dilations);
+        let conditions = conditions_of(&self.conditions, &dataset.about.conditions)?;
         let rest = dataset.rest()?;
         let loads = self.loads(dataset, known)?;
         let (mut weights, found) = self.fitted(rest, &loads, dataset.about.down, known)?;
-        weights.conditions = Conditions {
-            origin,
-            threshold,
-            dilations,
-            ..weights.conditions
-        };
+        weights.conditions = conditions;
         weights.check()?;
         Ok((weights, found))
     }
@@ -116,6 +91,7 @@ impl Weights {
             // Tables are in focal lengths: all cameras have this lens.
             camera: Camera::new(Preset::Ov7725, 320, 240)?,
             down,
+            fineness: FINENESS,
         };
         let from = known.from.map(Weights::own_film).transpose()?;
         let found = fit(&bench, loads, known.stage_mm, from)?;
@@ -133,6 +109,36 @@ impl Weights {
     }
 }
 
+/// The weights' conditions for the unit of a data set: with its own origin, threshold and dilations.
+///
+/// # Errors
+/// When the data set has other frames, another pixel format or another contact reading.
+fn conditions_of(own: &Conditions, unit: &Conditions) -> Result<Conditions> {
+    ensure!(
+        own.to_model()?.geometry == unit.to_model()?.geometry && own.centroid == unit.centroid,
+        "the weights are for other frames than the data set's"
+    );
+    ensure!(
+        own.pixel_format == unit.pixel_format,
+        "the weights are for {}, and the unit sends {}: take those for it \
+         (calibration/models), or `hivtac threshold --model`",
+        own.pixel_format.name(),
+        unit.pixel_format.name()
+    );
+    ensure!(
+        own.contact == unit.contact,
+        "the weights are for the contact reading `{}`, and the data set's is `{}`",
+        own.contact,
+        unit.contact
+    );
+    Ok(Conditions {
+        origin: unit.origin.clone(),
+        threshold: unit.threshold,
+        dilations: unit.dilations,
+        ..own.clone()
+    })
+}
+
 /// Markers 0–3 of a frame's features.
 fn places(features_px: &[f64]) -> [[f64; 2]; 4] {
     std::array::from_fn(|k| [features_px[2 * k], features_px[2 * k + 1]])
@@ -146,6 +152,7 @@ mod tests {
     use hivtac_twin::Contact;
 
     use super::*;
+    use crate::data::conditions::OriginName;
     use crate::data::dataset::{Loads, Recipe, generate};
     use crate::data::range::Range;
 
@@ -164,56 +171,26 @@ mod tests {
     /// A unit's model takes the unit's own threshold: with a different one it would give no force.
     #[test]
     fn a_model_has_the_threshold_of_its_unit() {
-        let recipe = Recipe {
-            loads: Loads::Random(8),
-            rest: 4,
-            ..Recipe::default()
+        let weights = default_weights();
+        let unit = Conditions {
+            origin: OriginName::Unit("00112233445566778899aabb".to_owned()),
+            threshold: [165, 12, 90, 255, 40, 255],
+            dilations: 2,
+            ..weights.conditions.clone()
         };
-        let mut dataset = generate(&recipe, || ()).unwrap();
-        let threshold = [165, 12, 90, 255, 40, 255];
-        dataset.about.conditions.threshold = threshold;
-        let (own, _) = default_weights().for_unit(&dataset, KNOWN).unwrap();
-        assert_eq!(own.conditions.threshold, threshold);
-        dataset.about.conditions.pixel_format = PixelFormat::Yuv422;
-        dataset.about.conditions.threshold = [162, 0, 0, 0, 0, 0];
-        let refused = default_weights().for_unit(&dataset, KNOWN);
+        assert_ne!(weights.conditions, unit);
+        assert_eq!(conditions_of(&weights.conditions, &unit).unwrap(), unit);
+        let yuv422 = Conditions {
+            pixel_format: PixelFormat::Yuv422,
+            threshold: [162, 0, 0, 0, 0, 0],
+            ..unit
+        };
+        let refused = conditions_of(&weights.conditions, &yuv422);
         let error = refused.unwrap_err().to_string();
         assert!(
             error.contains("rgb565") && error.contains("yuv422"),
             "{error}"
         );
-    }
-
-    /// Markers with more scatter than a camera's noise leave more uncertainty. Here, each load's
-    /// are some hundredths of a pixel off.
-    #[test]
-    fn loads_that_scatter_tell_less() {
-        let recipe = Recipe {
-            loads: Loads::Random(5),
-            rest: 4,
-            ..Recipe::default()
-        };
-        let dataset = generate(&recipe, || ()).unwrap();
-        let mut loads = default_weights().loads(&dataset, KNOWN).unwrap();
-        let fitted = |loads: &[SeenLoad]| {
-            let (_, fit) = default_weights()
-                .fitted(dataset.rest().unwrap(), loads, None, KNOWN)
-                .unwrap();
-            let sigmas = fit.own.numbers.iter().map(|number| number.sigma);
-            (fit.chi_square, sigmas.sum::<f64>())
-        };
-        let (usual, known) = fitted(&loads);
-        for (number, load) in loads.iter_mut().enumerate() {
-            for (k, part) in load.seen_px.as_flattened_mut().iter_mut().enumerate() {
-                *part += [0.04, -0.04][(number * 8 + k) * (number + 3) % 5 / 3];
-            }
-        }
-        let (scattered, less) = fitted(&loads);
-        assert!(
-            usual < 1.5 && scattered > 1.5 * usual,
-            "{usual} {scattered}"
-        );
-        assert!(less > 1.05 * known, "{less} {known}");
     }
 
     /// A pressing direction is not the direction of the force that the film model explains.

@@ -34,6 +34,7 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
+use descent::Found;
 use goodness_of_fit::GoodnessOfFit;
 pub use leave_one_out::LeaveOneOutError;
 use numbers::Family;
@@ -41,9 +42,9 @@ pub use own_film::{FoundNumber, OwnFilm};
 pub use problem::Bench;
 use problem::{Problem, Trust};
 
-/// Fineness of the film's mesh. Coarser meshes do not resolve how the film bends between a tip and
-/// a dot near it.
-const FINENESS: f64 = 0.5;
+/// Fineness of a unit's mesh. Coarser meshes do not resolve how the film bends between a tip and a
+/// dot near it.
+pub const FINENESS: f64 = 0.5;
 
 /// Fineness of the mesh on which rates by the numbers are computed.
 const COARSE: f64 = 0.3;
@@ -78,6 +79,27 @@ pub fn fit(
     stage_mm: f64,
     from: Option<&OwnFilm>,
 ) -> Result<Fit> {
+    let (problem, found) = unit_of(bench, loads, stage_mm, from)?;
+    Ok(Fit {
+        chi_square: found.chi_square(),
+        worst: loads[found.worst()],
+        is_held: bench.down.is_some(),
+        left_out: found.left_out(&problem)?,
+        own: OwnFilm::new(&problem, &found)?,
+    })
+}
+
+/// Finds the unit that explains the loads: one of the nominal family if there is one, else any.
+/// Arguments as for [`fit`].
+///
+/// # Errors
+/// As [`fit`].
+fn unit_of<'a>(
+    bench: &'a Bench,
+    loads: &'a [SeenLoad],
+    stage_mm: f64,
+    from: Option<&OwnFilm>,
+) -> Result<(Problem<'a>, Found)> {
     let problem = |family| Problem {
         bench,
         loads,
@@ -101,13 +123,7 @@ pub fn fit(
         bench.noise_px * found.chi_square().sqrt(),
         found.worst() + 1
     );
-    Ok(Fit {
-        chi_square: found.chi_square(),
-        worst: loads[found.worst()],
-        is_held: bench.down.is_some(),
-        left_out: found.left_out(&problem)?,
-        own: OwnFilm::new(&problem, &found)?,
-    })
+    Ok((problem, found))
 }
 
 impl fmt::Display for Fit {

@@ -5,12 +5,12 @@ use hivtac_shell::{Change, Design, Equilibrium, Film};
 use hivtac_twin::Camera;
 use rayon::prelude::*;
 
+use super::COARSE;
 use super::equations::{LoadEquations, LoadSlopes, Normal};
 use super::linear::{Matrix, inverse};
 use super::load::UNKNOWNS;
 use super::numbers::{self, Family, Number, Prior};
 use super::view::View;
-use super::{COARSE, FINENESS};
 use crate::loads::SeenLoad;
 
 /// Beyond this number, loads repeat each other: these cover places and directions all over the
@@ -40,6 +40,8 @@ pub struct Bench {
     pub camera: Camera,
     /// Direction of gravity in the film frame at rest and under all loads, parts of g, if known.
     pub down: Option<[f64; 3]>,
+    /// Fineness of the film's mesh.
+    pub fineness: f64,
 }
 
 /// A unit's numbers, their priors, and the loads to compare them with.
@@ -193,7 +195,7 @@ impl Problem<'_> {
         let bench = self.bench;
         let mut made = Made {
             design: Design {
-                fineness: FINENESS,
+                fineness: bench.fineness,
                 gauss_points: 2,
                 ..Design::default()
             },
