@@ -37,13 +37,13 @@ struct Outcome {
     wrong: Vec<String>,
 }
 
-fn outcome(sensor: &mut TaredSensor, case: &HardCase, presses: u64) -> Outcome {
+fn outcome(sensor: &mut TaredSensor, case: &HardCase, seed: u64, presses: u64) -> Outcome {
     let scene = case.scene(Preset::Ov7725, 320, 240, 7).unwrap();
-    let mut random = Random::new(17);
+    let mut random = Random::new(seed);
     let mut outcome = Outcome::default();
     for number in 0..presses {
         let load = PRESSES.draw(&mut random).unwrap();
-        let frame = scene.render_load(&load, number).unwrap();
+        let frame = scene.render_load(&load, seed << 32 | number).unwrap();
         match Judged::of(&sensor.sense(&frame), &frame.truth) {
             Judged::Right => outcome.right += 1,
             Judged::Refused(_) => outcome.refused += 1,
@@ -76,11 +76,11 @@ impl Outcome {
 }
 
 /// Moving cases are left out: they are about one frame's time, and their force itself moves.
-fn hold(presses: u64) {
+fn hold(seed: u64, presses: u64) {
     let mut sensor = sensor();
     let mut wrong = Vec::new();
     for case in hard_cases().iter().filter(|case| !case.moves()) {
-        let outcome = outcome(&mut sensor, case, presses);
+        let outcome = outcome(&mut sensor, case, seed, presses);
         println!(
             "{}: {} right, {} refused, {} wrong",
             case.name,
@@ -95,25 +95,25 @@ fn hold(presses: u64) {
 
 #[test]
 fn hard_cases_anywhere_are_right_or_refused() {
-    hold(60);
+    hold(17, 60);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
-    hold(150);
+    hold(18, 90);
 }
 
 /// Checks honest frames in which no marker reaches the picture's border: at most one in a thousand
 /// is refused, and none is wrong.
-fn hardly_any_is_refused(frames: u64) {
+fn hardly_any_is_refused(seed: u64, frames: u64) {
     let mut sensor = sensor();
     let scene = hivtac_twin::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
-    let mut random = Random::new(23);
+    let mut random = Random::new(seed);
     let (mut refused, mut reasons) = (0, BTreeMap::new());
     for number in 0..frames {
         let load = HONEST.draw(&mut random).unwrap();
-        let frame = scene.render_load(&load, number).unwrap();
+        let frame = scene.render_load(&load, seed << 32 | number).unwrap();
         match Judged::of(&sensor.sense(&frame), &frame.truth) {
             Judged::Right => {}
             Judged::Refused(status) if status.contains(Status::MARKERS_MISSING) => {}
@@ -133,11 +133,11 @@ fn hardly_any_is_refused(frames: u64) {
 
 #[test]
 fn honest_frames_anywhere_are_accepted() {
-    hardly_any_is_refused(2_000);
+    hardly_any_is_refused(23, 2_000);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn of_twenty_thousand_honest_frames_anywhere_at_most_twenty_are_refused() {
-    hardly_any_is_refused(20_000);
+fn of_thousands_of_honest_frames_anywhere_at_most_one_in_a_thousand_is_refused() {
+    hardly_any_is_refused(24, 8_000);
 }
