@@ -12,7 +12,7 @@ use crate::{artifacts, process};
 /// Limits of each attack: seconds in total; then seconds and MiB of memory for one input. A
 /// recording and its gauge may differ by half a day, and the search of that whole range takes
 /// seconds, or more while other tests run.
-const LIMITS: [&str; 3] = ["-max_total_time=10", "-timeout=100", "-rss_limit_mb=2048"];
+const LIMITS: [&str; 3] = ["-max_total_time=4", "-timeout=100", "-rss_limit_mb=2048"];
 /// Compiler flags that report to libFuzzer the reached code and its comparisons. They are
 /// cargo-fuzz's without a sanitizer, which needs a nightly compiler; no attacked code is `unsafe`.
 const COVERAGE: &str = "--cfg=fuzzing -Cpasses=sancov-module \
@@ -20,6 +20,8 @@ const COVERAGE: &str = "--cfg=fuzzing -Cpasses=sancov-module \
     -Cllvm-args=-sanitizer-coverage-inline-8bit-counters \
     -Cllvm-args=-sanitizer-coverage-pc-table \
     -Cllvm-args=-sanitizer-coverage-trace-compares";
+/// Settings for packages that attacks only link: they are built quickly.
+const LINKED: [&str; 2] = ["--config", "profile.tools.package.hivtac-shell.opt-level=0"];
 /// The text before libFuzzer's number of tried inputs.
 const TRIED: &str = "stat::number_of_executed_units:";
 
@@ -55,6 +57,7 @@ fn build() -> Result<PathBuf> {
         "--target",
         &toolchain::rustc("--print host-tuple")?,
     ]);
+    command.args(LINKED);
     let program = artifacts::build(command.env("RUSTFLAGS", COVERAGE), "model")?;
     Ok(program.with_file_name(""))
 }
