@@ -136,12 +136,14 @@ pub fn test() -> Command {
     command
 }
 
-/// The cargo commands that build all programs and tests for this computer.
-pub fn everything() -> [Command; 3] {
+/// The cargo commands that build all programs and tests for this computer. Those of `hivtac serve`
+/// need many more packages, and are among them if `serving` is set.
+pub fn everything(serving: bool) -> Vec<Command> {
     let [mut all, mut by_name] = [(); 2].map(|()| host_cargo("build"));
     all.arg("--all-targets");
     by_name.args(RIG_TESTS).args(ROOMS_TESTS);
-    [all, by_name, serving_command()]
+    let serving = serving.then(serving_command);
+    [all, by_name].into_iter().chain(serving).collect()
 }
 
 /// Whether builds for this computer also lint this project's packages.

@@ -2,7 +2,8 @@
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Command;
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, OnceLock};
 use std::thread;
 
 use anyhow::{Context, Result, anyhow, ensure};
@@ -28,26 +29,23 @@ pub struct Test {
 type Step = (&'static str, Work, Option<fn() -> Option<&'static str>>);
 type Work = fn(&Shared, &mut Tally) -> Result<()>;
 
-/// The steps of the main thread.
-static FIRST: [Step; 4] = [
+/// The steps. Two threads take them in this order, each the next one when it is free. Builds for
+/// the microcontroller come first, in their own folder, while the lints hold the common one. Long
+/// steps follow; those after them fill the time until both threads end.
+static STEPS: [Step; 14] = [
     ("format", |_, _| format(), None),
-    ("lints: host", |_, _| host_lints(), None),
-    ("tests: host", host_tests, None),
-    ("tests: across rooms", cross_room_tests, None),
-];
-
-/// The steps of the second thread, about half of the work: builds for the microcontroller, attacks
-/// and the rig's tests, between steps on which no others depend. Builds for the microcontroller
-/// come first, in their own folder, while the lints hold the common one.
-static BESIDE: [Step; 10] = [
-    ("lints: microcontroller", |_, _| target_lints(), None),
+    (
+        "lints: microcontroller",
+        |shared, _| shared.target_lints(),
+        None,
+    ),
+    ("lints: host", |shared, _| host_lints(shared.all), None),
     (BUILD, |shared, _| shared.build(), None),
     ("tests: rig", rig_tests, None),
-    ("tests: rig at half speed", rig_tests_at_half_speed, None),
+    ("tests: host", host_tests, None),
+    ("tests: across rooms", cross_room_tests, None),
     ("attacks", |_, _| fuzz::run(), Some(fuzz::obstacle)),
-    ("benchmark", |_, _| bench::Bench::default().run(), None),
-    ("build: board benchmark", |_, _| bench::board::lint(), None),
-    ("licences", |_, _| licences(), Some(no_cargo_deny)),
+    ("tests: rig at half speed", rig_tests_at_half_speed, None),
     (
         "tests: python",
         |_, tally| python::test_package(tally),
@@ -58,6 +56,9 @@ static BESIDE: [Step; 10] = [
         |_, tally| python::test_serve(tally),
         Some(python::no_serve),
     ),
+    ("benchmark", |_, _| bench::Bench::default().run(), None),
+    ("build: board benchmark", |_, _| bench::board::lint(), None),
+    ("licences", |_, _| licences(), Some(no_cargo_deny)),
 ];
 
 /// The build, which also runs if a chosen step needs it.
@@ -72,40 +73,50 @@ struct Shared {
     all: bool,
     /// Set by the step that builds them; `None` after a failure.
     programs: OnceLock<Option<Programs>>,
+    /// Held by steps that write the microcontroller's files: lints leave others than builds.
+    target: Mutex<()>,
 }
 
 impl Test {
     /// Runs every step, including those after a failure, and prints the table. It uses two threads,
     /// because a single build or test would leave cores idle.
     pub fn run(&self) -> Result<()> {
-        let wanted = |steps: &'static [Step]| steps.iter().filter(|step| self.wants(step));
-        let all = wanted(&FIRST).chain(wanted(&BESIDE)).count();
-        ensure!(all > 0, "no step is called so; some need `--all`");
+        let wanted: Vec<&Step> = STEPS.iter().filter(|step| self.wants(step)).collect();
+        ensure!(
+            !wanted.is_empty(),
+            "no step is called so; some need `--all`"
+        );
         if toolchain::has("clippy") {
             artifacts::lint_as_built();
         }
         let shared = Shared {
             all: self.all,
             programs: OnceLock::new(),
+            target: Mutex::default(),
         };
-        let report = Report::new(all, toolchain::work_folder("test")?);
-        let run = |steps| {
-            for &(name, work, slow) in wanted(steps) {
+        let report = Report::new(wanted.len(), toolchain::work_folder("test")?);
+        let next = AtomicUsize::new(0);
+        let take = || wanted.get(next.fetch_add(1, Ordering::Relaxed));
+        let work = || {
+            while let Some(&&(name, work, slow)) = take() {
                 let obstacle = || slow.and_then(|obstacle| obstacle());
                 report.step(name, obstacle, |tally| work(&shared, tally));
             }
         };
-        let beside = thread::scope(|scope| {
-            let beside = scope.spawn(|| {
-                let ended = catch_unwind(AssertUnwindSafe(|| run(&BESIDE)));
+        let caught = || {
+            let ended = catch_unwind(AssertUnwindSafe(work));
+            if ended.is_err() {
                 // Ends the wait of any step for the programs.
                 shared.programs.get_or_init(|| None);
-                ended
-            });
-            run(&FIRST);
-            beside.join().flatten()
+            }
+            ended
+        };
+        let [one, other] = thread::scope(|scope| {
+            let beside = scope.spawn(caught);
+            [caught(), beside.join().flatten()]
         });
-        beside.map_err(|_| anyhow!("the steps beside the others panicked"))?;
+        one.and(other)
+            .map_err(|_| anyhow!("a thread of steps panicked"))?;
         report.finish()
     }
 
@@ -120,7 +131,13 @@ impl Test {
 }
 
 impl Shared {
+    fn target_lints(&self) -> Result<()> {
+        let _no_build = self.target.lock();
+        target_lints()
+    }
+
     fn build(&self) -> Result<()> {
+        let _no_lints = self.target.lock();
         let built = Programs::build();
         let problem = built.as_ref().err().map(|error| anyhow!("{error:#}"));
         self.programs.get_or_init(|| built.ok());
@@ -154,10 +171,11 @@ fn format() -> Result<()> {
     Ok(())
 }
 
-/// Checks the builds that [`artifacts::lint_as_built`] linted, and lints the rest.
-fn host_lints() -> Result<()> {
+/// Checks the builds that [`artifacts::lint_as_built`] linted, and lints the rest. What only slow
+/// tests run is left out unless `all` is set.
+fn host_lints(all: bool) -> Result<()> {
     toolchain::ensure_component("clippy", "clippy")?;
-    for command in artifacts::everything() {
+    for command in artifacts::everything(all) {
         artifacts::without_warnings(command)?;
     }
     Ok(())
@@ -236,13 +254,13 @@ mod tests {
         let wanted = |words: &[&str], all| -> Vec<&str> {
             let steps = words.iter().map(|&word| word.to_owned()).collect();
             let test = Test { steps, all };
-            let steps = FIRST.iter().chain(&BESIDE).filter(|step| test.wants(step));
+            let steps = STEPS.iter().filter(|step| test.wants(step));
             steps.map(|step| step.0).collect()
         };
-        assert_eq!(wanted(&[], true).len(), FIRST.len() + BESIDE.len());
+        assert_eq!(wanted(&[], true).len(), STEPS.len());
         assert!(!wanted(&[], false).contains(&"attacks"));
         assert_eq!(wanted(&["format"], false), ["format"]);
-        assert_eq!(wanted(&["rooms"], false), ["tests: across rooms", BUILD]);
+        assert_eq!(wanted(&["rooms"], false), [BUILD, "tests: across rooms"]);
         assert!(wanted(&["firmware"], false).is_empty());
     }
 }
