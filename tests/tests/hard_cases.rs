@@ -85,8 +85,8 @@ impl Honest {
     }
 }
 
-/// Checks nominal frames of these numbers, which the views share: at most one in a thousand is refused, and none
-/// that is accepted has a larger error than allowed.
+/// Checks nominal frames of these numbers, which the views share: at most one in a thousand is
+/// refused, and none that is accepted has a larger error than allowed.
 fn hardly_any_is_refused(views: &[View], frames: Range<usize>) {
     let mut sensors: Vec<_> = views.iter().map(|view| view.sensor().unwrap()).collect();
     let mut found = vec![Honest::default(); views.len()];

@@ -109,7 +109,8 @@ impl Weights {
     }
 }
 
-/// The weights' conditions for the unit of a data set: with its own origin, threshold and dilations.
+/// The weights' conditions for the unit of a data set, with its own origin, threshold and
+/// dilations.
 ///
 /// # Errors
 /// When the data set has other frames, another pixel format or another contact reading.
