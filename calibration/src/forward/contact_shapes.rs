@@ -32,8 +32,8 @@ const EDGE_MM: [f64; 2] = [3.0, 0.8];
 /// Factor on standard uncertainties, and what is added to it at the dots. It rises with the smaller
 /// coordinate of the place, mm. Chosen so that forces of patches outside the ensemble are within
 /// the stated 95 % as often as stated.
-const WIDER: f64 = 1.2;
-const WIDER_AT_DOTS: f64 = 1.5;
+const WIDER: f64 = 1.4;
+const WIDER_AT_DOTS: f64 = 1.6;
 const AT_DOTS_MM: [f64; 2] = [1.0, 2.5];
 /// Half the width of a rim, mm.
 const RIM_MM: f64 = 0.3;
