@@ -86,6 +86,16 @@ impl<'a> CovarianceGrid<'a> {
 
     /// Calls `each` with the number and the weight of every knot around a load.
     pub(super) fn around(&self, pose: &Pose, limits: &Limits, mut each: impl FnMut(usize, f32)) {
+        for (knot, part) in self.corners(pose, limits) {
+            each(knot, part);
+        }
+    }
+
+    /// Compiled once, because the near memory is scarce.
+    #[inline(never)]
+    fn corners(&self, pose: &Pose, limits: &Limits) -> [(usize, f32); 8] {
+        let mut corners = [(0, 0.0); 8];
+        let mut free = corners.iter_mut();
         let [sizes, lines, places] = self.counts.map(usize::from);
         let along = |at_mm: f32| 0.5 + 0.5 * at_mm / self.end_mm;
         let [x, y] = pose.place_mm.map(along);
@@ -93,10 +103,13 @@ impl<'a> CovarianceGrid<'a> {
         for (i, of_size) in between(size, sizes) {
             for (j, of_y) in between(y, lines) {
                 for (k, of_x) in between(x, places) {
-                    each((i * lines + j) * places + k, of_size * of_y * of_x);
+                    if let Some(corner) = free.next() {
+                        *corner = ((i * lines + j) * places + k, of_size * of_y * of_x);
+                    }
                 }
             }
         }
+        corners
     }
 
     /// The largest place, mm.
