@@ -17,9 +17,17 @@ use hivtac_terms::units::Px;
 pub struct Motion {
     /// Lines from frame to frame, blank ones included; `None` with a global shutter.
     lines: Option<u16>,
-    before: Option<[Marker; 4]>,
+    before: Option<Seen>,
     /// The markers of the current frame, which may be looked at again.
-    now: Option<[Marker; 4]>,
+    now: Option<Seen>,
+}
+
+/// The markers of a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Seen {
+    markers: [Marker; 4],
+    /// The identity of one that was not seen.
+    lost: Option<u8>,
 }
 
 impl Motion {
@@ -51,15 +59,52 @@ impl Motion {
 
     /// Call at the end of each frame, with its markers if it showed any.
     pub fn ended(&mut self, seen: Option<&[Marker; 4]>) {
-        self.now = seen.copied();
+        self.now = seen.map(|markers| Seen {
+            markers: *markers,
+            lost: None,
+        });
+    }
+
+    /// Call instead at the end of a frame without marker `lost` (0–3), whose place is not used.
+    pub fn ended_without(&mut self, markers: &[Marker; 4], lost: usize) {
+        self.now = Some(Seen {
+            markers: *markers,
+            lost: Some(lost as u8),
+        });
     }
 
     /// Returns the markers as they were while the middle row of a frame of `rows` rows was exposed.
     /// Returns `None` with a global shutter, or if the previous frame's markers are unknown.
     pub fn at_the_middle(&self, seen: &[Marker; 4], rows: u16) -> Option<[Marker; 4]> {
         let (lines, before) = (self.lines?, self.before.as_ref()?);
+        if before.lost.is_some() {
+            return None;
+        }
         let mut moved = *seen;
-        for (marker, before) in moved.iter_mut().zip(before) {
+        for (marker, before) in moved.iter_mut().zip(&before.markers) {
+            move_to_the_middle(marker, before, rows, lines);
+        }
+        Some(moved)
+    }
+
+    /// As [`at_the_middle`](Self::at_the_middle), in a frame without marker `lost` (0–3). That one
+    /// stays where it is, and need not be known of the previous frame.
+    pub fn three_at_the_middle(
+        &self,
+        seen: &[Marker; 4],
+        lost: usize,
+        rows: u16,
+    ) -> Option<[Marker; 4]> {
+        let (lines, before) = (self.lines?, self.before.as_ref()?);
+        if before
+            .lost
+            .is_some_and(|before| usize::from(before) != lost)
+        {
+            return None;
+        }
+        let mut moved = *seen;
+        let pairs = moved.iter_mut().zip(&before.markers).enumerate();
+        for (_, (marker, before)) in pairs.filter(|(identity, _)| *identity != lost) {
             move_to_the_middle(marker, before, rows, lines);
         }
         Some(moved)
@@ -151,6 +196,29 @@ mod tests {
         global.ended(Some(&before));
         global.begin_frame();
         assert_eq!(global.at_the_middle(&now, ROWS), None);
+    }
+
+    /// The lost marker says nothing, in its own frame and in the next one.
+    #[test]
+    fn three_markers_move_as_four_do_and_the_lost_one_stays() {
+        let [before, now] = [0.0, 4.0].map(|x| PLACES.map(|[x0, y]| marker(x0 + x, y)));
+        let mut whole = Motion::rolling(LINES);
+        whole.ended(Some(&before));
+        whole.begin_frame();
+        let moved = whole.at_the_middle(&now, ROWS).unwrap();
+        for lost in 0..4 {
+            let mut expected = moved;
+            expected[lost] = now[lost];
+            let three = |motion: &Motion| motion.three_at_the_middle(&now, lost, ROWS);
+            assert_eq!(three(&whole), Some(expected));
+            let mut motion = Motion::rolling(LINES);
+            motion.ended_without(&before, lost);
+            motion.begin_frame();
+            assert_eq!(three(&motion), Some(expected));
+            assert_eq!(motion.at_the_middle(&now, ROWS), None);
+            let other = (lost + 1) % 4;
+            assert_eq!(motion.three_at_the_middle(&now, other, ROWS), None);
+        }
     }
 
     #[test]

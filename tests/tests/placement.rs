@@ -66,8 +66,8 @@ fn the_sensing_runs_from_itcm() {
             || symbol.name.starts_with("hivtac_")
     };
     // Code that rarely runs: for a model, a setting, a tare, a message or a self-test, after a force
-    // or in place of one without a film, and for a second look at a refused frame.
-    // It has no loop over pixels or weights.
+    // or in place of one without a film, for a second look at a refused frame, and for a lost
+    // marker. It has no loop over pixels or weights.
     let seldom = [
         "hivtac_sensor5force5model",
         "hivtac_sensor..force..model",
@@ -101,6 +101,11 @@ fn the_sensing_runs_from_itcm() {
         "5trust5Trust3new",
         "hivtac_sensor12known_answer",
         "8pipeline5again",
+        "8pipeline5three",
+        "5rules5three",
+        "7forward5three",
+        "7Resting17estimate_of_three",
+        "6Motion19three_at_the_middle",
         "8majority8Majority",
         "8portable8multiply",
         "8portable6spline",

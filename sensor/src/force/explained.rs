@@ -240,6 +240,23 @@ impl Resting {
         )
     }
 
+    /// Returns the load that explains three markers best, and where marker `lost` (0–3) is seen
+    /// under this load, px.
+    pub fn estimate_of_three(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker; 4],
+        lost: usize,
+        noise: FrameNoise,
+    ) -> (Estimate, (Px, Px)) {
+        let observed = self.observed(forward, markers, noise);
+        let unknown = forward.unknown(self.is_own);
+        let (estimate, moved) = forward.estimate_of_three(observed, lost, &self.mounting, unknown);
+        let [x, y] = self.mounting.px(moved);
+        let [rest_x, rest_y] = self.px.get(lost).copied().unwrap_or_default();
+        (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
+    }
+
     /// Returns the force of a load that was found in a frame of this noise, and its status. If the
     /// load explains the markers badly, its uncertainties are widened and the status is
     /// [`Status::LOOSELY_EXPLAINED`]. It is [`Status::UNEXPLAINED`] if these are then too large to

@@ -29,6 +29,7 @@ const AGAIN: Status = Status(
         | Status::MARKERS_IMPLAUSIBLE.0
         | Status::IMAGE_SATURATED.0
         | Status::IMAGE_DARK.0
+        | Status::MARKER_LOST.0
         | BADLY.0,
 );
 /// One contact does not explain the markers, or badly.

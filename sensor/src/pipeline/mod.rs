@@ -9,6 +9,7 @@ mod marker_tests;
 mod taring;
 #[cfg(test)]
 mod tests;
+mod three;
 
 use crate::force::features::Features;
 use crate::force::forward::Drift;
@@ -43,7 +44,7 @@ use hivtac_terms::units::Px;
 pub struct Measurement {
     /// Why there is no force, or how far it can be trusted.
     pub status: Status,
-    /// The four markers where the frame shows them; `None` if they were not found.
+    /// The four markers where the frame shows them; `None` if they were not all found.
     pub markers: Option<[Marker; 4]>,
     /// Their features at one common time ([`Sensor::set_motion`]); present exactly if there are
     /// markers.
@@ -328,8 +329,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Ends the frame and returns its measurement.
     pub fn finish_frame(&mut self) -> Measurement {
-        let measurement = self.measure_scanned();
+        let mut measurement = self.measure_scanned();
         self.motion.ended(measurement.markers.as_ref());
+        self.complete(&mut measurement);
         if self.wants_again(&measurement) {
             self.look = Look::Wanted(measurement);
         }

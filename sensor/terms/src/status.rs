@@ -20,7 +20,7 @@ macro_rules! bits {
 }
 
 bits! {
-    /// Fewer than four markers were found: no force.
+    /// Fewer than four markers were found, and three give no force: no force.
     MARKERS_MISSING = 0, "markers_missing";
     /// The blobs can be read as four markers in more than one plausible way, or in none: no force.
     MARKERS_AMBIGUOUS = 1, "markers_ambiguous";
@@ -81,7 +81,8 @@ bits! {
     /// One contact explains the markers' positions badly, so standard uncertainties are widened by
     /// what is left over.
     LOOSELY_EXPLAINED = 25, "loosely_explained";
-    /// One marker is not seen. The force is that of the other three, which nothing checks.
+    /// One marker is not seen, or is plainly faulty. The force is that of the other three, which
+    /// nothing checks.
     MARKER_LOST = 26, "marker_lost";
 }
 

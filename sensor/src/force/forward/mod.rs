@@ -22,6 +22,7 @@
 //! | `weight` | the effect of the film's own weight |
 //! | `shapes` | the effect of the shape of what presses |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
+//! | `three` | the same while a marker is lost |
 
 use covariance::between;
 use pose::limited;
@@ -38,6 +39,7 @@ mod shapes;
 mod solve;
 mod table;
 mod terms;
+mod three;
 pub mod weight;
 
 pub use axis::{Axis, NODES};

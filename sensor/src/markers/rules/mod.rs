@@ -20,6 +20,9 @@
 //! ([`Found::may_rest`]), and the four markers must be alike: they are punched alike, and a film at
 //! rest is flat.
 //!
+//! With a film run forwards, three markers may do (`three`): a fourth one stands where the film has
+//! it.
+//!
 //! Exactly one set of four must pass rules 1 to 3; two such sets are ambiguous, however different.
 //!
 //! Largest errors of accepted markers, asserted on rendered frames by `tests/tests/markers.rs` and
@@ -47,9 +50,11 @@ mod lean;
 pub mod pattern;
 mod reading;
 mod shape;
+mod three;
 mod trust;
 
 pub use reading::Reading;
+pub use three::Three;
 pub use trust::Trust;
 
 use crate::markers::blob::Blob;

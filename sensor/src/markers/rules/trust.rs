@@ -138,6 +138,12 @@ impl Trust {
         }
     }
 
+    /// The width that the mask added to a marker's diameters at rest, px; `None` if there is no
+    /// such marker.
+    pub(super) fn edge(&self, identity: usize) -> Option<f32> {
+        self.edges.get(identity).copied()
+    }
+
     /// Returns [`Status::OK`] if these markers may give a force, otherwise
     /// [`Status::MARKERS_IMPLAUSIBLE`].
     pub fn judge(&self, found: &Found) -> Status {

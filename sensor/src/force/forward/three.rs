@@ -1,0 +1,97 @@
+//! Finds the load that three markers show while the fourth one is lost.
+//!
+//! The lost marker stays among the equations, with so much noise that it does not count. So the
+//! steps are those for four markers. The network cannot give the first guess; the steps begin at
+//! the nearest of a few straight presses.
+
+use super::estimate::{Estimate, Observed};
+use super::mounting::Mounting;
+use super::pose::Pose;
+use super::predict::{DOTS, Markers};
+use super::solve::{Column, square};
+use super::{Forward, Unknown};
+
+/// Largest residual, relative to its variance, of a contact that explains three markers. χ² of one
+/// degree of freedom exceeds it in 1 of 2,000 honest frames.
+const UNEXPLAINED: f32 = 12.1;
+/// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
+/// nothing.
+const LOST: f32 = 1e6;
+/// Where the steps may begin: along each axis, as parts of the tables' last place; and the size, as
+/// a part of the largest.
+const PLACES: [f32; 3] = [-0.6, 0.0, 0.6];
+const SIZE: f32 = 0.5;
+
+impl Estimate {
+    /// Returns whether the load explains the three markers; false if the residual is NaN. A load
+    /// that is no contact explains hardly any of their noise, so more may be left over.
+    pub fn is_explained_by_three(&self, is_contact: bool) -> bool {
+        self.is_explained() && !(is_contact && self.unexplained > UNEXPLAINED)
+    }
+}
+
+impl Forward<'_> {
+    /// Returns the load that explains the markers but `lost` (0–3) best, and where that one is
+    /// under it: how far it moved from rest, focal lengths.
+    #[inline(never)]
+    pub fn estimate_of_three(
+        &self,
+        mut observed: Observed<'_>,
+        lost: usize,
+        mounting: &Mounting,
+        unknown: Unknown<'_>,
+    ) -> (Estimate, [f32; 2]) {
+        if let Some(noise) = observed.noise.get_mut(lost) {
+            *noise = [LOST, 0.0, LOST];
+        }
+        leave_out(&mut observed.moved, lost);
+        let guess = self.nearest_press(&observed.moved, lost, &mounting.beside_mm);
+        let estimate = self.estimate(&observed, mounting, unknown, guess);
+        let moved = self.moved(&estimate.pose, &mounting.beside_mm);
+        let [lost_x, lost_y] = [2 * lost, 2 * lost + 1].map(|k| moved.get(k).copied());
+        let at = lost_x.zip(lost_y).unwrap_or_default();
+        (estimate, at.into())
+    }
+
+    /// The straight press that moves the three markers most nearly as they `moved`.
+    fn nearest_press(&self, moved: &Column, lost: usize, beside_mm: &Markers) -> Pose {
+        let (mut nearest, mut least) = (Pose::default(), f32::INFINITY);
+        let [_, end] = self.tables.ends_mm();
+        let size = SIZE * self.limits.size;
+        for place in PLACES.map(|y| PLACES.map(|x| [x, y])).as_flattened() {
+            let press = Pose {
+                size,
+                place_mm: place.map(|part| part * end),
+                ..Pose::default()
+            };
+            let mut pressed = self.moved(&press, beside_mm);
+            leave_out(&mut pressed, lost);
+            // Motion is nearly proportional to the size.
+            let times = product(moved, &pressed) / square(&pressed).max(f32::MIN_POSITIVE);
+            let left: Column = core::array::from_fn(|k| moved[k] - times * pressed[k]);
+            let left = square(&left);
+            if left < least {
+                let size = times * size;
+                (nearest, least) = (Pose { size, ..press }, left);
+            }
+        }
+        nearest
+    }
+
+    /// How far a load moves the markers, focal lengths.
+    #[inline(never)]
+    fn moved(&self, pose: &Pose, beside_mm: &Markers) -> Column {
+        self.tables.predict(pose, &self.limits, beside_mm).moved
+    }
+}
+
+fn leave_out(column: &mut Column, lost: usize) {
+    debug_assert!(lost < DOTS);
+    for part in column.iter_mut().skip(2 * lost).take(2) {
+        *part = 0.0;
+    }
+}
+
+fn product(a: &Column, b: &Column) -> f32 {
+    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+}
