@@ -3,6 +3,7 @@
 
 use std::format;
 use std::string::String;
+use std::vec::Vec;
 
 use hivtac_sensor::force::Force;
 use hivtac_sensor::pipeline::Measurement;
@@ -83,8 +84,10 @@ impl Judged {
         {
             true => Judged::Right,
             false => Judged::Wrong(format!(
-                "{:?} N at {:?} mm: off by {errors:.3?} (°, mN, mm), may be {limits:.3?}",
-                truth.on_film_n, truth.touches_mm
+                "{:?} N at {:?} mm: off by {errors:.3?} (°, mN, mm), may be {limits:.3?}, {}",
+                truth.on_film_n,
+                truth.touches_mm,
+                seen.status.names().collect::<Vec<_>>().join(" ")
             )),
         }
     }

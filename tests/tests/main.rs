@@ -23,6 +23,7 @@ mod snapshots;
 mod status_bits;
 mod steps;
 mod tares;
+mod three_markers;
 mod turned;
 mod view;
 mod wire_vectors;
