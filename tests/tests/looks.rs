@@ -15,8 +15,8 @@ const PRESSES: Contacts = Contacts {
 };
 const FRAMES: u64 = 60;
 
-/// Returns the number of frames with a force from all four markers, and of those by the second look.
-/// Asserts that no force is wrong.
+/// Returns the number of frames with a force from all four markers, and of those by the second
+/// look. Asserts that no force is wrong.
 fn kept(options: Options) -> (u32, u32) {
     let mut sensor = TaredSensor::of_model(models::anywhere(1)).unwrap();
     let mut in_bands = TaredSensor::of_model(models::anywhere(1)).unwrap();

@@ -12,10 +12,11 @@ use core::fmt::{self, Write};
 use core::ops::Range;
 
 use hivtac_sensor::force::features::{FEATURES, Features};
+use hivtac_sensor::force::forward::Estimate;
 use hivtac_sensor::force::model::{AlignedFile, Model};
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::force::rest::Rest;
-use hivtac_sensor::force::{Polar, Resting};
+use hivtac_sensor::force::{FrameNoise, Polar, Resting};
 use hivtac_sensor::markers::formats::Formats;
 use hivtac_sensor::markers::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensor::markers::settings::Settings;
@@ -249,7 +250,17 @@ impl<'b> Runner<'b> {
         let output = network.run(&model, &features, &rest.features);
         let found = resting.force(forward, &model.range, &markers, &output);
         counting_ends();
-        say(results, self.cases, format_args!("{found:?}"))
+        say(results, self.cases, format_args!("{found:?}"))?;
+        for lost in 0..4 {
+            let noise = FrameNoise::AS_MODELLED;
+            let (load, at) = resting.estimate_of_three(forward, &markers, lost, noise);
+            let Estimate {
+                pose, unexplained, ..
+            } = load;
+            let text = format_args!("without {lost}: {pose:?} {unexplained:?} {at:?}");
+            say(results, self.cases, text)?;
+        }
+        Ok(())
     }
 
     fn force(

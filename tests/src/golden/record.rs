@@ -29,7 +29,8 @@ pub enum Kind {
     /// Three numbers (i32). Result: them as a force vector in µN, and as α, β in m° and |F| in µN.
     Force = 6,
     /// x, y (i32) and area (u32) of markers 0–3, then eleven features (i64) and four areas (u32) of
-    /// the rest position. Result: the network and the steps from its answer.
+    /// the rest position. Result: the network and the steps from its answer,
+    /// and the steps without each of the markers.
     Press = 7,
 }
 
