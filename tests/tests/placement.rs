@@ -65,9 +65,9 @@ fn the_sensing_runs_from_itcm() {
         packages.iter().any(|package| symbol.name.contains(package))
             || symbol.name.starts_with("hivtac_")
     };
-    // Code that rarely runs: for a model, a setting, a tare, a message or a self-test, after a force
-    // or in place of one without a film, for a second look at a refused frame, and for a lost
-    // marker. It has no loop over pixels or weights.
+    // Code that rarely runs: for a model, a setting, a tare, a message or a self-test, after a
+    // force or in place of one without a film, for a second look at a refused frame, and for a
+    // lost marker. It has no loop over pixels or weights.
     let seldom = [
         "hivtac_sensor5force5model",
         "hivtac_sensor..force..model",
