@@ -290,8 +290,8 @@ fn tilted(radius_mm: f64, turn: f64) -> Result<Patch> {
     Ok(Patch::new(tilted.collect())?)
 }
 
-/// The mirror image of a motion of all images in the diagonal x = y. Markers 0 and 2 lie on it, 1 and
-/// 3 change places.
+/// The mirror image of a motion of all images in the diagonal x = y. Markers 0 and 2 lie on it, 1
+/// and 3 change places.
 fn exchanged(moved: &Moved) -> Moved {
     let [ax, ay, bx, by, cx, cy, dx, dy] = *moved;
     [ay, ax, dy, dx, cy, cx, by, bx]

@@ -257,10 +257,21 @@ impl Resting {
         (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
     }
 
+    /// Returns whether a force that one contact explains badly may be given. The contact must not be
+    /// known to be a needle: what a needle leaves over is a fault. And the uncertainties, widened
+    /// by what is left over, must be of use.
+    fn may_be_loose(&self, force: &Force) -> bool {
+        let (direction, magnitude, place) = OF_USE;
+        self.shape != ContactShape::Needle
+            && force.direction_sigma.0 <= direction
+            && force.magnitude_sigma.0 <= force.magnitude.0.unsigned_abs() / magnitude
+            && force.place.is_some_and(|at| at.sigma.0 <= place)
+    }
+
     /// Returns the force of a load that was found in a frame of this noise, and its status. If the
     /// load explains the markers badly, its uncertainties are widened and the status is
-    /// [`Status::LOOSELY_EXPLAINED`]. It is [`Status::UNEXPLAINED`] if these are then too large to
-    /// be of use, or the load is the largest in the tables.
+    /// [`Status::LOOSELY_EXPLAINED`]. It is [`Status::UNEXPLAINED`] if that is not
+    /// [allowed](Self::may_be_loose), or the load is the largest in the tables.
     pub fn told(
         &self,
         forward: &Forward<'_>,
@@ -271,7 +282,7 @@ impl Resting {
         let (force, by_noise) = force(&forward.strength(self.is_own), estimate);
         let mut status = trust(&force, by_noise, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
-        if is_blurred || !estimate.is_explained() && !is_of_use(&force) {
+        if is_blurred || !estimate.is_explained() && !self.may_be_loose(&force) {
             status |= Status::UNEXPLAINED;
         } else if !estimate.is_explained() {
             status |= Status::LOOSELY_EXPLAINED;
@@ -299,13 +310,6 @@ impl Resting {
         let estimate = self.estimate(forward, markers, noise, output);
         self.told(forward, range, noise, &estimate)
     }
-}
-
-fn is_of_use(force: &Force) -> bool {
-    let (direction, magnitude, place) = OF_USE;
-    force.direction_sigma.0 <= direction
-        && force.magnitude_sigma.0 <= force.magnitude.0.unsigned_abs() / magnitude
-        && force.place.is_some_and(|at| at.sigma.0 <= place)
 }
 
 /// Returns the force of a load, and the standard uncertainty of |F| by noise.

@@ -35,7 +35,7 @@ pub struct Contacts {
     #[arg(long, default_value_t = 30)]
     presses: u32,
     /// Seed of all draws.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 2)]
     seed: u64,
     /// Frames of each press: as many draws of noise.
     #[arg(long, default_value_t = 20)]

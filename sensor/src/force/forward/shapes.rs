@@ -25,8 +25,8 @@ const LARGEST_STEP: f32 = 1e-3;
 const TIP_MM: f32 = 0.5;
 const LARGEST_MM: f32 = 4.0;
 /// Uncertainty of a contact whose shape and radius are set: of its own motion, in parts of that;
-/// and of any motion, in parts of what all shapes leave, at radius 0 and more per mm. A flat face is
-/// less certain, as it may be tilted.
+/// and of any motion, in parts of what all shapes leave, at radius 0 and more per mm. A flat face
+/// is less certain, as it may be tilted.
 const OF_OWN: f32 = 0.4;
 const OF_ALL: [f32; 2] = [0.15, 0.1];
 const OF_ALL_FLAT: [f32; 2] = [0.4, 0.15];
@@ -174,21 +174,23 @@ impl Mirror {
 
     /// The mirror image of a coordinate's number, and its sign.
     fn of_coordinate(&self, number: usize) -> (usize, f32) {
-        let axis = number % 2;
-        let marker = (number / 2) ^ self.exchanged;
-        (2 * marker + axis, self.signs[axis])
+        let [along_x, along_y] = self.signs;
+        let sign = if number % 2 == 0 { along_x } else { along_y };
+        (number ^ (2 * self.exchanged), sign)
     }
 
     fn column(&self, column: &Column) -> Column {
         core::array::from_fn(|i| {
             let (other, sign) = self.of_coordinate(i);
-            sign * column[other]
+            sign * column.get(other).copied().unwrap_or_default()
         })
     }
 
     fn entry(&self, covariance: &Covariance, i: usize, j: usize) -> f32 {
         let ((i, sign), (j, other)) = (self.of_coordinate(i), self.of_coordinate(j));
-        sign * other * covariance[i.max(j)][i.min(j)]
+        let row = covariance.get(i.max(j));
+        let entry = row.and_then(|row| row.get(i.min(j)));
+        sign * other * entry.copied().unwrap_or_default()
     }
 }
 
