@@ -1,7 +1,6 @@
 //! Derivatives of a pressed film's state by its load and by the film's own properties.
 
-use crate::film::{Tip, mean, tip_shares, weighted};
-use crate::grid::Grid;
+use crate::film::{Touched, mean, weighted};
 use crate::point::{V3, cross, dot};
 use crate::shell::{Hold, Shell};
 use crate::{Design, Equilibrium, Film, ShellError};
@@ -23,7 +22,7 @@ pub enum Change {
     Force(usize),
     /// The place of the tip along x or y at constant force, mm.
     Place(usize),
-    /// The tip's radius, mm.
+    /// The tip's radius, mm. A patch does not change with it.
     TipRadius,
     /// The film's thickness at constant grip, mm.
     Thickness,
@@ -188,7 +187,7 @@ impl Film {
             sides.extend(side);
         }
         factors.solve(&mut sides, changes.len());
-        let tip = self.tip_of(&state.touched);
+        let tip = self.shares_of(&state.touched);
         let columns = sides.chunks(self.unknowns()).zip(changes);
         let answer = |(unknowns, &change): (&[f64], &Change)| {
             let mut tip_mm = mean(&tip, unknowns);
@@ -319,7 +318,7 @@ impl Film {
             Change::Force(axis) => {
                 let mut force = [0.0; 3];
                 force[axis] = 1.0;
-                weighted(&self.tip_of(&state.touched), &force)
+                weighted(&self.shares_of(&state.touched), &force)
             }
             Change::Grip => negative(self.shell().pull(u)),
             Change::Post(post, way) => {
@@ -349,28 +348,24 @@ impl Film {
 
     /// Returns the derivative of the tip's shares by a change, per unit; `None` if they do not
     /// depend on it.
-    fn shares_by(&self, tip: &Tip, change: Change) -> Option<Vec<f64>> {
-        let grid = self.shell().grid();
-        let there = |sign: f64| -> Option<(&Grid, Tip)> {
-            let mut tip = *tip;
+    fn shares_by(&self, touched: &Touched, change: Change) -> Option<Vec<f64>> {
+        let there = |sign: f64| -> Option<Vec<f64>> {
+            let grid = self.shell().grid();
             match change {
-                Change::Place(way) => tip.place_mm[way] += sign * TIP_STEP_MM,
-                Change::TipRadius => tip.radius_mm += sign * TIP_STEP_MM,
+                Change::Place(way) => Some(touched.shifted(way, sign * TIP_STEP_MM).shares(grid)),
+                Change::TipRadius => Some(touched.grown(sign * TIP_STEP_MM)?.shares(grid)),
                 _ => {
                     let [back, forth] = self.morphed(change.morph()?);
                     let shell = if sign < 0.0 { back } else { forth };
-                    return Some((shell.grid(), tip));
+                    Some(touched.shares(shell.grid()))
                 }
             }
-            Some((grid, tip))
         };
         let step = match change.morph() {
             Some(_) => MORPH_STEP_MM,
             None => TIP_STEP_MM,
         };
-        let [back, forth] = BESIDE.map(|sign| {
-            there(sign).map(|(grid, tip)| tip_shares(grid, tip.place_mm, tip.radius_mm))
-        });
+        let [back, forth] = BESIDE.map(there);
         let pairs = forth?.into_iter().zip(back?);
         Some(pairs.map(|(b, a)| (b - a) / (2.0 * step)).collect())
     }

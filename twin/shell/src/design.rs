@@ -314,6 +314,24 @@ impl Design {
         points
     }
 
+    /// Checks that a point that is pressed, mm, is on the film and on no post.
+    pub(crate) fn check_pressed(&self, point_mm: [f64; 2]) -> Result<(), ShellError> {
+        let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
+        let on_film = point_mm.iter().all(|part| (-edge..=edge).contains(part));
+        let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];
+        let on_post = |([cx, cy], [dx, dy]): ([f64; 2], [f64; 2])| {
+            let [x, y] = point_mm;
+            (x - cx - dx).hypot(y - cy - dy) < self.post_radius_mm
+        };
+        let mut posts = centres.into_iter().zip(self.post_shift_mm);
+        if on_film && !posts.any(on_post) {
+            return Ok(());
+        }
+        Err(ShellError::Contact(format!(
+            "it presses at {point_mm:?} mm: press on the film, within ±{edge} mm, and on no post"
+        )))
+    }
+
     /// Returns the cell borders along one side: even steps in the integral of 1 / (wanted size),
     /// symmetric.
     fn breaks(&self) -> Vec<f64> {
@@ -370,7 +388,7 @@ pub(crate) fn tip_points(place_mm: [f64; 2], radius: f64) -> Vec<([f64; 2], f64)
 }
 
 /// Iterates over Gauss's points on a length, with their weights. An empty length has no points.
-fn gauss([from, to]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
+pub(crate) fn gauss([from, to]: [f64; 2]) -> impl Iterator<Item = (f64, f64)> {
     static POINTS: LazyLock<[(f64, f64); POST_POINTS]> = LazyLock::new(gauss_points);
     let (middle, half) = ((from + to) / 2.0, ((to - from) / 2.0).max(0.0));
     POINTS

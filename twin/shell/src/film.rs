@@ -10,7 +10,7 @@ use crate::newton::{Guide, Problem, Solution};
 use crate::point::{V3, cross, dot};
 use crate::shell::Shell;
 use crate::sparse::{COMPONENTS, Factors, Solver};
-use crate::{Design, ShellError};
+use crate::{Design, Patch, ShellError};
 
 /// A slack film is first pushed by this much, mm, to decide the side on which it bulges.
 const PUSH_MM: f64 = 1e-2;
@@ -47,6 +47,48 @@ pub(crate) struct Tip {
     pub radius_mm: f64,
 }
 
+/// What presses a film.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Touched {
+    /// A tip.
+    Tip(Tip),
+    /// A pressure of any shape.
+    Patch(Arc<Patch>),
+}
+
+impl Touched {
+    /// Returns the shares of each coefficient of a grid.
+    pub(crate) fn shares(&self, grid: &Grid) -> Vec<f64> {
+        match self {
+            Touched::Tip(tip) => tip_shares(grid, tip.place_mm, tip.radius_mm),
+            Touched::Patch(patch) => point_shares(grid, patch.points()),
+        }
+    }
+
+    /// Returns it shifted along x or y by some mm.
+    pub(crate) fn shifted(&self, way: usize, by_mm: f64) -> Touched {
+        match self {
+            Touched::Tip(tip) => {
+                let mut tip = *tip;
+                tip.place_mm[way] += by_mm;
+                Touched::Tip(tip)
+            }
+            Touched::Patch(patch) => Touched::Patch(Arc::new(patch.shifted(way, by_mm))),
+        }
+    }
+
+    /// Returns the tip with a larger radius, mm. A patch has none.
+    pub(crate) fn grown(&self, by_mm: f64) -> Option<Touched> {
+        match self {
+            Touched::Tip(tip) => Some(Touched::Tip(Tip {
+                radius_mm: tip.radius_mm + by_mm,
+                ..*tip
+            })),
+            Touched::Patch(_) => None,
+        }
+    }
+}
+
 /// A film ready to be pressed; threads can share it.
 pub struct Film {
     design: Design,
@@ -63,11 +105,11 @@ pub struct Film {
 #[derive(Clone, Debug)]
 pub struct Equilibrium {
     pub(crate) unknowns: Vec<f64>,
-    pub(crate) touched: Tip,
-    /// The displacement of the tip's disc from the flat mounted film, mm (the mean over the disc,
-    /// weighted as its force).
+    pub(crate) touched: Touched,
+    /// The displacement of the tip's disc from the flat mounted film, mm (the mean over the disc or
+    /// the patch, weighted as its force).
     pub tip_mm: [f64; 3],
-    /// The tip's force on the film, N.
+    /// The tip's or the patch's force on the film, N.
     pub force_n: [f64; 3],
     /// The posts' force on the film, N.
     pub reaction_n: [f64; 3],
@@ -156,7 +198,7 @@ impl Film {
         let unknowns = self.rest.unknowns.clone();
         Equilibrium {
             tip_mm: mean(&self.tip, &unknowns),
-            touched: self.own_tip(),
+            touched: Touched::Tip(self.own_tip()),
             force_n: [0.0; 3],
             reaction_n: self.shell.reaction(&unknowns),
             steps: self.rest.steps,
@@ -171,7 +213,7 @@ impl Film {
     /// If the contact's numbers are not finite, its direction is zero, no equilibrium is found, or
     /// the start belongs to another mesh.
     pub fn press(&self, contact: Contact, start: &Equilibrium) -> Result<Equilibrium, ShellError> {
-        self.press_tip(self.own_tip(), contact, start)
+        self.press_touched(Touched::Tip(self.own_tip()), contact, start)
     }
 
     /// As [`Film::press`], with the tip at another place, mm on the mounted film, and with another
@@ -191,7 +233,7 @@ impl Film {
             place_mm,
             radius_mm,
         };
-        self.press_tip(tip, contact, start)
+        self.press_touched(Touched::Tip(tip), contact, start)
     }
 
     /// Returns the film under a force, N, of a tip with its design's radius at a point of the film,
@@ -216,14 +258,14 @@ impl Film {
         from(start).or_else(|_| from(&self.rest()))
     }
 
-    fn press_tip(
+    pub(crate) fn press_touched(
         &self,
-        tip: Tip,
+        touched: Touched,
         contact: Contact,
         start: &Equilibrium,
     ) -> Result<Equilibrium, ShellError> {
         self.fits(start)?;
-        let shares = self.tip_of(&tip);
+        let shares = self.shares_of(&touched);
         let (force, guides) = self.asked(contact, mean(&shares, &self.rest.unknowns))?;
         let guided: Vec<V3> = guides.iter().map(|(direction, _)| *direction).collect();
         let problem = Problem {
@@ -238,7 +280,9 @@ impl Film {
                 .collect(),
         };
         let solution = problem.solve(&self.solver, &start.unknowns)?;
-        Ok(self.equilibrium(solution, force, &guided, tip))
+        let tip_mm = mean(&shares, &solution.unknowns);
+        drop(shares);
+        Ok(self.equilibrium(solution, force, &guided, (touched, tip_mm)))
     }
 
     /// Returns the displacement, mm, of the point of the camera-side surface of the mounted film at
@@ -330,7 +374,13 @@ impl Film {
         }
     }
 
-    fn equilibrium(&self, solution: Solution, load: V3, guided: &[V3], tip: Tip) -> Equilibrium {
+    fn equilibrium(
+        &self,
+        solution: Solution,
+        load: V3,
+        guided: &[V3],
+        (touched, tip_mm): (Touched, V3),
+    ) -> Equilibrium {
         let mut force_n = load;
         for (direction, size) in guided.iter().zip(&solution.guide_n) {
             for (sum, part) in force_n.iter_mut().zip(direction) {
@@ -338,8 +388,8 @@ impl Film {
             }
         }
         Equilibrium {
-            tip_mm: mean(&self.tip_of(&tip), &solution.unknowns),
-            touched: tip,
+            tip_mm,
+            touched,
             force_n,
             reaction_n: self.shell.reaction(&solution.unknowns),
             unknowns: solution.unknowns,
@@ -371,12 +421,13 @@ impl Film {
         }
     }
 
-    /// Returns a tip's shares.
-    pub(crate) fn tip_of(&self, tip: &Tip) -> Cow<'_, [f64]> {
-        if *tip == self.own_tip() {
-            return Cow::Borrowed(&self.tip);
+    /// Returns the shares of each coefficient in what presses.
+    pub(crate) fn shares_of(&self, touched: &Touched) -> Cow<'_, [f64]> {
+        let grid = self.shell.grid();
+        match touched {
+            Touched::Tip(tip) if *tip == self.own_tip() => Cow::Borrowed(&self.tip),
+            other => Cow::Owned(other.shares(grid)),
         }
-        Cow::Owned(tip_shares(self.shell.grid(), tip.place_mm, tip.radius_mm))
     }
 
     /// Rejects a state of another mesh.
@@ -478,8 +529,13 @@ pub(crate) fn weighted(shares: &[f64], vector: &V3) -> Vec<f64> {
 
 /// Returns the shares of a tip's force on each coefficient.
 pub(crate) fn tip_shares(grid: &Grid, place_mm: [f64; 2], radius_mm: f64) -> Vec<f64> {
+    point_shares(grid, &tip_points(place_mm, radius_mm))
+}
+
+/// Returns the shares on each coefficient of a force that acts on points, mm, by their weights.
+pub(crate) fn point_shares(grid: &Grid, points: &[([f64; 2], f64)]) -> Vec<f64> {
     let mut shares = vec![0.0; grid.unknowns() / COMPONENTS];
-    for (point, share) in tip_points(place_mm, radius_mm) {
+    for &(point, share) in points {
         let place = grid.place(point);
         for (local, value) in place.values.iter().enumerate() {
             shares[grid.coefficient(place.origin, local)] += share * value;
@@ -488,7 +544,7 @@ pub(crate) fn tip_shares(grid: &Grid, place_mm: [f64; 2], radius_mm: f64) -> Vec
     shares
 }
 
-fn finite(what: &str, vector: V3) -> Result<V3, ShellError> {
+pub(crate) fn finite(what: &str, vector: V3) -> Result<V3, ShellError> {
     if vector.iter().all(|part| part.is_finite()) {
         return Ok(vector);
     }
