@@ -374,7 +374,7 @@ impl Film {
         }
     }
 
-    fn equilibrium(
+    pub(crate) fn equilibrium(
         &self,
         solution: Solution,
         load: V3,
@@ -408,6 +408,10 @@ impl Film {
 
     pub(crate) fn shell(&self) -> &Shell {
         &self.shell
+    }
+
+    pub(crate) fn solver(&self) -> &Solver {
+        &self.solver
     }
 
     pub(crate) fn around(&self) -> &Beside {

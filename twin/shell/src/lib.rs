@@ -9,6 +9,7 @@
 )]
 
 mod answers;
+mod body;
 mod cell;
 mod check;
 mod design;
@@ -34,6 +35,7 @@ mod view;
 mod weight;
 
 pub use answers::{Change, Response};
+pub use body::{Body, Ends, RIGID_N_PER_MM3, Shape, Touch};
 pub use check::{Check, Domain, check};
 pub use design::Design;
 pub use error::ShellError;

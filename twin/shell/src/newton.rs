@@ -9,7 +9,7 @@
 
 use crate::ShellError;
 use crate::shell::Shell;
-use crate::sparse::{Factors, Solver};
+use crate::sparse::{Factors, Pattern, Solver};
 
 /// With unbalanced forces below this, N, the film is near: the energy needs no check.
 const NEAR_N: f64 = 1e-4;
@@ -93,7 +93,7 @@ impl Problem<'_> {
             let again = factors.is_some() && serves;
             let known = match factors.filter(|_| serves) {
                 Some(known) => known,
-                None => self.factors(solver, &self.shell.stiffness(&u))?,
+                None => shifted_factors(solver, self.shell.pattern(), &self.shell.stiffness(&u))?,
             };
             let step = self.step(&known, &at.1, &missing)?;
             at = match met && !again {
@@ -169,28 +169,6 @@ impl Problem<'_> {
             .ok_or_else(|| ShellError::Solver("the guides depend on each other".into()))
     }
 
-    /// Returns the factors of the stiffness, shifted if it is not positive definite.
-    fn factors(&self, solver: &Solver, stiffness: &[f64]) -> Result<Factors, ShellError> {
-        let pattern = self.shell.pattern();
-        if let Some(factors) = solver.factor(pattern, stiffness) {
-            return Ok(factors);
-        }
-        let diagonal = pattern.diagonal();
-        let mean = diagonal.iter().map(|&k| stiffness[k].abs()).sum::<f64>();
-        let mut shift = 1e-5 * mean / diagonal.len() as f64;
-        let mut shifted = stiffness.to_vec();
-        for _ in 0..12 {
-            for &entry in diagonal {
-                shifted[entry] = stiffness[entry] + shift;
-            }
-            if let Some(factors) = solver.factor(pattern, &shifted) {
-                return Ok(factors);
-            }
-            shift *= 8.0;
-        }
-        Err(ShellError::Solver("the stiffness has no factors".into()))
-    }
-
     /// Takes all of the step, or the half, quarter … at which the energy falls most. Returns the
     /// energy and the gradient there.
     fn shortened(&self, u: &mut Vec<f64>, at: &First, step: &[f64]) -> First {
@@ -220,6 +198,34 @@ impl Problem<'_> {
     }
 }
 
+/// Returns the factors of a stiffness, shifted if it is not positive definite.
+///
+/// # Errors
+/// If it has none with any shift.
+pub fn shifted_factors(
+    solver: &Solver,
+    pattern: &Pattern,
+    stiffness: &[f64],
+) -> Result<Factors, ShellError> {
+    if let Some(factors) = solver.factor(pattern, stiffness) {
+        return Ok(factors);
+    }
+    let diagonal = pattern.diagonal();
+    let mean = diagonal.iter().map(|&k| stiffness[k].abs()).sum::<f64>();
+    let mut shift = 1e-5 * mean / diagonal.len() as f64;
+    let mut shifted = stiffness.to_vec();
+    for _ in 0..12 {
+        for &entry in diagonal {
+            shifted[entry] = stiffness[entry] + shift;
+        }
+        if let Some(factors) = solver.factor(pattern, &shifted) {
+            return Ok(factors);
+        }
+        shift *= 8.0;
+    }
+    Err(ShellError::Solver("the stiffness has no factors".into()))
+}
+
 /// Returns a · b.
 pub fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
@@ -231,7 +237,8 @@ fn advance(u: &mut [f64], step: &[f64], length: f64) {
     }
 }
 
-fn largest(values: &[f64]) -> f64 {
+/// Returns the largest absolute value; NaN if one is NaN.
+pub fn largest(values: &[f64]) -> f64 {
     values.iter().fold(0.0, |most, value| {
         if value.is_nan() {
             f64::NAN
