@@ -2,6 +2,7 @@
 //! with the paper's pipeline, and test units drawn at random.
 
 mod anywhere;
+mod contacts;
 mod maps;
 mod page;
 mod paper;
@@ -26,6 +27,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Anywhere(anywhere::Anywhere),
+    Contacts(contacts::Contacts),
     Paper(paper::Paper),
     #[command(subcommand)]
     Scene(scene::SceneCommand),
@@ -40,6 +42,7 @@ fn main() -> Result<()> {
     sigpipe::reset();
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),
+        Command::Contacts(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
         Command::Slip(study) => study.run(),

@@ -21,7 +21,7 @@ use crate::point::{V3, cross};
 use crate::{Equilibrium, Film, Patch, ShellError};
 
 use newton::{LOOSE_N, Pressing, State, TOLERANCE_N};
-use points::{Bearing, Points, SPACING_MM};
+use points::{Bearing, Points};
 
 pub use shape::{Ends, Shape};
 
@@ -220,7 +220,7 @@ impl Film {
         let far = points
             .map(|([px, py], _)| (px - x).hypot(py - y))
             .fold(0.0, f64::max);
-        if far > body.shape.reach_mm() - 2.0 * SPACING_MM {
+        if far > body.shape.reach_mm() - 2.0 * body.shape.spacing_mm() {
             return Err(ShellError::Contact(format!(
                 "{body:?} touches the film {far:.1} mm from its foot: press less, or with \
                  another body"

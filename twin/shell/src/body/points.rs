@@ -9,9 +9,6 @@ use crate::point::V3;
 use crate::shell::LOCAL;
 use crate::sparse::{COMPONENTS, Pattern};
 
-/// Largest distance of neighbouring points, mm.
-pub const SPACING_MM: f64 = 0.07;
-
 /// The points of a film that may touch a body.
 pub struct Points<'a> {
     grid: &'a Grid,
@@ -74,7 +71,7 @@ impl<'a> Points<'a> {
     pub fn new(film: &'a Film, body: &Body) -> Points<'a> {
         let grid = film.shell().grid();
         let [cx, cy] = body.place_mm;
-        let reach = body.shape.reach_mm();
+        let (reach, spacing) = (body.shape.reach_mm(), body.shape.spacing_mm());
         let near = |at: [f64; 2]| {
             (at[0] - cx).hypot(at[1] - cy) < reach && film.design().check_pressed(at).is_ok()
         };
@@ -91,7 +88,8 @@ impl<'a> Points<'a> {
             .iter()
             .flat_map(|j| spans[0].iter().map(move |i| (*i, *j)))
         {
-            let [(xs, width), (ys, height)] = [middles(grid, 0, i), middles(grid, 1, j)];
+            let [(xs, width), (ys, height)] =
+                [middles(grid, 0, i, spacing), middles(grid, 1, j, spacing)];
             let places = ys.iter().flat_map(|y| xs.iter().map(move |x| [*x, *y]));
             let point = |at: [f64; 2]| Point {
                 at,
@@ -272,9 +270,9 @@ fn add_block(cell: &mut CellStiffness, values: &Row, block: &[V3; 3]) {
 }
 
 /// Returns the middles of the even parts of a span that are small enough, and the parts' length.
-fn middles(grid: &Grid, way: usize, span: usize) -> (Vec<f64>, f64) {
+fn middles(grid: &Grid, way: usize, span: usize, spacing: f64) -> (Vec<f64>, f64) {
     let [from, to] = grid.axes[way].ends(span);
-    let count = ((to - from) / SPACING_MM).ceil().max(1.0);
+    let count = ((to - from) / spacing).ceil().max(1.0);
     let width = (to - from) / count;
     let middle = |k: usize| from + (k as f64 + 0.5) * width;
     ((0..count as usize).map(middle).collect(), width)

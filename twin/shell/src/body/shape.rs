@@ -5,11 +5,14 @@ use crate::point::{V3, cross, dot};
 
 /// Half the length of a face's peg, mm: longer than the film can be pressed.
 const PEG_MM: f64 = 100.0;
+/// The least and the largest distance of the points that feel a body, mm.
+const FINE_MM: f64 = 0.07;
+const COARSE_MM: f64 = 0.2;
 /// How far a film is looked at beyond a body, in parts of its radius.
 const WRAP: f64 = 1.6;
 /// The same of a pad: how much of its height the film may wrap, mm, and the largest reach, mm.
 const PAD_HEIGHT_MM: f64 = 3.0;
-const MOST_REACH_MM: f64 = 9.0;
+const MOST_REACH_MM: f64 = 11.0;
 
 /// The ends of a lying cylinder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +105,17 @@ impl Shape {
             Shape::Pad { radii_mm: [a, b] } => (2.0 * a.max(b) * PAD_HEIGHT_MM).sqrt(),
         };
         reach.min(MOST_REACH_MM)
+    }
+
+    /// Returns the largest distance of the points that feel it, mm. The pressure of an edge changes
+    /// over a short distance.
+    pub fn spacing_mm(&self) -> f64 {
+        let radius = match *self {
+            Shape::Sphere { radius_mm } => radius_mm,
+            Shape::Pad { radii_mm: [a, b] } => a.min(b),
+            Shape::Cylinder { .. } | Shape::Face { .. } => 0.0,
+        };
+        (0.015 * radius).clamp(FINE_MM, COARSE_MM)
     }
 
     /// Returns the gap at a place relative to the foot, mm, in the body's axes. The third points

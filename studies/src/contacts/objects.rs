@@ -1,0 +1,175 @@
+//! Draws objects that press the film, and how they do it.
+
+use anyhow::Result;
+use hivtac_shell::{Body, Ends, Patch, Shape};
+use hivtac_twin::Load;
+use rand::Rng;
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use crate::press::{ANGLE_DEG, REACH_MM, seeded};
+
+/// Forces, N.
+const FORCES_N: [f64; 2] = [0.02, 0.25];
+/// The largest tilt of a face, degrees.
+const TILT_DEG: f64 = 5.0;
+/// Radii of flat faces, of cylinders and of balls, mm.
+const FACES_MM: [f64; 2] = [1.0, 3.0];
+const CYLINDER_MM: f64 = 0.8;
+
+/// A kind of objects.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub enum Kind {
+    /// A soft disc with Hertz's pressure, with a radius in this range, mm.
+    Disc([f64; 2]),
+    /// A rigid flat face, straight.
+    Face,
+    /// A rigid flat face, tilted.
+    TiltedFace,
+    /// A finger's pad.
+    Pad,
+    /// A rigid cylinder with rounded ends and this length, mm, lying on the film.
+    Cylinder(f64),
+    /// A rigid ball of this diameter, mm.
+    Ball(f64),
+}
+
+/// All kinds.
+pub const KINDS: [Kind; 10] = [
+    Kind::Disc([0.25, 1.0]),
+    Kind::Disc([1.0, 2.5]),
+    Kind::Disc([2.5, 4.0]),
+    Kind::Face,
+    Kind::TiltedFace,
+    Kind::Pad,
+    Kind::Cylinder(6.0),
+    Kind::Cylinder(12.0),
+    Kind::Ball(10.0),
+    Kind::Ball(40.0),
+];
+
+/// What presses.
+#[derive(Clone, Debug)]
+pub enum Object {
+    /// A pressure that is known before.
+    Patch(Patch),
+    /// A body whose pressure follows from its contact.
+    Body(Body),
+}
+
+/// An object and the force that presses it on the film.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// The object in words, with its sizes.
+    pub name: String,
+    /// The object.
+    pub object: Object,
+    /// The force on the film, N, film frame.
+    pub force_n: [f64; 3],
+}
+
+impl Kind {
+    /// Returns the kind in words.
+    pub fn name(self) -> String {
+        match self {
+            Kind::Disc([from, to]) => format!("soft disc, {from} to {to} mm"),
+            Kind::Face => format!("flat face, {} to {} mm", FACES_MM[0], FACES_MM[1]),
+            Kind::TiltedFace => format!("the same, tilted to {TILT_DEG}°"),
+            Kind::Pad => "finger's pad, 4 × 2.5 mm".into(),
+            Kind::Cylinder(length) => format!("cylinder of {length} mm"),
+            Kind::Ball(diameter) => format!("ball of {diameter} mm"),
+        }
+    }
+
+    /// Draws press `number` of this kind: the same for the same seed, however many are drawn.
+    ///
+    /// # Errors
+    /// Never, as long as the ranges are those of a load and of objects.
+    pub fn draw(self, seed: u64, number: u32) -> Result<Drawn> {
+        let mut random = seeded(seed);
+        let index = KINDS
+            .iter()
+            .position(|kind| *kind == self)
+            .unwrap_or(KINDS.len());
+        random.set_stream((index as u64) << 32 | u64::from(number));
+        let mut between = |[from, to]: [f64; 2]| random.random_range(from..=to);
+        let force_n = between(FORCES_N);
+        let [alpha_deg, beta_deg] = [(); 2].map(|()| between([-ANGLE_DEG, ANGLE_DEG]));
+        let place_mm = [(); 2].map(|()| between([-REACH_MM, REACH_MM]));
+        let load = Load::from_angles(force_n, alpha_deg, beta_deg)?;
+        let (name, object) = self.object(place_mm, &mut random)?;
+        let [x, y] = place_mm;
+        Ok(Drawn {
+            name: format!("{name} over ({x:.2}, {y:.2}) mm, {:.0} mN", 1e3 * force_n),
+            object,
+            force_n: load.vector_n(),
+        })
+    }
+
+    /// Draws an object over a point of the film, mm.
+    fn object(self, place_mm: [f64; 2], random: &mut ChaCha8Rng) -> Result<(String, Object)> {
+        let mut between = |[from, to]: [f64; 2]| random.random_range(from..=to);
+        let turned = |shape, turned_deg| Body {
+            turned_deg,
+            ..Body::rigid(shape, place_mm)
+        };
+        let body = |body: Body| Object::Body(body);
+        Ok(match self {
+            Kind::Disc(range) => {
+                let radius = between(range);
+                let name = format!("soft disc of {radius:.2} mm");
+                (name, Object::Patch(Patch::disc(place_mm, radius)?))
+            }
+            Kind::Face => {
+                let radius_mm = between(FACES_MM);
+                let name = format!("flat face of {radius_mm:.2} mm");
+                (name, body(turned(Shape::Face { radius_mm }, 0.0)))
+            }
+            Kind::TiltedFace => {
+                let radius_mm = between(FACES_MM);
+                let (turned_deg, tilt_deg) = (between([0.0, 360.0]), between([0.0, TILT_DEG]));
+                let face = turned(Shape::Face { radius_mm }, turned_deg);
+                let name = format!("flat face of {radius_mm:.2} mm, tilted by {tilt_deg:.1}°");
+                (name, body(Body { tilt_deg, ..face }))
+            }
+            Kind::Pad => {
+                let turned_deg = between([0.0, 180.0]);
+                let name = format!("pad at {turned_deg:.0}°");
+                (name, body(Body::pad(place_mm, turned_deg)))
+            }
+            Kind::Cylinder(length_mm) => {
+                let turned_deg = between([0.0, 180.0]);
+                let shape = Shape::Cylinder {
+                    radius_mm: CYLINDER_MM,
+                    length_mm,
+                    ends: Ends::Rounded,
+                };
+                let name = format!("cylinder of {length_mm} mm at {turned_deg:.0}°");
+                (name, body(turned(shape, turned_deg)))
+            }
+            Kind::Ball(diameter) => {
+                let radius_mm = diameter / 2.0;
+                let name = format!("ball of {diameter} mm");
+                (name, body(turned(Shape::Sphere { radius_mm }, 0.0)))
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn draws_are_the_same_for_the_same_seed_and_differ_otherwise() {
+        for kind in KINDS {
+            let draw = |seed, number| kind.draw(seed, number).unwrap();
+            assert_eq!(draw(1, 3).name, draw(1, 3).name);
+            assert_ne!(draw(1, 3).force_n, draw(1, 4).force_n);
+            assert_ne!(draw(1, 3).force_n, draw(2, 3).force_n);
+            let [x, y, z] = draw(1, 3).force_n;
+            let size = (x * x + y * y + z * z).sqrt();
+            assert!((FORCES_N[0]..=FORCES_N[1]).contains(&size) && z < 0.0);
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Solves what objects do to the film, with the truth that belongs to it.
+
+use anyhow::{Context, Result};
+use hivtac_shell::{Film, markers};
+use hivtac_twin::Camera;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use super::objects::{Drawn, KINDS, Kind, Object};
+
+/// Which presses to solve.
+#[derive(Clone, Copy, Debug)]
+pub struct Plan {
+    /// Presses of each kind.
+    pub of_each: u32,
+    /// Seed of all draws.
+    pub seed: u64,
+}
+
+/// A press of an object.
+#[derive(Clone, Debug, Serialize)]
+pub struct Press {
+    /// The object in words, with its sizes, place and force.
+    pub name: String,
+    /// Its kind.
+    pub kind: Kind,
+    /// The motion of the markers' images since rest, px of the camera, in the order of the markers.
+    /// In focal lengths: divided by [`Camera::focal_px`].
+    pub moved_px: [[f64; 2]; 4],
+    /// The true force on the film, N, film frame.
+    pub force_n: [f64; 3],
+    /// The true centre of pressure, mm: the mean of the points of the mounted film that touch,
+    /// weighted by the normal pressure.
+    pub centre_mm: [f64; 2],
+}
+
+/// Solves presses of all kinds on a film, on all threads. They come by kind, in the order of
+/// [`KINDS`], each kind in the order of its draws. A press is left out if the contact reaches too
+/// far for the solver; it is told on stderr.
+///
+/// # Errors
+/// If a draw is impossible.
+pub fn presses(film: &Film, camera: &Camera, plan: Plan) -> Result<Vec<Press>> {
+    let numbers = 0..plan.of_each;
+    let draws = KINDS
+        .iter()
+        .flat_map(|kind| numbers.clone().map(move |number| (*kind, number)));
+    let rest_px = markers(film, &film.rest(), camera).map(|marker| marker.seen_px);
+    let solved = draws
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|(kind, number)| {
+            let drawn = kind.draw(plan.seed, number)?;
+            let name = drawn.name.clone();
+            let solved = Press::solve(film, camera, (kind, drawn), &rest_px);
+            Ok(solved
+                .inspect_err(|why| eprintln!("left out: {name}: {why:#}"))
+                .ok())
+        });
+    Ok(solved
+        .collect::<Result<Vec<_>>>()?
+        .into_iter()
+        .flatten()
+        .collect())
+}
+
+impl Press {
+    fn solve(
+        film: &Film,
+        camera: &Camera,
+        (kind, drawn): (Kind, Drawn),
+        rest_px: &[[f64; 2]; 4],
+    ) -> Result<Press> {
+        let Drawn {
+            name,
+            object,
+            force_n,
+        } = drawn;
+        let (state, centre_mm) = match object {
+            Object::Patch(patch) => {
+                let state = film.press_patch(&patch, force_n, &film.rest());
+                (state.context("a patch")?, patch.centre_mm())
+            }
+            Object::Body(body) => {
+                let touch = film.press_body(&body, force_n, &film.rest())?;
+                (touch.state, touch.patch.centre_mm())
+            }
+        };
+        let there = markers(film, &state, camera);
+        let moved = |k: usize| [0, 1].map(|i| there[k].seen_px[i] - rest_px[k][i]);
+        Ok(Press {
+            name,
+            kind,
+            moved_px: std::array::from_fn(moved),
+            force_n,
+            centre_mm,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hivtac_shell::Design;
+    use hivtac_twin::Preset;
+
+    #[test]
+    fn presses_come_by_kind_with_their_truth() {
+        let design = Design {
+            fineness: 0.25,
+            ..Design::default()
+        };
+        let film = Film::new(&design).unwrap();
+        let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
+        let plan = Plan {
+            of_each: 1,
+            seed: 3,
+        };
+        let presses = presses(&film, &camera, plan).unwrap();
+        let kinds: Vec<Kind> = presses.iter().map(|press| press.kind).collect();
+        assert_eq!(kinds, KINDS);
+        for press in presses {
+            assert!(press.force_n[2] < -0.01);
+            // A long cylinder bears most on its end beside a post.
+            let out = press
+                .centre_mm
+                .iter()
+                .fold(0.0, |most: f64, part| most.max(part.abs()));
+            assert!(out < 9.0, "{} {out}", press.name);
+            let far = press
+                .moved_px
+                .iter()
+                .map(|[x, y]| x.hypot(*y))
+                .fold(0.0, f64::max);
+            assert!((1.0..100.0).contains(&far), "{} {far}", press.name);
+        }
+    }
+}
