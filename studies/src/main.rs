@@ -2,6 +2,7 @@
 //! with the paper's pipeline, and test units drawn at random.
 
 mod anywhere;
+mod contact_check;
 mod contacts;
 mod maps;
 mod page;
@@ -27,6 +28,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Anywhere(anywhere::Anywhere),
+    ContactCheck(contact_check::ContactCheck),
     Contacts(contacts::Contacts),
     Paper(paper::Paper),
     #[command(subcommand)]
@@ -42,6 +44,7 @@ fn main() -> Result<()> {
     sigpipe::reset();
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),
+        Command::ContactCheck(study) => study.run(),
         Command::Contacts(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
