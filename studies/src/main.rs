@@ -2,7 +2,6 @@
 //! with the paper's pipeline, and test units drawn at random.
 
 mod anywhere;
-mod contact_check;
 mod contacts;
 mod maps;
 mod page;
@@ -28,7 +27,6 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Anywhere(anywhere::Anywhere),
-    ContactCheck(contact_check::ContactCheck),
     Contacts(contacts::Contacts),
     Paper(paper::Paper),
     #[command(subcommand)]
@@ -44,7 +42,6 @@ fn main() -> Result<()> {
     sigpipe::reset();
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),
-        Command::ContactCheck(study) => study.run(),
         Command::Contacts(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
