@@ -98,8 +98,8 @@ impl Row {
 /// Returns the table of all kinds.
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
-        "| what presses | presses | refused | direction, rms | \\|F\\|, mean and rms | place, rms | \
-         within the stated 95 %: direction, \\|F\\|, place |\n|---|--:|--:|--:|--:|--:|--:|\n",
+        "| what presses | presses | refused | direction, rms | \\|F\\|, mean and rms | place, rms \
+         | within the stated 95 %: direction, \\|F\\|, place |\n|---|--:|--:|--:|--:|--:|--:|\n",
     );
     text.extend(rows.iter().map(Row::line));
     text
