@@ -105,8 +105,8 @@ impl Pressing<'_> {
         State { unknowns, foot }
     }
 
-    /// Finds the equilibrium from a state, but for this much unbalanced force, N. Returns the number
-    /// of steps, too.
+    /// Finds the equilibrium from a state, but for this much unbalanced force, N. Returns it with
+    /// the number of steps.
     ///
     /// # Errors
     /// If there is none within reach.
