@@ -1,5 +1,4 @@
-//! Computes how contacts of other shapes move the images, compared with the nominal tip: the
-//! section of a model file that is the same for all units.
+//! Computes how contacts of other shapes move the images, compared with the nominal tip.
 
 use std::f64::consts::TAU;
 
@@ -17,8 +16,6 @@ use rayon::prelude::*;
 use super::covariances::{END_MM, Moved, covariances, knots, sum_of_squares};
 use super::{LeastSquares, UnitSetup, in_focal_lengths};
 
-/// The section for nominal films, made by `hivtac-calibrate contact-shapes`.
-pub const CONTACT_SHAPES: &[u8] = include_bytes!("../../data/contact-shapes.bin");
 /// Knots along the size, along y and along x.
 const KNOTS: [u8; 3] = [6, 5, 5];
 /// Radii of round contacts and of flat faces, mm.
@@ -53,7 +50,7 @@ struct Member {
     weight: f64,
 }
 
-/// The section for the nominal film, solved by finite elements. This takes minutes.
+/// The table of the nominal film, solved by finite elements. This takes minutes.
 ///
 /// # Errors
 /// When the film finds no equilibrium.

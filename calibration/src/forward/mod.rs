@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::unit_fit::OwnFilm;
 use crate::weights::Weights;
-pub use contact_shapes::{CONTACT_SHAPES, contact_shapes};
+pub use contact_shapes::contact_shapes;
 use covariances::even;
 pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 pub use functions::{Sampled, compressed};
@@ -171,7 +171,6 @@ impl FilmModel {
             own: (self.beside_px > 0.0).then(|| even(self.beside_px / FOCAL_PX)),
             other: self.others.as_deref().map(OtherUnits::spec),
             weight: Some(nominal.weight),
-            shapes: Some(CONTACT_SHAPES.to_vec()),
         })
     }
 }

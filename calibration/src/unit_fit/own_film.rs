@@ -19,8 +19,7 @@ use super::numbers::{Family, Number};
 use super::problem::{At, Problem, Rates, mesh_part, near_tip};
 use super::weight::OwnWeight;
 use crate::forward::{
-    CONTACT_SHAPES, Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image,
-    sum_of_squares, tables,
+    Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
 
 /// Nodes along each axis of a dot's table.
@@ -176,7 +175,6 @@ impl OwnFilm {
             own: Some(self.covariance()?),
             other: None,
             weight: self.weight.as_deref().map(OwnWeight::spec).transpose()?,
-            shapes: Some(CONTACT_SHAPES.to_vec()),
         })
     }
 

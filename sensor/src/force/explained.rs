@@ -257,9 +257,9 @@ impl Resting {
         (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
     }
 
-    /// Returns whether a force that one contact explains badly may be given. The contact must not be
-    /// known to be a needle: what a needle leaves over is a fault. And the uncertainties, widened
-    /// by what is left over, must be of use.
+    /// Returns whether a force that one contact explains badly may be given. The contact must not
+    /// be known to be a needle: what a needle leaves over is a fault. And the uncertainties,
+    /// widened by what is left over, must be of use.
     fn may_be_loose(&self, force: &Force) -> bool {
         let (direction, magnitude, place) = OF_USE;
         self.shape != ContactShape::Needle

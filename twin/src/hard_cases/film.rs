@@ -82,7 +82,7 @@ pub(super) fn red_things() -> Vec<HardCase> {
         (
             "red-hiding",
             "a red disc that hides a marker",
-            Rejected,
+            Either,
             inwards(0.4),
             1.0,
         ),

@@ -91,7 +91,7 @@ pub struct Forward<'a> {
     pub other: Option<Others<'a>>,
     /// The effect of the film's own weight; `None` if the file has no such section.
     pub weight: Option<Weight<'a>>,
-    /// The effect of the shape of what presses; `None` if the file has no such section.
+    /// The effect of the shape of what presses; `None` if it is unknown.
     pub shapes: Option<Shapes<'a>>,
 }
 

@@ -2,7 +2,7 @@
 //! same force at the same centre of pressure.
 //!
 //! A wide contact moves the images as a slightly larger force does, and off the middle to one side.
-//! The file holds this motion at knots of size and place: its mean over all shapes, its covariance
+//! A table holds this motion at knots of size and place: its mean over all shapes, its covariance
 //! over them, and its dependence on the radius of a round or flat contact. Film and markers are
 //! symmetric, so that places along +x and +y tell all others.
 
@@ -31,7 +31,14 @@ const OF_OWN: f32 = 0.4;
 const OF_ALL: [f32; 2] = [0.15, 0.1];
 const OF_ALL_FLAT: [f32; 2] = [0.4, 0.15];
 
-/// The motions of all shapes, borrowed from a model file.
+/// Those of the nominal film, as the example `contact_shapes` of `calibration/` writes them: the
+/// number of knots along size, y and x, a zero, the largest place, the knots of the covariance, and
+/// those of the motions.
+const NOMINAL: &[u8] = include_bytes!("../../../data/contact-shapes.bin");
+/// Bytes before the knots.
+const HEAD: usize = 8;
+
+/// The motions of all shapes at knots of size and place.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shapes<'a> {
     covariance: CovarianceGrid<'a>,
@@ -43,11 +50,21 @@ pub struct Shapes<'a> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressing<'a> {
     shapes: Shapes<'a>,
-    /// The parts of the file's motions in this one's.
+    /// The parts of the table's motions in this one's.
     parts: [f32; SHIFTS],
     /// Standard uncertainty relative to the motion itself, and to what all shapes leave.
     of_own: f32,
     of_all: f32,
+}
+
+impl Shapes<'static> {
+    /// Those of the nominal film, which stand for all films with its markers.
+    pub fn nominal() -> Option<Shapes<'static>> {
+        let ([sizes, lines, places, _, end @ ..], knots) = NOMINAL.split_first_chunk::<HEAD>()?;
+        let (counts, end_mm) = ([*sizes, *lines, *places], f32::from_le_bytes(*end));
+        let (covariance, shifts) = knots.split_at_checked(CovarianceGrid::length(counts))?;
+        Shapes::new(CovarianceGrid::new(counts, end_mm, covariance)?, shifts)
+    }
 }
 
 impl<'a> Shapes<'a> {
@@ -274,6 +291,11 @@ mod tests {
         for (i, j) in [(0, 0), (3, 1), (7, 2)] {
             assert_eq!(both.entry(&square, i, j), there[i] * there[j]);
         }
+    }
+
+    #[test]
+    fn the_nominal_film_has_a_table() {
+        assert!(Shapes::nominal().is_some());
     }
 
     #[test]

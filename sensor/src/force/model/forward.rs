@@ -3,8 +3,8 @@
 use super::{ModelError, reader::Reader};
 use crate::force::forward::{
     Axis, CovarianceGrid, DOTS, EQUATIONS, Forward, Gravity, Limits, MOST_FUNCTIONS, MOST_STEPS,
-    Markers, NODES, Noise, Others, RELATIVE, RestImage, SHIFT_KNOT, Shapes, Stiffness, Table,
-    Tables, Terms, Weight, weight,
+    Markers, NODES, Noise, Others, RELATIVE, RestImage, Shapes, Stiffness, Table, Tables, Terms,
+    Weight, weight,
 };
 #[cfg(any(test, feature = "encode"))]
 use {
@@ -22,21 +22,21 @@ impl<'a> Forward<'a> {
     }
 }
 
-/// Optional parts of a file: the covariance of its own unit, the knowledge of other units, the
-/// effect of the film's weight, and that of the shape of what presses. Part k is there if bit k is
-/// set.
-const PARTS: [[bool; 4]; 16] = {
-    let mut parts = [[false; 4]; 16];
-    let mut number = 0;
-    while number < 16 {
-        let mut part = 0;
-        while part < 4 {
-            parts[number][part] = number >> part & 1 == 1;
-            part += 1;
-        }
-        number += 1;
-    }
-    parts
+/// Optional parts of a file: the covariance of its own unit, the knowledge of other units, and the
+/// effect of the film's weight.
+const PARTS: [[bool; 3]; 8] = {
+    const NO: bool = false;
+    const HAS: bool = true;
+    [
+        [NO, NO, NO],
+        [HAS, NO, NO],
+        [NO, HAS, NO],
+        [HAS, HAS, NO],
+        [NO, NO, HAS],
+        [HAS, NO, HAS],
+        [NO, HAS, HAS],
+        [HAS, HAS, HAS],
+    ]
 };
 
 /// Reads the section.
@@ -44,7 +44,7 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
     let steps = reader.u8_in("steps", MOST_STEPS, "0 to 3")?;
     let has_camera = reader.choice("camera", &[false, true], "0 or 1")?;
     dots(reader)?;
-    let [has_own, has_other, has_weight, has_shapes] = reader.choice("parts", &PARTS, "0 to 15")?;
+    let [has_own, has_other, has_weight] = reader.choice("parts", &PARTS, "0 to 7")?;
     let limits = Limits {
         size: float(reader, "largest size", [1e-3, 10.0], "0.001 to 10")?,
         tilt: float(reader, "largest tilt", [1e-2, 1.0], "0.01 to 1 rad")?,
@@ -71,18 +71,7 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         own: has_own.then(|| covariances(reader)).transpose()?,
         other: has_other.then(|| others(reader)).transpose()?,
         weight: has_weight.then(|| weight(reader)).transpose()?,
-        shapes: has_shapes.then(|| shapes(reader)).transpose()?,
-    })
-}
-
-fn shapes<'a>(reader: &mut Reader<'a>) -> Result<Shapes<'a>, ModelError> {
-    let covariance = covariances(reader)?;
-    let offset = reader.offset;
-    let bytes = reader.take(SHIFT_KNOT * covariance.knots())?;
-    Shapes::new(covariance, bytes).ok_or(ModelError::Field {
-        name: "shapes of contacts",
-        offset,
-        allowed: "steps of 0 to 0.001",
+        shapes: Shapes::nominal(),
     })
 }
 
@@ -278,8 +267,6 @@ pub struct ForwardSpec {
     pub other: Option<OthersSpec>,
     /// The effect of the film's own weight.
     pub weight: Option<WeightSpec>,
-    /// The effect of the shape of what presses: the bytes of [`ShapesSpec::to_bytes`].
-    pub shapes: Option<Vec<u8>>,
 }
 
 /// The effect of the shape of what presses, to be written.
@@ -377,7 +364,6 @@ impl ForwardSpec {
             self.own.is_some(),
             self.other.is_some(),
             self.weight.is_some(),
-            self.shapes.is_some(),
         ];
         let parts = PARTS.iter().position(|parts| *parts == has).unwrap_or(0);
         let camera = u8::from(self.per_px.is_some());
@@ -409,13 +395,12 @@ impl ForwardSpec {
         if let Some(weight) = &self.weight {
             weight.push(bytes);
         }
-        bytes.extend(self.shapes.iter().flatten());
     }
 }
 
 #[cfg(any(test, feature = "encode"))]
 impl ShapesSpec {
-    /// The section as a file holds it. Each knot's step is the largest of its entries over 32,767.
+    /// The bytes of `sensor/data/contact-shapes.bin`. Each knot's step is the largest of its entries over 32,767.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.covariance.push(&mut bytes);
