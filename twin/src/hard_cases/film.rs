@@ -28,7 +28,7 @@ pub(super) fn red_things() -> Vec<HardCase> {
             patched(vec![patch(centre_mm, radius_mm, Paint::Red)])
         })
     };
-    use Expected::{Either, Rejected};
+    use Expected::Either;
     let cases: [(&str, &str, Expected, [f64; 2], f64); 8] = [
         (
             "red-same-size",

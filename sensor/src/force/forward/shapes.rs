@@ -192,7 +192,8 @@ impl Mirror {
     /// The mirror image of a coordinate's number, and its sign.
     fn of_coordinate(&self, number: usize) -> (usize, f32) {
         let [along_x, along_y] = self.signs;
-        let sign = if number % 2 == 0 { along_x } else { along_y };
+        let is_x = number.is_multiple_of(2);
+        let sign = if is_x { along_x } else { along_y };
         (number ^ (2 * self.exchanged), sign)
     }
 
