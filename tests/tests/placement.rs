@@ -66,8 +66,8 @@ fn the_sensing_runs_from_itcm() {
             || symbol.name.starts_with("hivtac_")
     };
     // Code that rarely runs: for a model, a setting, a tare, a message or a self-test, after a
-    // force or in place of one without a film, for a second look at a refused frame, and for a
-    // lost marker. It has no loop over pixels or weights.
+    // force or in place of one without a film, for a second look at a refused frame, for a lost
+    // marker, and for a contact that is no needle. It has no loop over pixels or weights.
     let seldom = [
         "hivtac_sensor5force5model",
         "hivtac_sensor..force..model",
@@ -90,6 +90,7 @@ fn the_sensing_runs_from_itcm() {
         "7Resting9set_drift",
         "7forward5drift",
         "7forward6weight",
+        "7forward6shapes",
         "8pipeline7hanging",
         "5force10of_outputs",
         "8Geometry9rest_area",

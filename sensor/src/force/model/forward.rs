@@ -400,8 +400,8 @@ impl ForwardSpec {
 
 #[cfg(any(test, feature = "encode"))]
 impl ShapesSpec {
-    /// The bytes of `sensor/data/contact-shapes.bin`. Each knot's step is the largest of its entries
-    /// over 32,767.
+    /// The bytes of `sensor/data/contact-shapes.bin`. Each knot's step is the largest of its
+    /// entries over 32,767.
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
         self.covariance.push(&mut bytes);
