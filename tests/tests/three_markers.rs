@@ -14,9 +14,9 @@ const PRESSES: Contacts = Contacts {
     ratio: 0.14,
     place_mm: 4.0,
 };
-/// Largest part of the presses without a force: near the picture's border another marker's edge
-/// is uncertain.
-const REFUSED: f64 = 0.02;
+/// Largest part of the presses without a force: near the lost marker the others see little, and
+/// near the picture's border another marker's edge is uncertain.
+const REFUSED: f64 = 0.12;
 /// 95 of 100 errors of direction, |F| and place are within this many standard uncertainties, of
 /// two, one and two coordinates; σ of the place is that of one coordinate.
 const SIGMAS: [f64; 3] = [1.731, 1.960, 2.448];
@@ -182,7 +182,7 @@ fn too_little_to_go_by_gives_no_force() {
     let mut sensor = sensor();
     let mut random = Random::new(31);
     let load = PRESSES.draw(&mut random).unwrap();
-    let [one, two] = [without(&[1]), without(&[1, 2])];
+    let [one, two] = [without(&[3]), without(&[3, 2])];
     let seen = |scene: &Scene, sensor: &mut TaredSensor| {
         sensor.sense(&scene.render_load(&load, 1).unwrap())
     };

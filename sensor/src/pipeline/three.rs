@@ -7,7 +7,8 @@
 //! a tare, for re-zeroing, or for the noise level.
 //!
 //! It needs a rest position of this unit, which tells which three are seen, and a film run
-//! forwards. A frame that three markers do not explain stays refused for its first reason.
+//! forwards. A frame that three markers do not explain stays refused for its first reason, as does
+//! a contact near the lost marker: the others hardly see it.
 
 use super::{Measurement, Sensor};
 use crate::markers::tables::Table;
@@ -56,7 +57,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let (force, told) = resting.told(forward, &model.range, noise, &estimate);
         status |= told | Status::MARKER_LOST;
         let is_touched = told.contains(Status::CONTACT);
-        if !estimate.is_explained_by_three(is_touched) || status.intersects(Status::NO_FORCE) {
+        let is_known = !is_touched || forward.is_far_from(lost, &estimate);
+        let is_explained = is_known && estimate.is_explained_by_three(is_touched);
+        if !is_explained || status.intersects(Status::NO_FORCE) {
             return None;
         }
         self.motion.ended_without(seen, lost);

@@ -5,7 +5,7 @@
 //! the nearest of a few straight presses.
 
 use super::estimate::{Estimate, Observed};
-use super::mounting::Mounting;
+use super::mounting::{Mounting, RestImage};
 use super::pose::Pose;
 use super::predict::{DOTS, Markers};
 use super::solve::{Column, square};
@@ -17,6 +17,9 @@ const UNEXPLAINED: f32 = 12.1;
 /// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
 /// nothing.
 const LOST: f32 = 1e6;
+/// A contact this near to the lost marker moves the other three so little that several loads
+/// explain them, mm.
+const NEAR_MM: f32 = 2.2;
 /// Where the steps may begin: along each axis, as parts of the tables' last place; and the size, as
 /// a part of the largest.
 const PLACES: [f32; 3] = [-0.6, 0.0, 0.6];
@@ -31,6 +34,17 @@ impl Estimate {
 }
 
 impl Forward<'_> {
+    /// Returns whether three markers determine a contact: it is not near the marker `lost` (0–3).
+    pub fn is_far_from(&self, lost: usize, estimate: &Estimate) -> bool {
+        let RestImage { at, film_mm } = &self.rest_image;
+        let dot = at.get(lost).zip(film_mm.get(lost));
+        dot.is_some_and(|([x, y], [_, across_mm])| {
+            let [right, below] = estimate.pose.place_mm;
+            let (right, below) = (right - across_mm * x, below - across_mm * y);
+            right * right + below * below >= NEAR_MM * NEAR_MM
+        })
+    }
+
     /// Returns the load that explains the markers but `lost` (0–3) best, and where that one is
     /// under it: how far it moved from rest, focal lengths.
     #[inline(never)]
