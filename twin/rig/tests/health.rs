@@ -13,7 +13,7 @@ use hivtac_wire::message::{Outcome, Request};
 const ASKED: u16 = 40;
 const ASKED_MS: u64 = 200;
 /// The time is within the read-back of written registers.
-const FORGETS: &str = "camera-forgets@97";
+const FORGETS: &str = "camera-forgets@103";
 
 fn ask(request: Request, virtual_ms: u64) -> Setup {
     let asked = Action::Send(command(ASKED, request));
@@ -63,7 +63,7 @@ fn a_camera_of_another_kind_is_told() {
 #[test]
 fn a_register_that_does_not_hold_what_was_written_is_told() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
-    let setup = Setup::new(firmware(), 760).at(740, asked);
+    let setup = Setup::new(firmware(), 920).at(900, asked);
     let run = setup.fault(FORGETS).run();
     let health = told(&run);
     let expected = (0, Problem::CameraRegisters.bit());

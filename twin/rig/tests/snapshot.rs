@@ -133,7 +133,7 @@ fn check_latency(run: &Run, kept: u64) {
 /// its bands are copied.
 #[test]
 fn an_overrun_costs_a_frame_and_a_busy_bus_nothing() {
-    let run = setup(450).fault("dcmi-overrun@233").fault("bus-busy").run();
+    let run = setup(450).fault("dcmi-overrun@241").fault("bus-busy").run();
     assert_eq!(run.report.dcmi.overruns, 1);
     let taken = snapshots(&run);
     assert_eq!(taken.len(), 1);
