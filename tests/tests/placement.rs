@@ -100,7 +100,6 @@ fn the_sensing_runs_from_itcm() {
         "8pipeline6taring",
         "hivtac_sensor5force4rest",
         "5trust5Trust3new",
-        "hivtac_sensor12known_answer",
         "8pipeline5again",
         "8pipeline5three",
         "5rules5three",
