@@ -5,12 +5,11 @@ use std::f64::consts::TAU;
 use anyhow::{Context as _, Result};
 use hivtac_sensor::force::forward::{EQUATIONS, SHIFTS, span};
 use hivtac_sensor::force::model::ShapesSpec;
-use hivtac_shell::{Contact, Design, Equilibrium, Film, Patch};
+use hivtac_shell::{Contact, Design, Equilibrium, Film, Patch, markers};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::units::Micrometres;
-use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Pose, Unit};
-use hivtac_twin::{Camera, Disc, Preset};
+use hivtac_twin::{Camera, Preset};
 use rayon::prelude::*;
 
 use super::covariances::{END_MM, Moved, covariances, knots, sum_of_squares};
@@ -27,8 +26,8 @@ const TILTED_MM: [f64; 3] = [1.0, 2.0, 3.0];
 const PAD_MM: [f64; 2] = [4.0, 2.5];
 const EDGE_MM: [f64; 2] = [3.0, 0.8];
 /// Factor on standard uncertainties, and what is added to it at the dots. It rises with the smaller
-/// coordinate of the place, mm. Chosen so that forces of patches outside the ensemble are within
-/// the stated 95 % as often as stated.
+/// coordinate of the place, mm. Chosen so that forces of presses outside the ensemble are within
+/// the stated 95 % nearly as often as stated.
 const WIDER: f64 = 1.4;
 const WIDER_AT_DOTS: f64 = 1.6;
 const AT_DOTS_MM: [f64; 2] = [1.0, 2.5];
@@ -171,16 +170,10 @@ impl NominalFilm {
 
     /// Images of the dots, focal lengths from the axis.
     fn seen(&self, state: &Equilibrium) -> Moved {
+        let images = markers(&self.film, state, &self.camera);
         let mut seen = Moved::default();
-        for (place, dot_mm) in seen
-            .as_chunks_mut::<2>()
-            .0
-            .iter_mut()
-            .zip(MARKER_CENTRES_MM)
-        {
-            let disc = Disc::marker(dot_mm);
-            let at = disc.centroid_px(|point| self.film.displacement(state, point), &self.camera);
-            *place = in_focal_lengths(at, &self.camera);
+        for (place, marker) in seen.as_chunks_mut::<2>().0.iter_mut().zip(images) {
+            *place = in_focal_lengths(marker.seen_px, &self.camera);
         }
         seen
     }

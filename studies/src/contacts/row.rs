@@ -1,6 +1,7 @@
 //! Sums the errors of one kind of presses under one setting.
 
 use anyhow::{Context, Result};
+use hivtac_calibration::data::loads::norm;
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::Force;
@@ -59,7 +60,7 @@ impl Row {
         self.loosely += u32::from(status.contains(Status::LOOSELY_EXPLAINED));
         let place = force.place.context("the model tells no places")?;
         let [x, y] = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
-        let size_n = length(press.force_n);
+        let size_n = norm(press.force_n);
         let found = force.cartesian.map(|part| f64::from(part.0));
         let stronger = f64::from(force.magnitude.0) * 1e-6 / size_n - 1.0;
         let errors = [
@@ -119,10 +120,6 @@ impl Row {
             100.0 * self.stronger / told
         )
     }
-}
-
-fn length(vector: [f64; 3]) -> f64 {
-    vector.iter().map(|part| part * part).sum::<f64>().sqrt()
 }
 
 /// Returns the table of all kinds.

@@ -118,7 +118,7 @@ impl<'a> CovarianceGrid<'a> {
     }
 
     /// Number of knots.
-    pub fn knots(&self) -> usize {
+    pub(super) fn knots(&self) -> usize {
         self.knots.len()
     }
 }
