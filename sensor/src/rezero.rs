@@ -144,10 +144,8 @@ impl Tare {
     }
 
     fn rezero(&mut self) {
-        let mut px = Markers::default();
-        for (px, moved) in px.as_flattened_mut().iter_mut().zip(self.moved) {
-            *px = moved.to_f32();
-        }
+        let moved = self.moved.as_chunks().0.iter();
+        let px = Markers::of(moved.map(|[x, y]| [x.to_f32(), y.to_f32()]));
         self.rest = self.hung.displaced(&px);
     }
 
@@ -225,10 +223,12 @@ impl Tare {
         }
         // A seen drift replaces the uncertainty of an unseen one.
         (self.drift, self.is_seen) = (Drift::NONE, true);
-        let seen_px = self.drift.seen_px.as_flattened_mut().iter_mut();
-        for (seen, (there, moved)) in seen_px.zip(there.iter().zip(self.moved)) {
-            *seen = Px::saturated(*there - Q::from(moved)).to_f32();
+        let mut seen_px = Markers::defaults(self.moved.len() / 2);
+        let pairs = there.iter().zip(&self.moved);
+        for (seen, (there, moved)) in seen_px.as_flattened_mut().iter_mut().zip(pairs) {
+            *seen = Px::saturated(*there - Q::from(*moved)).to_f32();
         }
+        self.drift.seen_px = Some(seen_px);
         if self.moved == before {
             return Told::Drift;
         }

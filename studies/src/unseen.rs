@@ -7,8 +7,9 @@ use clap::Args;
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::forward::{Estimate, Forward, Mounting, Observed, Pose};
+use hivtac_sensor::force::forward::{Estimate, Forward, Markers, Mounting, Observed, Pose};
 use hivtac_sensor::force::model::Model;
+use hivtac_terms::list::List;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -109,7 +110,7 @@ impl<'m> Film<'m> {
     fn new(model: &Model<'m>) -> Option<Film<'m>> {
         let forward = model.forward?;
         let mounting = Mounting {
-            beside_mm: [[0.0; 2]; 4],
+            beside_mm: Markers::defaults(forward.tables.dots()),
             ..forward.rest_image.mounting(&model.rest)
         };
         Some(Film { forward, mounting })
@@ -130,7 +131,7 @@ impl<'m> Film<'m> {
             pressing: None,
             drift: None,
             moved: shown.moved,
-            noise: std::array::from_fn(|k| forward.rest_image.noise(k, variances)),
+            noise: List::from_fn(tables.dots(), |k| forward.rest_image.noise(k, variances)),
         };
         (pose, observed)
     }

@@ -1,7 +1,7 @@
 //! Tests of the film run forwards, by the committed model: it finds the contact that explains the
 //! markers' motion, refuses markers that no contact explains, and survives any input.
 
-use hivtac_sensor::force::forward::{Forward, Markers, Pose, STEPS_AT_MOST};
+use hivtac_sensor::force::forward::{Covariance, Forward, Markers, Pose, STEPS_AT_MOST};
 use hivtac_sensor::force::model::encode::FORWARD_OFFSET;
 use hivtac_sensor::force::model::{Model, ModelError};
 use hivtac_sensor::force::network::Output;
@@ -241,13 +241,14 @@ fn damaged_sections_do_no_harm() {
                     tilt: [0.2, 0.1],
                     place_mm: [4.0, -4.0],
                 };
-                let beside = [[0.2, -0.1]; 4];
+                let beside = Markers::filled(forward.tables.dots(), [0.2, -0.1]);
                 let moved = forward.tables.predict(&pose, &forward.limits, &beside);
                 assert!(moved.moved.iter().all(|part| part.is_finite()));
                 for is_own in [true, false] {
                     let unknown = forward.unknown(is_own);
-                    let covariance = unknown.covariance(&pose, &forward.limits, &moved.moved);
-                    assert!((0..8).all(|k| covariance[k][k] >= 0.0));
+                    let mut covariance = Covariance::EMPTY;
+                    unknown.put(&pose, &forward.limits, &moved.moved, &mut covariance);
+                    assert!(covariance.rows().all(|row| row.last() >= Some(&0.0)));
                 }
             }
             Err(ModelError::Field { .. } | ModelError::TooShort { .. }) => {}
@@ -262,7 +263,7 @@ fn damaged_sections_do_no_harm() {
 fn a_section_of_other_markers_is_refused() {
     let file = models::anywhere(1);
     let section = &file[FORWARD_OFFSET..file.len() - 4];
-    for (at, value, name) in [(2, 8, "markers"), (3, 8, "parts")] {
+    for (at, value, name) in [(2, 3, "markers"), (2, 17, "markers"), (3, 8, "parts")] {
         let mut changed = section.to_vec();
         changed[at] = value;
         let refused = Forward::parse(&changed).err();

@@ -65,12 +65,9 @@ impl<'m> Chip<'m> {
         let Some((forward, resting)) = forward else {
             return Ok(force::of_outputs(&self.model, &output));
         };
-        let marker = |k: usize| {
-            let (x, y) = features.centroids[k];
-            let area = seen.areas_px[k];
-            Marker { x, y, area }
-        };
-        let markers = std::array::from_fn(marker);
+        let pairs = features.centroids.iter().zip(seen.areas_px);
+        let markers = pairs.map(|((x, y), area)| Marker { x: *x, y: *y, area });
+        let markers: Vec<Marker> = markers.collect();
         let noise = FrameNoise::AS_MODELLED;
         let estimate = resting.estimate(forward, &markers, noise, &output);
         Ok(resting.told(forward, &self.model.range, noise, &estimate))

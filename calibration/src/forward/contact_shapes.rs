@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use anyhow::{Context as _, Result};
-use hivtac_sensor::force::forward::{EQUATIONS, SHIFTS, span};
+use hivtac_sensor::force::forward::{SHIFTS, span};
 use hivtac_sensor::force::model::ShapesSpec;
 use hivtac_shell::{Contact, Design, Equilibrium, Film, Patch, markers};
 use hivtac_terms::contact_shape::ContactShape;
@@ -12,7 +12,7 @@ use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::{Camera, Preset};
 use rayon::prelude::*;
 
-use super::covariances::{END_MM, Moved, covariances, knots, sum_of_squares};
+use super::covariances::{END_MM, EQUATIONS, Moved, covariances, knots, sum_of_squares};
 use super::{LeastSquares, UnitSetup, in_focal_lengths};
 
 /// Knots along the size, along y and along x.

@@ -1,6 +1,5 @@
 //! Covariances of the images' motion around a film's tables, at even places and sizes.
 
-use hivtac_sensor::force::forward::EQUATIONS;
 use hivtac_sensor::force::model::CovarianceSpec;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 
@@ -12,6 +11,9 @@ pub const END_MM: f64 = 4.2;
 pub const KNOTS: [u8; 3] = [5, 5, 5];
 /// The same where covariances do not depend on the place.
 const ANYWHERE: [u8; 3] = [5, 2, 2];
+
+/// Number of coordinates: x and y of four markers.
+pub const EQUATIONS: usize = 8;
 
 /// Motion of all images, x and y of each marker, focal lengths along the film's axes.
 pub type Moved = [f64; EQUATIONS];
@@ -51,6 +53,10 @@ pub fn knots([sizes, lines, places]: [u8; 3]) -> impl Iterator<Item = Pose> {
 
 /// Covariances given at these [`knots`], as a model file holds them.
 pub fn covariances(counts: [u8; 3], knots: &[Covariance]) -> CovarianceSpec {
+    let factor = |covariance: &Covariance| {
+        let rows = covariance.iter().map(|row| row.to_vec());
+        cholesky(rows.collect())
+    };
     CovarianceSpec {
         factors: knots.iter().map(factor).collect(),
         counts,
@@ -72,12 +78,6 @@ pub fn even(largest: f64) -> CovarianceSpec {
     covariances(ANYWHERE, &all)
 }
 
-fn factor(covariance: &Covariance) -> Covariance {
-    let rows = covariance.iter().map(|row| row.to_vec()).collect();
-    let factor = cholesky(rows);
-    std::array::from_fn(|i| std::array::from_fn(|j| factor[i][j]))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -97,7 +97,7 @@ mod tests {
         let spec = covariances(KNOTS, &all);
         let mut bytes = Vec::new();
         spec.push(&mut bytes);
-        let grid = CovarianceGrid::new(spec.counts, spec.end_mm, &bytes[8..]).unwrap();
+        let grid = CovarianceGrid::new(EQUATIONS, spec.counts, spec.end_mm, &bytes[8..]).unwrap();
         let limits = Limits {
             size: LARGEST_SIZE as f32,
             tilt: 0.6,
@@ -120,7 +120,7 @@ mod tests {
             let (found, truth) = (grid.at(&chip, &limits), truth(&pose));
             for i in 0..EQUATIONS {
                 for j in 0..=i {
-                    let off = f64::from(found[i][j]) - truth[i][j];
+                    let off = f64::from(found.entry(i, j)) - truth[i][j];
                     let whole = (truth[i][i] * truth[j][j]).sqrt();
                     assert!(off.abs() < part * whole, "{pose:?} {i} {j}: {off} {whole}");
                 }

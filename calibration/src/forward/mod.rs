@@ -17,7 +17,7 @@ mod weight;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
-use hivtac_sensor::force::forward::{self, DOTS, Limits, RestImage, Stiffness};
+use hivtac_sensor::force::forward::{self, Limits, Markers, RestImage, Stiffness};
 use hivtac_sensor::force::model::{ForwardSpec, TablesSpec, WeightSpec};
 use hivtac_twin::film::Film;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
@@ -28,7 +28,7 @@ use crate::unit_fit::OwnFilm;
 use crate::weights::Weights;
 pub use contact_shapes::contact_shapes;
 use covariances::even;
-pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
+pub use covariances::{Covariance, EQUATIONS, KNOTS, Moved, covariances, knots, sum_of_squares};
 pub use functions::{Sampled, compressed};
 pub(crate) use least_squares::{LeastSquares, dot};
 pub use noise::Noise;
@@ -150,7 +150,7 @@ impl FilmModel {
     pub fn spec(&self) -> Result<ForwardSpec> {
         self.check()?;
         let noise = forward::Noise {
-            rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
+            rest_px: Markers::of(self.rest_px.map(|place| place.map(|part| part as f32))),
             at_rest_px: self.noise_px.map(|part| part as f32),
             at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
         };
@@ -164,7 +164,7 @@ impl FilmModel {
             steps: self.steps,
             limits: limits(),
             stiffness: nominal.stiffness,
-            rest_image: rest_image(Film::default().markers_mm(), &camera),
+            rest_image: rest_image(&Film::default().markers_mm(), &camera),
             per_px: None,
             noise,
             tables: nominal.tables,
@@ -260,11 +260,12 @@ fn parsed(bytes: &[u8]) -> Result<forward::Forward<'_>> {
 }
 
 /// Images of markers at these places, mm, at rest; focal lengths from the axis.
-fn at_rest(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> [[f64; 2]; DOTS] {
-    places_mm.map(|place_mm| {
-        let at = Disc::marker(place_mm).centroid_px(|_| [0.0; 3], camera);
+fn at_rest(places_mm: &[[f64; 2]], camera: &Camera) -> Vec<[f64; 2]> {
+    let at_rest = |place_mm: &[f64; 2]| {
+        let at = Disc::marker(*place_mm).centroid_px(|_| [0.0; 3], camera);
         in_focal_lengths(at, camera)
-    })
+    };
+    places_mm.iter().map(at_rest).collect()
 }
 
 /// Converts a point of a camera's picture from px to focal lengths from the axis.
@@ -274,16 +275,21 @@ pub(crate) fn in_focal_lengths(at_px: [f64; 2], camera: &Camera) -> [f64; 2] {
 }
 
 /// The rest picture of markers at these places, mm, by the nominal camera, 10 mm from the film.
-pub(crate) fn rest_image(places_mm: [[f64; 2]; DOTS], camera: &Camera) -> RestImage {
-    let film_mm = places_mm.map(|[x, y]| {
-        let (distance, radius) = (FILM_DISTANCE_MM, libm::hypot(x, y));
+pub(crate) fn rest_image(places_mm: &[[f64; 2]], camera: &Camera) -> RestImage {
+    let film_mm = |[x, y]: &[f64; 2]| {
+        let (distance, radius) = (FILM_DISTANCE_MM, libm::hypot(*x, *y));
         let away = (distance * distance + radius * radius) / distance;
-        let across = radius / libm::atan(radius / distance);
+        // A marker on the axis is seen as far as its height says.
+        let across = match radius > 0.0 {
+            true => radius / libm::atan(radius / distance),
+            false => distance,
+        };
         [away, across].map(|part| part as f32)
-    });
+    };
+    let at = at_rest(places_mm, camera).into_iter();
     RestImage {
-        at: at_rest(places_mm, camera).map(|place| place.map(|part| part as f32)),
-        film_mm,
+        at: Markers::of(at.map(|place| place.map(|part| part as f32))),
+        film_mm: Markers::of(places_mm.iter().map(film_mm)),
     }
 }
 
@@ -306,7 +312,7 @@ mod tests {
             place_mm: pose.place_mm.map(|part| part as f32),
         };
         let predicted = (forward.tables).predict(&pose, &forward.limits, beside_mm);
-        predicted.moved.map(f64::from)
+        std::array::from_fn(|k| predicted.moved[k].into())
     }
 
     fn film_model() -> FilmModel {
@@ -362,7 +368,7 @@ mod tests {
         let forward = forward::Forward::parse(&bytes).unwrap();
         let (mut sum, mut worst, mut count) = (0.0, 0.0_f64, 0.0);
         for pose in poses() {
-            let chip = predicted_motion(&forward, &pose, &[[0.0; 2]; DOTS]);
+            let chip = predicted_motion(&forward, &pose, &forward::Markers::defaults(4));
             for marker in 0..4 {
                 let truth = setup.moved(&film, &pose, marker).unwrap();
                 for axis in [0, 1] {
@@ -411,20 +417,14 @@ mod tests {
                 now: down.map(|part| part as f32),
             };
             let hanging = forward.hanging(turned, true).unwrap();
-            let mut told = forward::Prediction::default();
+            let mut told = forward::Prediction::zeros(EQUATIONS);
             let chip = forward::Pose {
                 size: pose.size as f32,
                 tilt: pose.tilt.map(|part| part as f32),
                 place_mm: pose.place_mm.map(|part| part as f32),
             };
-            let mut covariance = forward::Covariance::default();
-            hanging.add_to(
-                &chip,
-                &forward.stiffness,
-                &forward.limits,
-                &mut told,
-                &mut covariance,
-            );
+            let mut covariance = forward::Covariance::zeros(EQUATIONS);
+            hanging.add_to(&chip, &forward, &mut told, &mut covariance);
             for c in 0..8 {
                 let moved = f64::from(told.moved[c]);
                 let off = camera.focal_px() * (moved - (with[c] - without[c]));

@@ -3,7 +3,7 @@
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::features::Features;
-use hivtac_sensor::force::forward::{DOTS, EQUATIONS, Forward, Markers, Mounting, Stiffness};
+use hivtac_sensor::force::forward::{Forward, Markers, Mounting, Stiffness};
 use hivtac_sensor::force::forward::{Pose as ChipPose, RELATIVE};
 use hivtac_sensor::force::model::{CovarianceSpec, OthersSpec};
 use hivtac_sensor::force::rest::Rest;
@@ -65,7 +65,7 @@ pub struct OtherUnits {
     counts: [u8; 3],
     end_mm: f32,
     /// Row by row, of each knot.
-    factors: Vec<[[f64; EQUATIONS]; EQUATIONS]>,
+    factors: Vec<Vec<Vec<f64>>>,
 }
 
 impl OtherUnits {
@@ -185,15 +185,14 @@ impl<'a> Other<'a> {
             chip,
             tilt: [(); 2].map(|()| random.random_range(-TILT..TILT)),
         };
-        other.rest_px = other
-            .seen(&other.rest)
-            .map(|place| place.map(|part| part as f32));
+        let rest_px = other.seen(&other.rest);
+        other.rest_px = Markers::of(rest_px.map(|place| place.map(|part| part as f32)));
         other.mounting = chip.rest_image.mounting(&rest(&other.rest_px));
         Ok(other)
     }
 
     /// Images of the dots, px from the camera's axis.
-    fn seen(&self, state: &Equilibrium) -> [[f64; 2]; DOTS] {
+    fn seen(&self, state: &Equilibrium) -> [[f64; 2]; 4] {
         let [cos, sin] = self.to_px;
         std::array::from_fn(|dot| {
             let disc = Disc::marker(self.film.design().dots_mm[dot]);
@@ -327,7 +326,7 @@ fn design(number: u64, random: &mut ChaCha8Rng) -> Design {
         stretch: [(); 2].map(|()| random.random_range(STRETCH[0]..STRETCH[1])),
         overhang_mm,
         post_radius_mm: random.random_range(POST_RADIUS_MM[0]..POST_RADIUS_MM[1]),
-        post_shift_mm: [(); DOTS].map(|()| beside(random, POST_MM)),
+        post_shift_mm: [(); 4].map(|()| beside(random, POST_MM)),
         thickness_slope: [(); 2].map(|()| random.random_range(-UNEVEN..UNEVEN)),
         thickness_curve: [(); 3].map(|()| random.random_range(-UNEVEN..UNEVEN)),
         dot_stiffening: random.random_range(0.0..1.0),
@@ -350,10 +349,10 @@ fn rest(seen_px: &Markers) -> Rest {
     let px = |part: f32| Px((part * 65_536.0) as i32);
     Rest {
         features: Features {
-            centroids: seen_px.map(|[x, y]| (px(x), px(y))),
+            centroids: std::array::from_fn(|k| (px(seen_px[k][0]), px(seen_px[k][1]))),
             ..Features::default()
         },
-        areas: [1; DOTS],
+        areas: [1; 4],
     }
 }
 

@@ -4,12 +4,12 @@ use anyhow::Result;
 use hivtac_sensor::force::forward::weight::{
     AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms,
 };
-use hivtac_sensor::force::forward::{EQUATIONS, Gravity, Stiffness};
+use hivtac_sensor::force::forward::{Gravity, Stiffness};
 use hivtac_sensor::force::model::WeightSpec;
 use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
 use rayon::prelude::*;
 
-use super::covariances::Moved;
+use super::covariances::{EQUATIONS, Moved};
 use super::least_squares::LeastSquares;
 
 /// Number of directions of gravity around the film, in the planes of x and z and of y and z, at
@@ -91,7 +91,7 @@ pub fn weight(film: &impl Weighed, stiffness: Stiffness, down: [f64; 3]) -> Resu
         press_n: functions.press_n,
         unsure: UNSURE,
         under_load: under_load(film, &functions, &at_rest)?,
-        at_rest,
+        at_rest: at_rest.map(|column| column.to_vec()),
     })
 }
 
@@ -118,7 +118,7 @@ fn under_load(
     film: &impl Weighed,
     functions: &Functions,
     at_rest: &[Moved; AT_REST],
-) -> Result<[[[[f64; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES]> {
+) -> Result<[[Vec<[f64; TERMS]>; UNDER_LOAD]; SIZES]> {
     let sizes: [f64; SIZES] = std::array::from_fn(|number| {
         let root = (number + 1) as f64 / SIZES as f64;
         LARGEST_SIZE * root * root
@@ -137,14 +137,14 @@ fn under_load(
         terms(place, tilt).map(f64::from)
     });
     let rows: Vec<[f64; TERMS]> = rows.collect();
-    let mut under_load = [[[[0.0; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES];
+    let mut under_load: [[Vec<[f64; TERMS]>; UNDER_LOAD]; SIZES] = Default::default();
     for (number, (of_size, size)) in under_load.iter_mut().zip(sizes).enumerate() {
         let softness = f64::from(soft(&functions.stiffness, size as f32));
         for (f, of_function) in of_size.iter_mut().enumerate() {
             let found = fitted_parts(&rows, |i, c| sides[i][number][f][c] / softness)?;
-            for (c, of_coordinate) in of_function.iter_mut().enumerate() {
-                *of_coordinate = found.map(|of_term| of_term[c]);
-            }
+            *of_function = (0..EQUATIONS)
+                .map(|c| found.map(|of_term| of_term[c]))
+                .collect();
         }
     }
     Ok(under_load)

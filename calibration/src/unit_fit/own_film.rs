@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_sensor::force::forward::{DOTS, EQUATIONS, MOST_TILTS, Noise, Stiffness};
+use hivtac_sensor::force::forward::{MOST_TILTS, Noise, Stiffness};
 use hivtac_sensor::force::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use hivtac_shell::Equilibrium;
 use hivtac_twin::Camera;
@@ -19,7 +19,8 @@ use super::numbers::{Family, Number};
 use super::problem::{At, Problem, Rates, mesh_part, near_tip};
 use super::weight::OwnWeight;
 use crate::forward::{
-    Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
+    Covariance, Dot, EQUATIONS, KNOTS, Moved, covariances, knots, limits, rest_image,
+    sum_of_squares, tables,
 };
 
 /// Nodes along each axis of a dot's table.
@@ -115,11 +116,7 @@ impl OwnFilm {
             covariance: OwnCovariance {
                 counts: covariance.counts,
                 end_mm: covariance.end_mm,
-                factors: covariance
-                    .factors
-                    .iter()
-                    .map(|f| f.as_flattened().to_vec())
-                    .collect(),
+                factors: covariance.factors.iter().map(|f| f.concat()).collect(),
             },
             weight: (problem.bench.down)
                 .and_then(|_| OwnWeight::new(problem, found, field.stiffness_n()).ok())
@@ -143,9 +140,10 @@ impl OwnFilm {
             "film.own: {numbers:?} are no stiffness and no camera's scale"
         );
         ensure!(
-            self.dots.len() == DOTS && self.rest_px.len() == DOTS,
-            "film.own: {} markers: this program knows {DOTS}",
-            self.dots.len()
+            2 * self.dots.len() == EQUATIONS && 2 * self.rest_px.len() == EQUATIONS,
+            "film.own: {} markers: this program knows {}",
+            self.dots.len(),
+            EQUATIONS / 2
         );
         if let Some(weight) = &self.weight {
             weight.check()?;
@@ -168,7 +166,7 @@ impl OwnFilm {
             steps,
             limits: limits(),
             stiffness: Stiffness { linear_n, cubic_n },
-            rest_image: rest_image(std::array::from_fn(|k| self.dots[k].place_mm), camera),
+            rest_image: rest_image(&self.places_mm(), camera),
             per_px: Some(self.per_px.map(|part| part as f32)),
             noise: Noise { rest_px, ..noise },
             tables: self.tables(),
@@ -176,6 +174,11 @@ impl OwnFilm {
             other: None,
             weight: self.weight.as_deref().map(OwnWeight::spec).transpose()?,
         })
+    }
+
+    /// Where its dots are glued, mm.
+    fn places_mm(&self) -> Vec<[f64; 2]> {
+        self.dots.iter().map(|dot| dot.place_mm).collect()
     }
 
     /// The tables as a model file holds them.
@@ -197,9 +200,9 @@ impl OwnFilm {
     /// # Errors
     /// When a knot has a different number of entries than a covariance.
     fn covariance(&self) -> Result<CovarianceSpec> {
-        let factor = |entries: &Vec<f64>| -> Option<Covariance> {
-            let (rows, rest) = entries.as_chunks::<EQUATIONS>();
-            rest.is_empty().then(|| rows.try_into().ok())?
+        let factor = |entries: &Vec<f64>| -> Option<Vec<Vec<f64>>> {
+            let rows = entries.chunks(EQUATIONS).map(<[f64]>::to_vec);
+            (entries.len() == EQUATIONS * EQUATIONS).then(|| rows.collect())
         };
         let factors = self.covariance.factors.iter().map(factor);
         Ok(CovarianceSpec {

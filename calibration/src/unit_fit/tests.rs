@@ -163,11 +163,12 @@ fn stiffer(fineness: f64) -> Truth {
 
 impl OwnFilm {
     /// Converts motions from focal lengths to px. The found numbers include the unit's camera.
-    fn to_px(&self, moved: &[f64; 8]) -> [f64; 8] {
+    fn to_px(&self, moved: &[f32]) -> [f64; 8] {
         let [re, im] = self.per_px;
         let square = re * re + im * im;
         std::array::from_fn(|k| {
             let [x, y] = [moved[k - k % 2], moved[k - k % 2 + 1]];
+            let [x, y] = [x, y].map(f64::from);
             [re * x + im * y, re * y - im * x][k % 2] / square
         })
     }
@@ -235,8 +236,10 @@ fn predicts(fit: &Fit, chip: &Forward<'_>, truth: &Truth) {
     ] {
         let seen = truth.seen_px(&truth.press(force_n, place_mm), 0);
         let pose = chip_pose(chip, force_n, place_mm);
-        let told = chip.tables.predict(&pose, &chip.limits, &[[0.0; 2]; 4]);
-        let px = fit.own.to_px(&told.moved.map(f64::from));
+        let told = chip
+            .tables
+            .predict(&pose, &chip.limits, &chip::Markers::defaults(4));
+        let px = fit.own.to_px(&told.moved);
         for k in 0..4 {
             for i in [0, 1] {
                 let off = px[2 * k + i] - (seen[k][i] - rest_px[k][i]);
@@ -288,17 +291,11 @@ fn a_mounted_film_is_known_turned() {
             let moved_px = |film: &Truth| film.moved_px(force_n, place_mm);
             let [with, without] = [&film, &truth].map(moved_px);
             let pose = chip_pose(&chip, force_n, place_mm);
-            let mut told = chip::Prediction::default();
-            let mut covariance = chip::Covariance::default();
+            let mut told = chip::Prediction::zeros(8);
+            let mut covariance = chip::Covariance::zeros(8);
             let hanging = chip.hanging(turned, true).unwrap();
-            hanging.add_to(
-                &pose,
-                &chip.stiffness,
-                &chip.limits,
-                &mut told,
-                &mut covariance,
-            );
-            let told_px = fit.own.to_px(&told.moved.map(f64::from));
+            hanging.add_to(&pose, &chip, &mut told, &mut covariance);
+            let told_px = fit.own.to_px(&told.moved);
             let does = |k: usize| with[k] - without[k];
             let most = (0..8)
                 .map(does)
@@ -306,7 +303,7 @@ fn a_mounted_film_is_known_turned() {
             assert!(most > 0.04, "{most}");
             for k in 0..8 {
                 let off = told_px[k] - does(k);
-                let sigma = truth.made.focal_px * f64::from(covariance[k][k]).sqrt();
+                let sigma = truth.made.focal_px * f64::from(covariance.entry(k, k)).sqrt();
                 let about = format!("{down:?} {force_n:?} {k}: {off} of {} px", does(k));
                 assert!(off.abs() < 0.015 + 0.05 * most, "{about}");
                 assert!(off.abs() < 3.0 * sigma, "{about}: {sigma}");

@@ -1,8 +1,8 @@
 //! Computes what gravity does to a unit's film when it is turned, by finite elements.
 
 use anyhow::{Context, Result, ensure};
+use hivtac_sensor::force::forward::Stiffness;
 use hivtac_sensor::force::forward::weight::{AT_REST, SIZES, TERMS, UNDER_LOAD};
-use hivtac_sensor::force::forward::{EQUATIONS, Stiffness};
 use hivtac_sensor::force::model::WeightSpec;
 use hivtac_shell::{Design, Equilibrium, Film};
 use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_TILT, Pose};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::descent::Found;
 use super::field::force_n;
 use super::problem::{At, Problem};
-use crate::forward::{Moved, Pressed, Weighed, weight};
+use crate::forward::{EQUATIONS, Moved, Pressed, Weighed, weight};
 
 /// Places of the tip along each axis, mm, and tilts in its middle, in parts of the largest.
 const PLACES_MM: [f64; 3] = [-3.8, 0.0, 3.8];
@@ -26,7 +26,7 @@ pub struct OwnWeight {
     press_n: f32,
     unsure: [f32; 2],
     /// By function of gravity.
-    at_rest: Vec<Moved>,
+    at_rest: Vec<Vec<f64>>,
     /// Coefficients by size, function of gravity, coordinate and term, flattened.
     under_load: Vec<f32>,
 }
@@ -49,13 +49,13 @@ impl OwnWeight {
         let stiffness = Stiffness { linear_n, cubic_n };
         let down = at.made.design.down;
         let spec = weight(&film, stiffness, down).context("the film, turned any way")?;
-        let under_load = spec.under_load.as_flattened().as_flattened().as_flattened();
+        let under_load = spec.under_load.as_flattened().iter().flatten().flatten();
         Ok(Self {
             down,
             press_n: spec.press_n,
             unsure: spec.unsure,
             at_rest: spec.at_rest.to_vec(),
-            under_load: under_load.iter().map(|part| *part as f32).collect(),
+            under_load: under_load.map(|part| *part as f32).collect(),
         })
     }
 
@@ -72,23 +72,26 @@ impl OwnWeight {
     /// # Errors
     /// When numbers are missing, too many or not finite.
     pub fn spec(&self) -> Result<WeightSpec> {
-        let all = self.at_rest.as_flattened().iter();
+        let all = self.at_rest.iter().flatten();
         ensure!(
             all.chain(&self.down).all(|part| part.is_finite())
                 && self.under_load.iter().all(|part| part.is_finite()),
             "film.own.weight has numbers that are not finite"
         );
-        let at_rest = <[Moved; AT_REST]>::try_from(self.at_rest.as_slice());
+        let at_rest = <[Vec<f64>; AT_REST]>::try_from(self.at_rest.clone());
         let counts = "film.own.weight: numbers are missing, or too many";
         ensure!(
-            self.under_load.len() == SIZES * UNDER_LOAD * EQUATIONS * TERMS,
+            self.under_load.len() == SIZES * UNDER_LOAD * EQUATIONS * TERMS
+                && self.at_rest.iter().all(|column| column.len() == EQUATIONS),
             counts
         );
-        let mut under_load = [[[[0.0; TERMS]; EQUATIONS]; UNDER_LOAD]; SIZES];
-        let all = under_load.as_flattened_mut().as_flattened_mut();
-        for (part, own) in all.as_flattened_mut().iter_mut().zip(&self.under_load) {
-            *part = f64::from(*own);
-        }
+        let (terms, _) = self.under_load.as_chunks::<TERMS>();
+        let mut blocks = terms.chunks(EQUATIONS).map(|coordinates| {
+            let terms = coordinates.iter().map(|terms| terms.map(f64::from));
+            terms.collect::<Vec<_>>()
+        });
+        let under_load =
+            [(); SIZES].map(|()| [(); UNDER_LOAD].map(|()| blocks.next().unwrap_or_default()));
         Ok(WeightSpec {
             down: self.down.map(|part| part as f32),
             press_n: self.press_n,

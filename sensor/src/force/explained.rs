@@ -2,13 +2,14 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
-    Column, Covariance, DOTS, Drift, Estimate, Forward, Hanging, Markers, Mounting, Noise,
+    Column, Covariance, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise,
     Observed, Pose, Sigma, Strength, Turned,
 };
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
 use crate::force::rest::Rest;
 use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
@@ -16,13 +17,13 @@ use hivtac_terms::units::{
 };
 
 /// Where a unit's markers rest, and what follows from that before the first frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Resting {
     mounting: Mounting,
     /// True for the unit that the model was made on.
     is_own: bool,
     px: Markers,
-    areas: [f32; DOTS],
+    areas: List<f32, MOST_DOTS>,
     /// Covariance of the difference between this and where the film rests; `None` if there is none.
     drift: Option<Covariance>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
@@ -94,7 +95,7 @@ impl Resting {
         // The tables already include how this unit's markers are glued.
         let known = Mounting {
             per_px: forward.per_px.unwrap_or(told.per_px),
-            beside_mm: Markers::default(),
+            beside_mm: Markers::defaults(told.beside_mm.len()),
         };
         let own = match near {
             true => Some(known),
@@ -102,22 +103,18 @@ impl Resting {
         };
         let is_own = own.is_some();
         let mounting = own.unwrap_or(told);
-        let centroids = rest.features.centroids;
+        let centroids = &rest.features.centroids;
         let off = match near {
             true => forward.noise.rest_px,
-            false => Markers::default(),
+            false => Markers::defaults(centroids.len()),
         };
-        let at = |k: usize| {
-            [
-                centroids[k].0.to_f32() - off[k][0],
-                centroids[k].1.to_f32() - off[k][1],
-            ]
-        };
+        let pairs = centroids.iter().zip(off.iter());
+        let px = pairs.map(|((x, y), off)| [x.to_f32() - off[0], y.to_f32() - off[1]]);
         Resting {
             mounting,
             is_own,
-            px: core::array::from_fn(at),
-            areas: rest.areas.map(|area| area as f32),
+            px: List::of(px),
+            areas: List::of(rest.areas.iter().map(|area| *area as f32)),
             drift: None,
             hanging: None,
             shape: ContactShape::Needle,
@@ -147,7 +144,7 @@ impl Resting {
     ) -> Option<(MicroNewtons, UnsignedMicroNewtons)> {
         let forward = model.forward.as_ref()?;
         let scale = forward.rest_image.mounting(&model.rest).scale();
-        let [away, _] = forward.rest_image.film_mm[0];
+        let [away, _] = *forward.rest_image.film_mm.first()?;
         let noise = FrameNoise {
             blur: Px((GLUED_MM / away / scale * 65_536.0) as i32),
             ..FrameNoise::AS_MODELLED
@@ -182,17 +179,18 @@ impl Resting {
     fn observed<'a>(
         &'a self,
         forward: &Forward<'a>,
-        markers: &[Marker; 4],
+        markers: &[Marker],
         frame: FrameNoise,
     ) -> Observed<'a> {
-        let (mut moved, mut noise) = (Column::default(), [[0.0; 3]; DOTS]);
+        let (mut moved, mut noise) = (Column::defaults(2 * self.px.len()), List::default());
         let scale = self.mounting.scale();
         let blur = scale * frame.blur.to_f32();
-        for (k, marker) in markers.iter().enumerate() {
-            let [x, y] = self.px[k];
+        let at_rest = self.px.iter().zip(self.areas.iter());
+        let pairs = markers.iter().zip(at_rest).zip(moved.as_chunks_mut().0);
+        for (k, ((marker, ([x, y], area)), moved)) in pairs.enumerate() {
             let [x, y] = [marker.x.to_f32() - x, marker.y.to_f32() - y];
-            [moved[2 * k], moved[2 * k + 1]] = self.mounting.moved([x, y]);
-            let larger = (marker.area as f32 / self.areas[k]).clamp(AREAS[0], AREAS[1]);
+            *moved = self.mounting.moved([x, y]);
+            let larger = (marker.area as f32 / area).clamp(AREAS[0], AREAS[1]);
             let Noise {
                 at_rest_px,
                 at_four_areas,
@@ -207,7 +205,7 @@ impl Resting {
                 let seen = frame.times * scale * at_rest * growth.max(0.1);
                 seen * seen + blur * blur
             });
-            noise[k] = forward.rest_image.noise(k, variances);
+            noise.push(forward.rest_image.noise(k, variances));
         }
         let drift = self.drift.as_ref();
         let hanging = self.hanging.as_ref();
@@ -224,7 +222,7 @@ impl Resting {
     pub fn estimate(
         &self,
         forward: &Forward<'_>,
-        markers: &[Marker; 4],
+        markers: &[Marker],
         noise: FrameNoise,
         output: &Output,
     ) -> Estimate {
@@ -245,7 +243,7 @@ impl Resting {
     pub fn estimate_of_three(
         &self,
         forward: &Forward<'_>,
-        markers: &[Marker; 4],
+        markers: &[Marker],
         lost: usize,
         noise: FrameNoise,
     ) -> (Estimate, (Px, Px)) {
@@ -303,7 +301,7 @@ impl Resting {
         &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
-        markers: &[Marker; 4],
+        markers: &[Marker],
         output: &Output,
     ) -> (Force, Status) {
         let noise = FrameNoise::AS_MODELLED;

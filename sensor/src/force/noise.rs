@@ -1,17 +1,15 @@
 //! Measures how noisy frames are, from what the film leaves unexplained in two successive frames.
 //!
-//! Four markers have eight coordinates, and a load explains five of them. Three are left over,
-//! whatever the load is. An object on the film or a model error leaves nearly the same there in two
-//! successive frames, 6 ms apart; noise leaves independent values. So half the squared difference
-//! of two frames is the variance of noise alone. It shows little light, a high gain or flickering
-//! specks, but no force, not even a fast one.
+//! N markers have 2·N coordinates, and a load explains five of them. The others, three of four
+//! markers, are left over, whatever the load is. An object on the film or a model error leaves
+//! nearly the same there in two successive frames, 6 ms apart; noise leaves independent values. So
+//! half the squared difference of two frames is the variance of noise alone. It shows little light,
+//! a high gain or flickering specks, but no force, not even a fast one.
 
-use crate::force::forward::{Column, UNEXPLAINED, square};
+use crate::force::forward::{Column, residual, square};
 use crate::force::kernels::sqrt;
 use hivtac_terms::units::Px;
 
-/// Number of coordinates that are left over.
-const LEFT_OVER: f32 = 3.0;
 /// Time constant of the mean variance, in frames: 0.1 s at 156 frames a second.
 const FRAMES: f32 = 16.0;
 /// Limit of a single frame's variance, relative to the mean: an object that falls onto the film
@@ -83,12 +81,13 @@ impl NoiseLevel {
     pub fn saw(&mut self, noise: FrameNoise, left: &Column) {
         let left = left.map(|part| part * noise.times);
         // A residual beyond the largest noise is not noise.
-        self.now = (square(&left) <= LARGEST * UNEXPLAINED).then_some(left);
+        self.now = (square(&left) <= LARGEST * residual::unexplained(left.len())).then_some(left);
         let Some((before, left)) = self.before.as_ref().zip(self.now.as_ref()) else {
             return;
         };
-        let apart: Column = core::array::from_fn(|i| left[i] - before[i]);
-        let variance = square(&apart) / (2.0 * LEFT_OVER);
+        let pairs = left.iter().zip(before.iter());
+        let apart = Column::of(pairs.map(|(left, before)| left - before));
+        let variance = square(&apart) / (2.0 * residual::left_over(apart.len()) as f32);
         let seen = variance.min(MOST_AT_ONCE * self.variance);
         let mean = self.variance + (seen - self.variance) / FRAMES;
         self.variance = mean.clamp(1.0 / LARGEST, 2.0 * LARGEST);
@@ -116,7 +115,7 @@ mod tests {
 
     /// Three coordinates with noise of this size; all of them with a constant or slow part.
     fn left(state: &mut u64, times: f32, drift: f32) -> Column {
-        let mut left = [drift; 8];
+        let mut left = Column::filled(8, drift);
         for part in &mut left[..3] {
             *part += times * normal(state);
         }
@@ -190,7 +189,7 @@ mod tests {
         ) {
             let mut level = NoiseLevel::AS_MODELLED;
             for left in frames {
-                let told = pushed(&mut level, &left);
+                let told = pushed(&mut level, &Column::of(left));
                 prop_assert!((1.0..=LARGEST.sqrt()).contains(&told), "{told}");
             }
         }

@@ -52,7 +52,7 @@ impl Rest {
 
     /// Returns the rest position with each marker moved by `px`. The bounding rectangle of a mean
     /// is not the mean of rectangles, so the rectangle's change is added.
-    pub fn displaced(&self, px: &[[f32; 2]; 4]) -> Rest {
+    pub fn displaced(&self, px: &[[f32; 2]]) -> Rest {
         let mut markers = self.markers();
         let before = Features::of_markers(&markers);
         for (marker, [x, y]) in markers.iter_mut().zip(px) {

@@ -14,7 +14,7 @@ const WHOLE: f32 = 12_582_912.0;
 
 /// The nodes of cubic splines, borrowed from a file. A spline is a sum of B-splines, one for each
 /// node, and smooth over the second and the last but one node (not-a-knot).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Axis<'a> {
     /// f32 each, mm.
     nodes: &'a [[u8; 4]],

@@ -3,38 +3,144 @@
 //! coordinates the covariance is the unit matrix.
 
 use super::pose::{Pose, limited};
-use super::solve::{Column, EQUATIONS};
+use super::solve::{Column, MOST_EQUATIONS, square};
 use super::terms::Limits;
 use crate::force::kernels::sqrt;
+use heapless::Vec;
 
 /// Allowed number of knots along the size and along each axis of places.
 pub const KNOTS: core::ops::RangeInclusive<u8> = 2..=16;
 /// Largest step of a factor's entries, focal lengths.
 pub const LARGEST_STEP: f32 = 1e-3;
-/// Entries of a lower triangle.
-const TRIANGLE: usize = EQUATIONS * (EQUATIONS + 1) / 2;
-/// Bytes of a knot: a step and the entries of the factor.
-const KNOT: usize = 4 + 2 * TRIANGLE;
+/// Most entries of a lower triangle.
+const TRIANGLE: usize = triangle(MOST_EQUATIONS);
 /// Standard uncertainty as a fraction of the motion, for a unit of which only a rest picture is
 /// known, if the file has no grid for it. `OF_ITSELF` is that of each coordinate of a marker,
 /// `OF_ALL` that of all coordinates together.
 const OF_ITSELF: f32 = 0.03;
 const OF_ALL: f32 = 0.1;
 
-/// A covariance of x and y of all images, in focal lengths squared. Entries above the diagonal are
-/// unused.
-pub type Covariance = [Column; EQUATIONS];
+/// A covariance of x and y of all images, in focal lengths squared, or a lower factor of one: rows
+/// up to the diagonal.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Covariance {
+    entries: Vec<f32, TRIANGLE>,
+}
+
+/// Number of entries of a lower triangle with this number of rows.
+pub(super) const fn triangle(rows: usize) -> usize {
+    rows * (rows + 1) / 2
+}
+
+/// Bytes of a knot: a step and the entries of the factor.
+const fn knot_length(coordinates: usize) -> usize {
+    4 + 2 * triangle(coordinates)
+}
+
+impl Covariance {
+    /// Storage without coordinates.
+    pub const EMPTY: Covariance = Covariance {
+        entries: Vec::new(),
+    };
+
+    /// No uncertainty of this number of coordinates.
+    pub fn zeros(coordinates: usize) -> Covariance {
+        let mut covariance = Covariance::EMPTY;
+        covariance.reset(coordinates);
+        covariance
+    }
+
+    /// Makes this no uncertainty of this number of coordinates.
+    pub fn reset(&mut self, coordinates: usize) {
+        self.entries.clear();
+        // More coordinates than the largest layout has are left out.
+        let count = triangle(coordinates.min(MOST_EQUATIONS));
+        let _ = self.entries.resize(count, 0.0);
+    }
+
+    /// The rows, each up to the diagonal.
+    pub fn rows(&self) -> impl Iterator<Item = &[f32]> {
+        let mut rest = &*self.entries;
+        (1..).map_while(move |length| {
+            let (row, below) = rest.split_at_checked(length)?;
+            rest = below;
+            Some(row)
+        })
+    }
+
+    /// The rows, each up to the diagonal.
+    pub fn rows_mut(&mut self) -> impl Iterator<Item = &mut [f32]> {
+        let mut rest = &mut *self.entries;
+        (1..).map_while(move |length| {
+            let (row, below) = core::mem::take(&mut rest).split_at_mut_checked(length)?;
+            rest = below;
+            Some(row)
+        })
+    }
+
+    /// Adds to the entry of two coordinates.
+    pub fn add(&mut self, one: usize, other: usize, part: f32) {
+        let place = triangle(one.max(other)) + one.min(other);
+        if let Some(sum) = self.entries.get_mut(place) {
+            *sum += part;
+        }
+    }
+
+    /// The entry of two coordinates.
+    pub fn entry(&self, one: usize, other: usize) -> f32 {
+        let place = triangle(one.max(other)) + one.min(other);
+        self.entries.get(place).copied().unwrap_or_default()
+    }
+
+    /// Makes the covariance of a lower factor out of that factor. From the last entry on, because
+    /// an entry needs only those before it.
+    fn square(&mut self) {
+        let coordinates = self.rows().count();
+        for i in (0..coordinates).rev() {
+            let Some((mut above, rest)) = self.entries.split_at_mut_checked(triangle(i)) else {
+                return;
+            };
+            let Some(row) = rest.get_mut(..=i) else {
+                return;
+            };
+            let own = square(row);
+            for j in (0..i).rev() {
+                let Some((before, other)) = above.split_at_mut_checked(triangle(j)) else {
+                    return;
+                };
+                let products = other.iter().zip(&*row);
+                let sum = products.fold(0.0, |sum, (a, b)| sum + b * a);
+                above = before;
+                if let Some(entry) = row.get_mut(j) {
+                    *entry = sum;
+                }
+            }
+            if let Some(entry) = row.get_mut(i) {
+                *entry = own;
+            }
+        }
+    }
+
+    /// Adds another covariance of as many coordinates.
+    pub fn add_all(&mut self, other: &Covariance) {
+        for (sum, part) in self.entries.iter_mut().zip(&other.entries) {
+            *sum += part;
+        }
+    }
+}
 
 /// Covariances by the load's size and place, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CovarianceGrid<'a> {
+    /// Number of coordinates.
+    coordinates: usize,
     /// Knots along the size, along y and along x.
     counts: [u8; 3],
     /// Places range from −`end_mm` to `end_mm` along each axis.
     end_mm: f32,
     /// Indexed by size, place along y, place along x. Each knot is an f32 step and a lower triangle
     /// of i16, row by row, in units of the step. The factor times its transpose is the covariance.
-    knots: &'a [[u8; KNOT]],
+    knots: &'a [u8],
 }
 
 /// What a model does not know of a unit.
@@ -49,39 +155,54 @@ pub enum Unknown<'a> {
 }
 
 impl<'a> CovarianceGrid<'a> {
-    /// Takes the number of knots ([`KNOTS`]) along the size, y and x, and the largest place
-    /// `end_mm` (0.1 to 100). Returns `None` if a number of knots, `end_mm` or the number of bytes
-    /// ([`CovarianceGrid::length`]) is wrong, or a step is not between 0 and [`LARGEST_STEP`].
-    pub fn new(counts: [u8; 3], end_mm: f32, bytes: &'a [u8]) -> Option<CovarianceGrid<'a>> {
-        let (knots, _) = bytes.as_chunks();
+    /// Takes the number of coordinates, of knots ([`KNOTS`]) along the size, y and x, and the
+    /// largest place `end_mm` (0.1 to 100). Returns `None` if a number of knots, `end_mm` or the
+    /// number of bytes ([`CovarianceGrid::length`]) is wrong, or a step is not between 0 and
+    /// [`LARGEST_STEP`].
+    pub fn new(
+        coordinates: usize,
+        counts: [u8; 3],
+        end_mm: f32,
+        knots: &'a [u8],
+    ) -> Option<CovarianceGrid<'a>> {
         let grid = CovarianceGrid {
+            coordinates,
             counts,
             end_mm,
             knots,
         };
         let sound = counts.iter().all(|count| KNOTS.contains(count))
             && (0.1..=100.0).contains(&end_mm)
-            && bytes.len() == CovarianceGrid::length(counts)
+            && knots.len() == CovarianceGrid::length(coordinates, counts)
             && knots
-                .iter()
+                .chunks(knot_length(coordinates).max(1))
                 .all(|knot| (0.0..=LARGEST_STEP).contains(&step(knot)));
         sound.then_some(grid)
     }
 
     /// Bytes of all knots.
-    pub fn length(counts: [u8; 3]) -> usize {
-        counts.into_iter().map(usize::from).product::<usize>() * KNOT
+    pub fn length(coordinates: usize, counts: [u8; 3]) -> usize {
+        counts.into_iter().map(usize::from).product::<usize>() * knot_length(coordinates)
     }
 
     /// Returns the covariance at a load; beyond the last size or place, the covariance there. Knot
     /// k of n+1 is at (k/n)² of the largest size. Factors, not covariances, are interpolated: any
     /// sum of factors is the factor of a covariance.
     pub fn at(&self, pose: &Pose, limits: &Limits) -> Covariance {
-        let mut factor = Covariance::default();
-        self.around(pose, limits, |knot, part| {
-            add(&mut factor, self.knots.get(knot), part);
-        });
-        squared(&factor)
+        let mut covariance = Covariance::EMPTY;
+        self.put(pose, limits, &mut covariance);
+        covariance
+    }
+
+    /// As [`CovarianceGrid::at`], in place.
+    fn put(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
+        covariance.reset(self.coordinates);
+        let length = knot_length(self.coordinates);
+        for (knot, part) in self.corners(pose, limits) {
+            let knots = self.knots.get(knot.saturating_mul(length)..);
+            add(covariance, knots.unwrap_or_default(), part);
+        }
+        covariance.square();
     }
 
     /// Calls `each` with the number and the weight of every knot around a load.
@@ -119,70 +240,61 @@ impl<'a> CovarianceGrid<'a> {
 
     /// Number of knots.
     pub(super) fn knots(&self) -> usize {
-        self.knots.len()
+        self.knots.len() / knot_length(self.coordinates).max(1)
+    }
+
+    /// Number of coordinates.
+    pub(super) fn coordinates(&self) -> usize {
+        self.coordinates
     }
 }
 
 impl Unknown<'_> {
-    /// Returns the covariance under a load that moves the images by `moved`. Not inlined, so that
-    /// its stack is released on return.
-    #[inline(never)]
-    pub fn covariance(&self, pose: &Pose, limits: &Limits, moved: &Column) -> Covariance {
+    /// Puts the covariance under a load that moves the images by `moved` into `covariance`.
+    pub fn put(&self, pose: &Pose, limits: &Limits, moved: &Column, covariance: &mut Covariance) {
         match self {
-            Unknown::Nothing => Covariance::default(),
-            Unknown::Grid(grid) => grid.at(pose, limits),
-            Unknown::Unit => of_motion(moved),
+            Unknown::Nothing => covariance.reset(moved.len()),
+            Unknown::Grid(grid) => grid.put(pose, limits, covariance),
+            Unknown::Unit => put_of_motion(moved, covariance),
         }
     }
 }
 
 /// The covariance of what may differ between units whose images move by `moved`.
-fn of_motion(moved: &Column) -> Covariance {
-    let mut covariance: Covariance = moved.map(|a| moved.map(|b| OF_ALL * OF_ALL * a * b));
+fn put_of_motion(moved: &Column, covariance: &mut Covariance) {
+    covariance.reset(moved.len());
+    for (row, a) in covariance.rows_mut().zip(moved.iter()) {
+        for (entry, b) in row.iter_mut().zip(moved.iter()) {
+            *entry = OF_ALL * OF_ALL * a * b;
+        }
+    }
     for (dot, [x, y]) in moved.as_chunks::<2>().0.iter().enumerate() {
         let square = OF_ITSELF * OF_ITSELF * (x * x + y * y);
         for k in [2 * dot, 2 * dot + 1] {
-            covariance[k][k] += square;
+            covariance.add(k, k, square);
         }
     }
-    covariance
 }
 
-fn step(knot: &[u8; KNOT]) -> f32 {
-    let [a, b, c, d, ..] = *knot;
-    f32::from_le_bytes([a, b, c, d])
+fn step(knot: &[u8]) -> f32 {
+    let step = knot.first_chunk().copied();
+    f32::from_le_bytes(step.unwrap_or_default())
 }
 
-/// Adds `part` times a knot's factor.
-fn add(factor: &mut Covariance, knot: Option<&[u8; KNOT]>, part: f32) {
-    let Some(knot) = knot else { return };
+/// Adds `part` times the factor of a knot, which these bytes begin with.
+fn add(factor: &mut Covariance, knot: &[u8], part: f32) {
     let part = part * step(knot);
-    let mut entries = knot.as_chunks::<2>().0[2..].iter();
-    for (i, row) in factor.iter_mut().enumerate() {
-        for (entry, bytes) in row[..=i].iter_mut().zip(&mut entries) {
-            *entry += part * f32::from(i16::from_le_bytes(*bytes));
-        }
+    let steps = knot.as_chunks::<2>().0.iter().skip(2);
+    for (entry, bytes) in factor.entries.iter_mut().zip(steps) {
+        *entry += part * f32::from(i16::from_le_bytes(*bytes));
     }
-}
-
-/// The covariance of a lower factor.
-fn squared(factor: &Covariance) -> Covariance {
-    let mut covariance = Covariance::default();
-    for (i, (row, of_row)) in factor.iter().zip(&mut covariance).enumerate() {
-        for (j, (other, sum)) in factor.iter().zip(&mut of_row[..=i]).enumerate() {
-            for (a, b) in row[..=j].iter().zip(other) {
-                *sum += a * b;
-            }
-        }
-    }
-    covariance
 }
 
 /// Adds the covariance of a motion along a column with a standard uncertainty.
-pub(super) fn add_square(covariance: &mut Covariance, along: &Column, sigma: f32) {
-    for (i, row) in covariance.iter_mut().enumerate() {
-        for (sum, part) in row[..=i].iter_mut().zip(along) {
-            *sum += sigma * along[i] * (sigma * part);
+pub(super) fn add_square(covariance: &mut Covariance, along: &[f32], sigma: f32) {
+    for (row, own) in covariance.rows_mut().zip(along) {
+        for (sum, part) in row.iter_mut().zip(along) {
+            *sum += sigma * own * (sigma * part);
         }
     }
 }
@@ -197,36 +309,75 @@ pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
 }
 
 /// Coordinates in which a covariance is the unit matrix.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Whitening {
     /// The covariance's lower factor, with the reciprocals of its diagonal on the diagonal.
     factor: Covariance,
 }
 
 impl Whitening {
+    /// Storage without coordinates.
+    pub(super) const EMPTY: Whitening = Whitening {
+        factor: Covariance::EMPTY,
+    };
+
     /// Returns `None` if the covariance is singular, or an entry is not a finite number.
     pub fn new(covariance: &Covariance) -> Option<Whitening> {
-        let mut factor = Covariance::default();
-        for i in 0..EQUATIONS {
-            for j in 0..=i {
-                let left = less(covariance[i][j], &factor[i][..j], &factor[j]);
-                factor[i][j] = match i == j {
-                    true if (f32::MIN_POSITIVE..f32::MAX).contains(&left) => 1.0 / sqrt(left),
-                    true => return None,
-                    false => left * factor[j][j],
-                };
-            }
-        }
-        Some(Whitening { factor })
+        let mut whitening = Whitening {
+            factor: covariance.clone(),
+        };
+        whitening.factorize()?;
+        Some(whitening)
     }
 
-    /// A column in these coordinates.
-    pub fn of(&self, column: &Column) -> Column {
-        let mut white = *column;
-        for (i, row) in self.factor.iter().enumerate() {
-            white[i] = less(white[i], &row[..i], &white) * row[i];
+    /// Sets the covariance, which `put` leaves in its argument. Returns `None` if it is singular,
+    /// or an entry is not a finite number.
+    pub(super) fn set(&mut self, put: impl FnOnce(&mut Covariance)) -> Option<()> {
+        put(&mut self.factor);
+        self.factorize()
+    }
+
+    /// Cholesky's factor out of the covariance, in place.
+    #[inline(never)]
+    fn factorize(&mut self) -> Option<()> {
+        let factor = &mut self.factor;
+        let mut above = 0;
+        for length in 1.. {
+            let (finished, rest) = factor.entries.split_at_mut_checked(above)?;
+            let Some(row) = rest.get_mut(..length) else {
+                break;
+            };
+            let mut before = &*finished;
+            for j in 1..length {
+                let (other, below) = before.split_at_checked(j)?;
+                before = below;
+                let (own, [entry, ..]) = row.split_at_mut_checked(j - 1)? else {
+                    return None;
+                };
+                let (reciprocal, other) = other.split_last()?;
+                *entry = less(*entry, own, other) * reciprocal;
+            }
+            let (diagonal, own) = row.split_last_mut()?;
+            let left = less(*diagonal, own, own);
+            if !(f32::MIN_POSITIVE..f32::MAX).contains(&left) {
+                return None;
+            }
+            *diagonal = 1.0 / sqrt(left);
+            above += length;
         }
-        white
+        Some(())
+    }
+
+    /// Converts a column to these coordinates. Compiled once, because the near memory is scarce.
+    #[inline(never)]
+    pub fn whiten(&self, column: &mut [f32]) {
+        for row in self.factor.rows() {
+            let head = column.get_mut(..row.len());
+            let head = head.and_then(<[f32]>::split_last_mut);
+            if let Some(((reciprocal, row), (here, before))) = row.split_last().zip(head) {
+                *here = less(*here, row, before) * reciprocal;
+            }
+        }
     }
 }
 
@@ -247,6 +398,8 @@ pub(super) mod tests {
         tilt: 0.67,
     };
     pub const COUNTS: [u8; 3] = [3, 2, 4];
+    const COORDINATES: usize = 8;
+    const KNOT: usize = knot_length(COORDINATES);
 
     pub fn pose(size: f32, place_mm: [f32; 2]) -> Pose {
         Pose {
@@ -261,7 +414,7 @@ pub(super) mod tests {
         let mut bytes = Vec::new();
         for knot in 0..COUNTS.map(usize::from).iter().product() {
             bytes.extend(1e-5f32.to_le_bytes());
-            bytes.extend((0..TRIANGLE).flat_map(|k| entry(knot, k).to_le_bytes()));
+            bytes.extend((0..triangle(COORDINATES)).flat_map(|k| entry(knot, k).to_le_bytes()));
         }
         bytes
     }
@@ -280,7 +433,7 @@ pub(super) mod tests {
             }
         };
         let bytes = knots(entry);
-        let grid = CovarianceGrid::new(COUNTS, 3.0, &bytes).unwrap();
+        let grid = CovarianceGrid::new(COORDINATES, COUNTS, 3.0, &bytes).unwrap();
         for (size, [x, y]) in [
             (0.0, [-3.0, -3.0]),
             (0.2, [1.0, -2.0]),
@@ -292,12 +445,30 @@ pub(super) mod tests {
             let part = |at: f32| (at.clamp(-3.0, 3.0) + 3.0) / 6.0;
             let sizes = 2.0 * (size.min(0.8) / 0.8).sqrt();
             let expected = 1e-10 * sigma(sizes, part(y), 3.0 * part(x)).powi(2);
-            let off = (found[0][0] - expected).abs();
+            let off = (found.entry(0, 0) - expected).abs();
             assert!(
                 off < 2e-3 * expected,
                 "{size} {x} {y}: {found:?} {expected}"
             );
-            assert_eq!(found[7][7], 0.0);
+            assert_eq!(found.entry(7, 7), 0.0);
+        }
+    }
+
+    /// At a knot, the covariance is the knot's factor times its transpose.
+    #[test]
+    fn a_factor_is_squared() {
+        let entry = |_, k: usize| ((k * k) % 29) as i16 - 14;
+        let bytes = knots(entry);
+        let grid = CovarianceGrid::new(COORDINATES, COUNTS, 3.0, &bytes).unwrap();
+        let found = grid.at(&pose(0.8, [3.0, 3.0]), &LIMITS);
+        let factor = |i: usize, k: usize| match k <= i {
+            true => 1e-5 * f32::from(entry(0, triangle(i) + k)),
+            false => 0.0,
+        };
+        for (i, j) in (0..8).flat_map(|i| (0..8).map(move |j| (i, j))) {
+            let expected: f32 = (0..8).map(|k| factor(i, k) * factor(j, k)).sum();
+            let off = (found.entry(i, j) - expected).abs();
+            assert!(off < 1e-12, "{i} {j}: {} {expected}", found.entry(i, j));
         }
     }
 
@@ -305,26 +476,29 @@ pub(super) mod tests {
     fn white_coordinates_have_the_unit_matrix() {
         let wave = |i: usize, j: usize| ((5 * i + 3 * j) as f32).sin();
         let product = |i: usize, j: usize| (0..8).map(|k| wave(i, k) * wave(j, k)).sum::<f32>();
-        let mut covariance: Covariance =
-            core::array::from_fn(|i| core::array::from_fn(|j| product(i, j)));
-        for (i, row) in covariance.iter_mut().enumerate() {
+        let mut covariance = Covariance::zeros(8);
+        for (i, row) in covariance.rows_mut().enumerate() {
+            for (j, entry) in row.iter_mut().enumerate() {
+                *entry = product(i, j);
+            }
             row[i] += 0.5;
         }
         let whitening = Whitening::new(&covariance).unwrap();
         // Columns of the whitening matrix.
         let inverse: [Column; 8] = core::array::from_fn(|k| {
-            let mut unit = Column::default();
+            let mut unit = Column::defaults(8);
             unit[k] = 1.0;
-            whitening.of(&unit)
+            whitening.whiten(&mut unit);
+            unit
         });
         for a in 0..8 {
             for b in 0..8 {
-                let row = |k: usize| -> Column { core::array::from_fn(|i| inverse[i][k]) };
+                let row = |k: usize| -> Column { Column::from_fn(8, |i| inverse[i][k]) };
                 let (row_a, row_b) = (row(a), row(b));
                 let mut sum = 0.0;
                 for i in 0..8 {
                     for j in 0..8 {
-                        sum += row_a[i] * covariance[i][j] * row_b[j];
+                        sum += row_a[i] * covariance.entry(i, j) * row_b[j];
                     }
                 }
                 let expected = f32::from(u8::from(a == b));
@@ -335,14 +509,14 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_no_covariance_whitens_nothing() {
-        assert!(Whitening::new(&Covariance::default()).is_none());
+        assert!(Whitening::new(&Covariance::zeros(8)).is_none());
         for wrong in [f32::NAN, f32::INFINITY, -1.0] {
-            let mut covariance = Covariance::default();
-            for (k, row) in covariance.iter_mut().enumerate() {
-                row[k] = 1.0;
+            let mut covariance = Covariance::zeros(8);
+            for row in covariance.rows_mut() {
+                *row.last_mut().unwrap() = 1.0;
             }
             assert!(Whitening::new(&covariance).is_some());
-            covariance[5][5] = wrong;
+            covariance.add(5, 5, wrong - 1.0);
             assert!(Whitening::new(&covariance).is_none(), "{wrong}");
         }
     }
@@ -357,14 +531,14 @@ pub(super) mod tests {
             noise in 1e-5f32..1e-2,
         ) {
             let entry = |knot: usize, k: usize| {
-                let mixed = (knot * TRIANGLE + k) as u64 ^ seed;
+                let mixed = (knot * triangle(COORDINATES) + k) as u64 ^ seed;
                 (mixed.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 48) as i16
             };
             let bytes = knots(entry);
-            let grid = CovarianceGrid::new(COUNTS, 4.0, &bytes).unwrap();
+            let grid = CovarianceGrid::new(COORDINATES, COUNTS, 4.0, &bytes).unwrap();
             let mut covariance = grid.at(&pose(size, [x, 0.5]), &LIMITS);
-            for (k, row) in covariance.iter_mut().enumerate() {
-                row[k] += noise * noise;
+            for k in 0..COORDINATES {
+                covariance.add(k, k, noise * noise);
             }
             let no_number = size.is_nan() || x.is_nan();
             prop_assert!(no_number || Whitening::new(&covariance).is_some(), "{covariance:?}");
@@ -374,8 +548,9 @@ pub(super) mod tests {
     #[test]
     fn nonsense_is_refused() {
         let bytes = knots(|_, _| 3);
-        let is_sound =
-            |counts, end_mm, bytes: &[u8]| CovarianceGrid::new(counts, end_mm, bytes).is_some();
+        let is_sound = |counts, end_mm, bytes: &[u8]| {
+            CovarianceGrid::new(COORDINATES, counts, end_mm, bytes).is_some()
+        };
         assert!(is_sound(COUNTS, 4.0, &bytes[..]));
         assert!(!is_sound(COUNTS, 4.0, &bytes[1..]) && !is_sound(COUNTS, 4.0, &bytes[KNOT..]));
         assert!(!is_sound([1, 6, 4], 4.0, &bytes[..]) && !is_sound([0, 2, 4], 4.0, &[]));

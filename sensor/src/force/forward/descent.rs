@@ -1,12 +1,13 @@
 //! Steps downhill to the load that explains the markers best, each by the linearized film.
 
 use super::Forward;
-use super::covariance::{Covariance, Unknown, Whitening};
+use super::covariance::{Unknown, Whitening};
 use super::estimate::{Estimate, Observed};
 use super::mounting::Mounting;
 use super::pose::{Pose, limited};
 use super::predict::Prediction;
-use super::solve::{Column, EQUATIONS, Solved, UNKNOWNS, Unknowns, solve, square};
+use super::residual;
+use super::solve::{Column, PRIOR, Rows, Solved, UNKNOWNS, Unknowns, solve, square};
 use crate::force::kernels::sqrt;
 
 /// The steps have converged if the next one would explain at most this part of the residual,
@@ -16,17 +17,12 @@ const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// If a step that would explain at most this does not lower the residual, the rest is rounding of
 /// the tables.
 const ROUNDING: f32 = 0.5;
-/// If more than this is left where the steps end, they may be stuck where the tables bend. χ² of
-/// three degrees of freedom exceeds it in 1 of 100 honest frames.
-const STUCK: f32 = 11.3;
 /// Index of the tilt among the unknowns; the place follows it.
 const TILT: usize = 1;
 /// Prior: standard deviations of the tilt along x and y, rad, and the place along x and y, mm,
 /// around 0. A load too weak for its direction and place stays near the prior; otherwise the steps
 /// would not end.
-const LIKELY: [f32; 4] = [0.3, 0.3, 2.5, 2.5];
-/// The markers' equations, and those of the prior.
-const ROWS: usize = EQUATIONS + LIKELY.len();
+const LIKELY: [f32; PRIOR] = [0.3, 0.3, 2.5, 2.5];
 /// Factor by which the next step is shortened if one did not lower the residual.
 const SHORTER: f32 = 0.5;
 
@@ -34,7 +30,9 @@ const SHORTER: f32 = 0.5;
 pub struct Descent<'a> {
     forward: &'a Forward<'a>,
     markers: Markers<'a>,
-    here: Linearization,
+    here: &'a mut Linearization,
+    /// Storage for the load of the next step.
+    there: &'a mut Linearization,
     /// The fraction of the next step that is tried.
     part: f32,
     /// How the path bends: added to the unknowns, times the square of that fraction.
@@ -52,21 +50,24 @@ struct Markers<'a> {
     unknown: Unknown<'a>,
 }
 
-/// A load, and the linear equations of the markers there.
-struct Linearization {
+/// A load, and the linear equations of the markers there. It is large, and therefore changed in
+/// place.
+pub struct Linearization {
     pose: Pose,
-    /// The part of the markers' motion that the load does not explain, and the slopes of the part
-    /// that it does, focal lengths.
+    /// The motion under the load, and its slopes.
+    prediction: Prediction,
+    /// The part of the markers' motion that the load does not explain, focal lengths.
     left: Column,
-    slopes: [Column; UNKNOWNS],
-    /// Weighted by the covariance, at this load, of noise and of what is unknown of the unit;
-    /// `None` if that covariance is singular or not finite.
+    /// By the covariance, at this load, of noise and of what is unknown of the unit.
+    whitening: Whitening,
+    /// In coordinates in which that covariance is the unit matrix; `None` if it is singular or not
+    /// finite.
     white: Option<White>,
 }
 
 /// A linearization in coordinates in which the covariance is the unit matrix.
+#[derive(Clone, Copy)]
 struct White {
-    whitening: Whitening,
     /// The square of the part of the motion that the load does not explain.
     unexplained: f32,
     /// That square, plus the square of the distance from the prior.
@@ -75,24 +76,27 @@ struct White {
 }
 
 impl<'a> Descent<'a> {
-    /// Begins at a guess; outside the tables, at the nearest load inside.
+    /// Begins at a guess; outside the tables, at the nearest load inside. It works in the storage
+    /// of two points.
     pub fn new(
         forward: &'a Forward<'a>,
         observed: &'a Observed<'a>,
         mounting: &'a Mounting,
         unknown: Unknown<'a>,
         guess: Pose,
+        [here, there]: &'a mut [Linearization; 2],
     ) -> Self {
         let markers = Markers {
             observed,
             mounting,
             unknown,
         };
-        let here = Linearization::at(forward, &markers, within(forward, guess));
+        here.put(forward, &markers, within(forward, guess));
         Self {
             forward,
             markers,
             here,
+            there,
             part: 1.0,
             bend: Unknowns::default(),
             has_ended: false,
@@ -105,19 +109,20 @@ impl<'a> Descent<'a> {
     /// whole step's residual says (geodesic acceleration: Transtrum and Sethna 2012). Returns false
     /// if the markers do not determine a step.
     pub fn step(&mut self) -> bool {
-        let Some((white, solved)) = self.here.solved() else {
+        let Some((square, solved)) = self.here.solved() else {
             return false;
         };
         let pose = after(self.forward, &self.here.pose, solved, self.part, &self.bend);
-        let there = Linearization::at(self.forward, &self.markers, pose);
+        let explained = solved.explained;
+        self.there.put(self.forward, &self.markers, pose);
         self.looks += 1;
-        let left = square(&white.whitening.of(&there.left));
-        if left + square(&unlikely(&there.pose)) < white.square {
-            (self.here, self.part, self.bend) = (there, 1.0, Unknowns::default());
+        if self.here.square_of(self.there) < square {
+            core::mem::swap(&mut self.here, &mut self.there);
+            (self.part, self.bend) = (1.0, Unknowns::default());
         } else {
-            self.has_ended = solved.explained <= ROUNDING;
+            self.has_ended = explained <= ROUNDING;
             if self.part == 1.0 {
-                self.bend = self.here.bend(&white.whitening, &there);
+                self.bend = self.here.bend(self.there);
             }
             self.part *= SHORTER;
         }
@@ -138,20 +143,19 @@ impl<'a> Descent<'a> {
     /// Returns whether the load explains the markers and the steps came to an end.
     pub fn is_done(&self) -> bool {
         let white = self.here.white.as_ref();
-        let is_explained = white.is_some_and(|white| white.unexplained <= STUCK);
+        let stuck = residual::stuck(self.here.left.len());
+        let is_explained = white.is_some_and(|white| white.unexplained <= stuck);
         is_explained && (self.has_ended || self.has_converged())
     }
 
     /// The load that it has reached.
     pub fn estimate(self) -> Estimate {
-        let left = self.here.by_noise(&self.markers.observed.by_noise());
+        let left = self.here.by_noise(self.markers.observed, self.there);
         let white = self.here.white;
         Estimate {
             pose: self.here.pose,
             // A load without a covariance explains nothing: infinite residual.
-            unexplained: white
-                .as_ref()
-                .map_or(f32::INFINITY, |white| white.unexplained),
+            unexplained: white.map_or(f32::INFINITY, |white| white.unexplained),
             left,
             solved: white.and_then(|white| white.solved),
             looks: self.looks,
@@ -161,25 +165,41 @@ impl<'a> Descent<'a> {
 
 /// The markers' equations and those of the prior, in units of their standard uncertainties.
 struct Equations {
-    columns: [[f32; ROWS]; UNKNOWNS],
-    side: [f32; ROWS],
+    columns: [Rows; UNKNOWNS],
+    side: Rows,
 }
 
 impl Equations {
     fn new(whitening: &Whitening, slopes: &[Column; UNKNOWNS], left: &Column, pose: &Pose) -> Self {
+        let (markers, rows) = (left.len(), left.len() + PRIOR);
         let mut all = Equations {
-            columns: [[0.0; ROWS]; UNKNOWNS],
-            side: [0.0; ROWS],
+            columns: [Rows::defaults(rows); UNKNOWNS],
+            side: Rows::defaults(rows),
         };
         for (column, slope) in all.columns.iter_mut().zip(slopes) {
-            column[..EQUATIONS].copy_from_slice(&whitening.of(slope));
+            put_white(whitening, slope, column);
         }
-        all.side[..EQUATIONS].copy_from_slice(&whitening.of(left));
-        all.side[EQUATIONS..].copy_from_slice(&unlikely(pose));
-        for (k, likely) in LIKELY.into_iter().enumerate() {
-            all.columns[TILT + k][EQUATIONS + k] = 1.0 / likely;
+        put_white(whitening, left, &mut all.side);
+        for (k, (likely, own)) in LIKELY.into_iter().zip(unlikely(pose)).enumerate() {
+            let column = all.columns.get_mut(TILT + k);
+            let one = column.and_then(|column| column.get_mut(markers + k));
+            if let Some((one, side)) = one.zip(all.side.get_mut(markers + k)) {
+                (*one, *side) = (1.0 / likely, own);
+            }
         }
         all
+    }
+
+    fn solve(&mut self) -> Option<Solved> {
+        solve(&mut self.columns, &mut self.side)
+    }
+}
+
+/// Puts a column, in white coordinates, into the first rows.
+fn put_white(whitening: &Whitening, column: &Column, rows: &mut Rows) {
+    if let Some(rows) = rows.get_mut(..column.len()) {
+        rows.copy_from_slice(column);
+        whitening.whiten(rows);
     }
 }
 
@@ -191,82 +211,101 @@ fn unlikely(pose: &Pose) -> [f32; LIKELY.len()] {
 }
 
 impl Linearization {
-    fn at(forward: &Forward<'_>, markers: &Markers<'_>, pose: Pose) -> Linearization {
+    /// Storage without a load.
+    pub fn empty() -> Linearization {
+        Linearization {
+            pose: Pose::default(),
+            prediction: Prediction::zeros(0),
+            left: Column::default(),
+            whitening: Whitening::EMPTY,
+            white: None,
+        }
+    }
+
+    /// Makes this the linearization at a load. Not inlined, so that its stack is released on
+    /// return.
+    #[inline(never)]
+    fn put(&mut self, forward: &Forward<'_>, markers: &Markers<'_>, pose: Pose) {
         let Markers {
             observed,
             mounting,
             unknown,
         } = markers;
         let (tables, limits) = (&forward.tables, &forward.limits);
-        let mut prediction = tables.predict(&pose, limits, &mounting.beside_mm);
-        let mut covariance = unknown.covariance(&pose, limits, &prediction.moved);
-        observed.add_to(&mut covariance);
-        if let Some(hanging) = observed.hanging {
-            let stiffness = &forward.stiffness;
-            hanging.add_to(&pose, stiffness, limits, &mut prediction, &mut covariance);
+        let prediction = &mut self.prediction;
+        tables.put(&pose, limits, &mounting.beside_mm, prediction);
+        let is_sound = self.whitening.set(|covariance| {
+            unknown.put(&pose, limits, &prediction.moved, covariance);
+            observed.add_to(covariance);
+            if let Some(hanging) = observed.hanging {
+                hanging.add_to(&pose, forward, prediction, covariance);
+            }
+            if let Some(pressing) = &observed.pressing {
+                pressing.add_to(&pose, limits, prediction, covariance);
+            }
+        });
+        self.pose = pose;
+        self.left.reset(observed.moved.len(), 0.0);
+        let pairs = observed.moved.iter().zip(prediction.moved.iter());
+        for (left, (seen, told)) in self.left.iter_mut().zip(pairs) {
+            *left = seen - told;
         }
-        if let Some(pressing) = &observed.pressing {
-            pressing.add_to(&pose, limits, &mut prediction, &mut covariance);
-        }
-        let Prediction { moved, slopes } = prediction;
-        let left = core::array::from_fn(|i| observed.moved[i] - moved[i]);
-        let white = White::new(&covariance, &slopes, &left, &pose);
-        Linearization {
-            pose,
-            left,
-            slopes,
-            white,
+        self.white = is_sound.map(|()| self.white());
+    }
+
+    /// Not inlined, so that its stack is released on return.
+    #[inline(never)]
+    fn white(&self) -> White {
+        let slopes = &self.prediction.slopes;
+        let mut equations = Equations::new(&self.whitening, slopes, &self.left, &self.pose);
+        let markers = equations.side.get(..self.left.len());
+        White {
+            unexplained: square(markers.unwrap_or_default()),
+            square: square(&equations.side),
+            solved: equations.solve(),
         }
     }
 
-    fn solved(&self) -> Option<(&White, &Solved)> {
+    /// The solution here, and the square that a step must lower.
+    fn solved(&self) -> Option<(f32, &Solved)> {
         let white = self.white.as_ref()?;
-        Some((white, white.solved.as_ref()?))
+        Some((white.square, white.solved.as_ref()?))
+    }
+
+    /// The square of another load, weighted by the covariance here.
+    fn square_of(&self, other: &Linearization) -> f32 {
+        let mut left = other.left;
+        self.whitening.whiten(&mut left);
+        square(&left) + square(&unlikely(&other.pose))
     }
 
     /// Returns how the path from here bends if its whole first step leads to `there`: the slopes
-    /// here, solved for the residual there. Not inlined, as [`White::new`].
+    /// here, solved for the residual there. Not inlined, as [`Linearization::white`].
     #[inline(never)]
-    fn bend(&self, whitening: &Whitening, there: &Linearization) -> Unknowns {
-        let mut equations = Equations::new(whitening, &self.slopes, &there.left, &there.pose);
-        let solved = solve(equations.columns, &mut equations.side);
+    fn bend(&self, there: &Linearization) -> Unknowns {
+        let slopes = &self.prediction.slopes;
+        let mut equations = Equations::new(&self.whitening, slopes, &there.left, &there.pose);
+        let solved = equations.solve();
         solved.map_or(Unknowns::default(), |solved| solved.unknowns)
     }
 
-    /// The part of the motion that no load near this one explains, in units of its noise alone.
-    fn by_noise(&self, noise: &Covariance) -> Column {
-        let Some(whitening) = Whitening::new(noise) else {
-            return [f32::INFINITY; EQUATIONS];
-        };
-        let mut equations = Equations::new(&whitening, &self.slopes, &self.left, &self.pose);
+    /// The part of the motion that no load near this one explains, in units of its noise alone. It
+    /// works in the storage of another load.
+    fn by_noise(&self, observed: &Observed<'_>, storage: &mut Linearization) -> Column {
+        let markers = self.left.len();
+        let whitening = &mut storage.whitening;
+        if whitening.set(|noise| observed.put_noise(noise)).is_none() {
+            return Column::filled(markers, f32::INFINITY);
+        }
+        let slopes = &self.prediction.slopes;
+        let mut equations = Equations::new(whitening, slopes, &self.left, &self.pose);
         // If the markers do not determine the load, the whole residual.
-        let left = equations.side;
-        let side = match solve(equations.columns, &mut equations.side) {
+        let whole = equations.side;
+        let side = match equations.solve() {
             Some(_) => equations.side,
-            None => left,
+            None => whole,
         };
-        core::array::from_fn(|i| side[i])
-    }
-}
-
-impl White {
-    /// Returns `None` if the covariance is singular or not finite. Not inlined, so that its stack
-    /// is released on return.
-    #[inline(never)]
-    fn new(
-        covariance: &Covariance,
-        slopes: &[Column; UNKNOWNS],
-        left: &Column,
-        pose: &Pose,
-    ) -> Option<White> {
-        let whitening = Whitening::new(covariance)?;
-        let mut equations = Equations::new(&whitening, slopes, left, pose);
-        Some(White {
-            whitening,
-            unexplained: square(&equations.side[..EQUATIONS]),
-            square: square(&equations.side),
-            solved: solve(equations.columns, &mut equations.side),
-        })
+        Column::of(side.iter().copied().take(markers))
     }
 }
 

@@ -1,10 +1,9 @@
 //! Describes how far the film may rest from its rest position. Camera and film drift with
 //! temperature, and move when the sensor is touched.
 
-use super::covariance::Covariance;
+use super::covariance::{Covariance, add_square};
 use super::mounting::{Mounting, about_middle, radius};
-use super::predict::{DOTS, Markers};
-use super::solve::Column;
+use super::predict::Markers;
 
 /// What may have happened to a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,15 +12,15 @@ pub struct Drift {
     /// shift along x and along y each, turn, change of scale.
     pub unseen: [f32; 3],
     /// Distance of the untouched film's markers from the rest position when they were last seen,
-    /// px.
-    pub seen_px: Markers,
+    /// px; `None` if it is 0 or unknown.
+    pub seen_px: Option<Markers>,
 }
 
 impl Drift {
     /// A rest position that was taken just now.
     pub const NONE: Drift = Drift {
         unseen: [0.0; 3],
-        seen_px: [[0.0; 2]; DOTS],
+        seen_px: None,
     };
 
     /// A rest position that no frame of the untouched film has confirmed: 0.08 px at 320×240, and
@@ -40,8 +39,8 @@ impl Drift {
 
     /// The largest distance of a marker's coordinate from the rest position, px.
     pub fn farthest_px(&self) -> f32 {
-        let far = self.seen_px.as_flattened().iter();
-        far.fold(0.0, |farthest, part| part.abs().max(farthest))
+        let seen = self.seen_px.iter().flat_map(|seen| seen.as_flattened());
+        seen.fold(0.0, |farthest, part| part.abs().max(farthest))
     }
 
     /// Returns the covariance of the images of markers that rest at these px. Entries above the
@@ -50,22 +49,18 @@ impl Drift {
         let about = about_middle(rest_px);
         let [shift, turn, scale] = self.unseen;
         let shift_px = shift * radius(&about);
-        let mut covariance = Covariance::default();
+        let mut covariance = Covariance::zeros(2 * rest_px.len());
         let mut add = |px: Markers| {
             let moved = px.map(|px| mounting.moved(px));
-            let mut mode = Column::default();
-            mode.copy_from_slice(moved.as_flattened());
-            for (i, row) in covariance.iter_mut().enumerate() {
-                for (sum, part) in row[..=i].iter_mut().zip(&mode) {
-                    *sum += mode[i] * part;
-                }
-            }
+            add_square(&mut covariance, moved.as_flattened(), 1.0);
         };
-        add([[shift_px, 0.0]; DOTS]);
-        add([[0.0, shift_px]; DOTS]);
+        add(about.map(|_| [shift_px, 0.0]));
+        add(about.map(|_| [0.0, shift_px]));
         add(about.map(|[x, y]| [-turn * y, turn * x]));
         add(about.map(|place| place.map(|part| scale * part)));
-        add(self.seen_px);
+        if let Some(seen_px) = self.seen_px {
+            add(seen_px);
+        }
         covariance
     }
 }
@@ -73,21 +68,23 @@ impl Drift {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::force::forward::EQUATIONS;
 
-    const MOUNTING: Mounting = Mounting {
-        per_px: [0.01, 0.0],
-        beside_mm: [[0.0; 2]; DOTS],
-    };
-    const REST_PX: Markers = [[60.0, 20.0], [160.0, 20.0], [160.0, 120.0], [60.0, 120.0]];
+    const REST_PX: [[f32; 2]; 4] = [[60.0, 20.0], [160.0, 20.0], [160.0, 120.0], [60.0, 120.0]];
 
-    fn variance(covariance: &Covariance, along: &Markers) -> f32 {
+    fn covariance(drift: &Drift) -> Covariance {
+        let mounting = Mounting {
+            per_px: [0.01, 0.0],
+            beside_mm: Markers::defaults(4),
+        };
+        drift.covariance(&mounting, &Markers::of(REST_PX))
+    }
+
+    fn variance(covariance: &Covariance, along: &[[f32; 2]]) -> f32 {
         let along = along.as_flattened();
-        let entry = |i: usize, j: usize| covariance[i.max(j)][i.min(j)];
         let mut sum = 0.0;
-        for i in 0..EQUATIONS {
-            for j in 0..EQUATIONS {
-                sum += along[i] * along[j] * entry(i, j);
+        for i in 0..along.len() {
+            for j in 0..along.len() {
+                sum += along[i] * along[j] * covariance.entry(i, j);
             }
         }
         sum
@@ -100,13 +97,16 @@ mod tests {
             unseen: [1e-3, 2e-3, 3e-3],
             ..Drift::NONE
         };
-        let covariance = drift.covariance(&MOUNTING, &REST_PX);
-        let about = about_middle(&REST_PX);
+        let covariance = covariance(&drift);
+        let about = about_middle(&Markers::of(REST_PX));
         let modes = [
-            ([[0.5, 0.0]; DOTS], 1e-3 * 50.0 * 2f32.sqrt() * 2.0),
+            (
+                Markers::filled(4, [0.5, 0.0]),
+                1e-3 * 50.0 * 2f32.sqrt() * 2.0,
+            ),
             (about.map(|[x, y]| [-y / 141.42, x / 141.42]), 2e-3 * 141.42),
             (about.map(|[x, y]| [x / 141.42, y / 141.42]), 3e-3 * 141.42),
-            ([[0.5, 0.0], [-0.5, 0.0], [0.5, 0.0], [-0.5, 0.0]], 0.0),
+            (Markers::from_fn(4, |k| [0.5 - (k % 2) as f32, 0.0]), 0.0),
         ];
         for (mode, sigma_px) in modes {
             let found = variance(&covariance, &mode).sqrt();
@@ -118,16 +118,13 @@ mod tests {
     fn what_was_seen_is_as_uncertain_as_it_is_far() {
         let seen_px = [[0.1, 0.0], [0.1, -0.3], [0.1, 0.0], [0.1, 0.0]];
         let drift = Drift {
-            seen_px,
+            seen_px: Some(Markers::of(seen_px)),
             ..Drift::NONE
         };
         assert_eq!(drift.farthest_px(), 0.3);
-        let covariance = drift.covariance(&MOUNTING, &REST_PX);
-        assert!((covariance[3][3] - 9e-6).abs() < 1e-9);
-        assert!((covariance[3][0] + 3e-6).abs() < 1e-9);
-        assert_eq!(
-            Drift::NONE.covariance(&MOUNTING, &REST_PX),
-            Covariance::default()
-        );
+        let found = covariance(&drift);
+        assert!((found.entry(3, 3) - 9e-6).abs() < 1e-9);
+        assert!((found.entry(3, 0) + 3e-6).abs() < 1e-9);
+        assert_eq!(covariance(&Drift::NONE), Covariance::zeros(8));
     }
 }

@@ -1,21 +1,16 @@
 //! Takes Gauss–Newton steps from a first guess to the load that explains the markers best.
 
 use super::covariance::{Covariance, Unknown};
-use super::descent::Descent;
+use super::descent::{Descent, Linearization};
 use super::mounting::Mounting;
 use super::pose::{Pose, sine_over_angle_and_cosine};
-use super::predict::DOTS;
+use super::residual;
 use super::shapes::Pressing;
-use super::solve::{Column, Solved};
+use super::solve::{Column, MOST_DOTS, Solved};
 use super::weight::Hanging;
 use super::{Forward, Strength};
+use hivtac_terms::list::List;
 
-/// Largest residual, relative to its variance, of a load that explains the markers. χ² of three
-/// degrees of freedom exceeds 17.7 in 1 of 2,000 honest frames.
-pub const UNEXPLAINED: f32 = 17.7;
-/// χ² of three degrees of freedom exceeds this in 1 of 6 frames. A larger residual is taken for
-/// noise that is larger than the model says.
-const USUAL: f32 = 5.0;
 /// Most steps of a frame. It exceeds what the model asks for: more steps follow while the load does
 /// not explain the markers. Little-known units begin far from the result.
 pub const STEPS_AT_MOST: u8 = 8;
@@ -23,10 +18,10 @@ pub const STEPS_AT_MOST: u8 = 8;
 /// How the markers' images moved since the rest position, and how well that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observed<'a> {
-    /// x and y of markers 0–3, focal lengths along the film's axes.
+    /// x and y of each marker, focal lengths along the film's axes.
     pub moved: Column,
     /// The noise of each marker: covariances xx, xy, yy, focal lengths squared; xx and yy > 0.
-    pub noise: [[f32; 3]; DOTS],
+    pub noise: List<[f32; 3], MOST_DOTS>,
     /// Covariance of the rest position's distance from where the film rests
     /// ([`Drift`](super::Drift)); `None` if the distance is 0.
     pub drift: Option<&'a Covariance>,
@@ -37,30 +32,26 @@ pub struct Observed<'a> {
 }
 
 impl Observed<'_> {
-    /// The noise of all markers, which is independent between markers.
-    pub(super) fn by_noise(&self) -> Covariance {
-        let mut covariance = Covariance::default();
-        self.add_noise(&mut covariance);
-        covariance
+    /// Puts the noise of all markers, which is independent between markers, into `covariance`.
+    pub(super) fn put_noise(&self, covariance: &mut Covariance) {
+        covariance.reset(self.moved.len());
+        self.add_noise(covariance);
     }
 
     /// Adds noise, and the covariance of the rest position.
     pub(super) fn add_to(&self, covariance: &mut Covariance) {
         self.add_noise(covariance);
-        let drift = self.drift.into_iter().flatten();
-        for (i, (row, of_drift)) in covariance.iter_mut().zip(drift).enumerate() {
-            for (sum, part) in row.iter_mut().take(i + 1).zip(of_drift) {
-                *sum += part;
-            }
+        if let Some(drift) = self.drift {
+            covariance.add_all(drift);
         }
     }
 
     fn add_noise(&self, covariance: &mut Covariance) {
-        for (dot, [xx, xy, yy]) in self.noise.into_iter().enumerate() {
+        for (dot, [xx, xy, yy]) in self.noise.iter().enumerate() {
             let (x, y) = (2 * dot, 2 * dot + 1);
-            covariance[x][x] += xx;
-            covariance[y][x] += xy;
-            covariance[y][y] += yy;
+            covariance.add(x, x, *xx);
+            covariance.add(y, x, *xy);
+            covariance.add(y, y, *yy);
         }
     }
 }
@@ -95,7 +86,13 @@ impl Forward<'_> {
         unknown: Unknown<'_>,
         guess: Pose,
     ) -> Estimate {
-        let descend = |guess| self.descend(Descent::new(self, observed, mounting, unknown, guess));
+        let mut points = [Linearization::empty(), Linearization::empty()];
+        let mut descend = |guess| {
+            let points = &mut points;
+            self.descend(Descent::new(
+                self, observed, mounting, unknown, guess, points,
+            ))
+        };
         let (found, is_done) = descend(guess);
         if is_done {
             return found;
@@ -146,12 +143,13 @@ pub struct Sigma {
 impl Estimate {
     /// Returns whether the load explains the markers; false if the residual is NaN.
     pub fn is_explained(&self) -> bool {
-        (0.0..=UNEXPLAINED).contains(&self.unexplained)
+        (0.0..=residual::unexplained(self.left.len())).contains(&self.unexplained)
     }
 
     /// The factor by which the residual exceeds the markers' stated noise, at least 1.
     fn noisier(&self) -> f32 {
-        libm::sqrtf(1.0 + (self.unexplained - USUAL).max(0.0) / USUAL)
+        let usual = residual::usual(self.left.len());
+        libm::sqrtf(1.0 + (self.unexplained - usual).max(0.0) / usual)
     }
 
     /// Returns the standard uncertainties; `None` if the markers do not determine all unknowns.
@@ -231,7 +229,7 @@ mod tests {
                 place_mm: [1.0, -2.0],
             },
             unexplained,
-            left: Column::default(),
+            left: Column::defaults(8),
             solved: Some(Solved {
                 unknowns: [0.0; 5],
                 left_over: unexplained,
@@ -251,9 +249,9 @@ mod tests {
     #[test]
     fn what_is_left_over_beyond_the_usual_widens_all_three() {
         let stated = parts(1.0);
-        assert_eq!(parts(USUAL), stated);
+        assert_eq!(parts(residual::usual(8)), stated);
         for times in [1.5f32, 1.8] {
-            let wider = parts(USUAL * times * times);
+            let wider = parts(residual::usual(8) * times * times);
             for (wider, stated) in wider.into_iter().zip(stated) {
                 assert!((wider / stated - times).abs() < 1e-5, "{wider} {stated}");
             }

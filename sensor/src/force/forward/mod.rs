@@ -1,10 +1,10 @@
 //! Finds the force and its place that explain the markers' positions: a model of the film run
 //! forwards, and Gauss–Newton steps on it.
 //!
-//! Four markers have eight coordinates, a contact has five unknowns. The network's answer is the
-//! first guess. Each step evaluates the film and its slopes there, and solves the linearized
-//! problem. The residual of the three redundant coordinates exposes a load that the model does not
-//! know; the slopes give the uncertainty of the load.
+//! N markers have 2·N coordinates, a contact has five unknowns. The network's answer is the first
+//! guess. Each step evaluates the film and its slopes there, and solves the linearized problem. The
+//! residual of the redundant coordinates, three of four markers, exposes a load that the model does
+//! not know; the slopes give the uncertainty of the load.
 //!
 //! All of it is single precision, each operation rounded once and in a fixed order. Additions,
 //! multiplications, divisions and roots follow IEEE 754 on every machine, so the results are the
@@ -16,8 +16,9 @@
 //! | `pose` | a load in the variables in which the film is nearly a polynomial |
 //! | `predict` | the positions of all images, with slopes |
 //! | `mounting` | where this unit's markers are glued, and how its camera sees them |
-//! | `solve` | eight equations, five unknowns |
+//! | `solve` | 2·N equations, five unknowns |
 //! | `descent` | steps downhill from a guess |
+//! | `residual` | how large the residual of honest frames is |
 //! | `covariance` | what is unknown of the unit, in addition to the noise |
 //! | `weight` | the effect of the film's own weight |
 //! | `shapes` | the effect of the shape of what presses |
@@ -35,6 +36,7 @@ mod estimate;
 mod mounting;
 mod pose;
 mod predict;
+pub(crate) mod residual;
 mod shapes;
 mod solve;
 mod table;
@@ -46,13 +48,13 @@ pub use axis::{Axis, NODES};
 pub use covariance::{Covariance, CovarianceGrid, KNOTS, LARGEST_STEP, Unknown, Whitening};
 pub use descent::Descent;
 pub use drift::Drift;
-pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, UNEXPLAINED, stated};
+pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, stated};
 pub use mounting::{CameraMotion, Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
-pub use predict::{DOTS, MOST_FUNCTIONS, Markers, Prediction, Tables};
-pub use shapes::{Pressing, SHIFT_KNOT, SHIFTS, Shapes, span};
+pub use predict::{MOST_FUNCTIONS, Markers, Prediction, Tables};
+pub use shapes::{COORDINATES as SHAPES_COORDINATES, Pressing, SHIFT_KNOT, SHIFTS, Shapes, span};
 pub(crate) use solve::square;
-pub use solve::{Column, EQUATIONS, Solved, UNKNOWNS, solve};
+pub use solve::{Column, MOST_DOTS, MOST_EQUATIONS, Solved, UNKNOWNS, solve};
 pub use table::{Answer, OUTPUTS, Place, Table};
 #[cfg(any(test, feature = "encode"))]
 pub use terms::{EVEN, ODD};

@@ -1,9 +1,10 @@
 //! Describes where a unit's markers are glued on its film, and how its camera sees them.
 
-use super::predict::{DOTS, Markers};
+use super::predict::Markers;
 use super::solve::{Column, square};
 use crate::force::kernels::sqrt;
 use crate::force::rest::{NEAR, Rest};
+use hivtac_terms::list::List;
 
 /// How a unit's camera sees its film, and where its markers are glued.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -47,7 +48,8 @@ impl RestImage {
     /// square of their motion; the middle if none moved.
     pub fn where_most(&self, moved: &Column) -> [f32; 2] {
         let (mut sum, mut all) = ([0.0; 2], f32::MIN_POSITIVE);
-        for ((at, film_mm), [x, y]) in self.at.iter().zip(&self.film_mm).zip(moved.as_chunks().0) {
+        let moved = moved.as_chunks().0;
+        for ((at, film_mm), [x, y]) in self.at.iter().zip(self.film_mm.iter()).zip(moved) {
             let counts = x * x + y * y;
             sum = [0, 1].map(|i| sum[i] + counts * film_mm[1] * at[i]);
             all += counts;
@@ -74,19 +76,21 @@ impl RestImage {
         let seen = about_middle(&places_px(rest));
         let own = about_middle(&self.at);
         let per_px = similarity(&seen, &own);
-        let beside = |dot: usize| {
-            let [x, y] = turned(per_px, seen[dot]);
-            self.on_film(dot, [x - own[dot][0], y - own[dot][1]])
-        };
+        let pairs = seen.iter().zip(own.iter()).enumerate();
+        let beside = pairs.map(|(dot, (seen, own))| {
+            let [x, y] = turned(per_px, *seen);
+            self.on_film(dot, [x - own[0], y - own[1]])
+        });
         Mounting {
             per_px,
-            beside_mm: core::array::from_fn(beside),
+            beside_mm: List::of(beside),
         }
     }
 
     /// Converts a shift of a marker's image, focal lengths, to millimetres on the film.
     fn on_film(&self, dot: usize, [x, y]: [f32; 2]) -> [f32; 2] {
-        let ([ux, uy], [away, across]) = (self.away(dot), self.film_mm[dot]);
+        let film_mm = self.film_mm.get(dot).copied();
+        let ([ux, uy], [away, across]) = (self.away(dot), film_mm.unwrap_or_default());
         let away = away * (x * ux + y * uy);
         let across = across * (y * ux - x * uy);
         [away * ux - across * uy, away * uy + across * ux]
@@ -94,14 +98,14 @@ impl RestImage {
 }
 
 fn places_px(rest: &Rest) -> Markers {
-    let centroids = rest.features.centroids;
-    centroids.map(|(x, y)| [x.to_f32(), y.to_f32()])
+    let centroids = rest.features.centroids.iter();
+    Markers::of(centroids.map(|(x, y)| [x.to_f32(), y.to_f32()]))
 }
 
 fn middle(places: &Markers) -> [f32; 2] {
     let mut middle = [0.0; 2];
-    for place in places {
-        middle = [0, 1].map(|i| middle[i] + place[i] / DOTS as f32);
+    for place in places.iter() {
+        middle = [0, 1].map(|i| middle[i] + place[i] / places.len() as f32);
     }
     middle
 }
@@ -114,13 +118,13 @@ pub(super) fn about_middle(places: &Markers) -> Markers {
 
 /// Root mean square distance of places from their mean; `about` is relative to it.
 pub(super) fn radius(about: &Markers) -> f32 {
-    sqrt(square(about.as_flattened()) / DOTS as f32)
+    sqrt(square(about.as_flattened()) / about.len().max(1) as f32)
 }
 
 /// The complex number that maps `seen` to `own` with the smallest squared error.
 fn similarity(seen: &Markers, own: &Markers) -> [f32; 2] {
     let (mut along, mut across, mut square) = (0.0, 0.0, 0.0);
-    for ([x, y], [cx, cy]) in seen.iter().zip(own) {
+    for ([x, y], [cx, cy]) in seen.iter().zip(own.iter()) {
         along += x * cx + y * cy;
         across += x * cy - y * cx;
         square += x * x + y * y;
@@ -153,14 +157,15 @@ impl CameraMotion {
         let [at, at_before] = places.each_ref().map(middle);
         let [seen, own] = places.each_ref().map(about_middle);
         let back = similarity(&seen, &own);
-        let beside = |k: usize| {
-            let [x, y] = turned(back, seen[k]);
-            (x - own[k][0]).abs().max((y - own[k][1]).abs())
+        let beside = |(seen, own): (&[f32; 2], &[f32; 2])| {
+            let [x, y] = turned(back, *seen);
+            (x - own[0]).abs().max((y - own[1]).abs())
         };
+        let pairs = seen.iter().zip(own.iter());
         CameraMotion {
             shift_px: [at[0] - at_before[0], at[1] - at_before[1]],
             back,
-            beside_px: (0..DOTS).map(beside).fold(0.0, f32::max),
+            beside_px: pairs.map(beside).fold(0.0, f32::max),
             radius_px: radius(&own),
         }
     }
@@ -226,22 +231,22 @@ mod tests {
     use crate::force::features::Features;
     use hivtac_terms::units::Px;
 
-    const CORNERS: Markers = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    const CORNERS: [[f32; 2]; 4] = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     const CORNER: f32 = 0.342;
-    const REST: RestImage = RestImage {
-        at: [
-            [-CORNER, -CORNER],
-            [CORNER, -CORNER],
-            [CORNER, CORNER],
-            [-CORNER, CORNER],
-        ],
-        film_mm: [[12.76, 10.85]; DOTS],
-    };
+    const STILL: [[f32; 2]; 4] = [[0.0; 2]; 4];
+
+    fn rest_image() -> RestImage {
+        RestImage {
+            at: Markers::of(CORNERS.map(|place| place.map(|part| CORNER * part))),
+            film_mm: Markers::filled(4, [12.76, 10.85]),
+        }
+    }
 
     /// Markers at the places of a nominal camera, each moved by `moved` focal lengths.
-    fn rest(moved: Markers, per_focal: [f32; 2], middle: [f32; 2]) -> Rest {
+    fn rest(moved: [[f32; 2]; 4], per_focal: [f32; 2], middle: [f32; 2]) -> Rest {
+        let at = rest_image().at;
         let seen = |k: usize| {
-            let [x, y] = [0, 1].map(|i| REST.at[k][i] + moved[k][i]);
+            let [x, y] = [0, 1].map(|i| at[k][i] + moved[k][i]);
             let [x, y] = turned(per_focal, [x, y]);
             let px = |part: f32| Px((65_536.0 * part) as i32);
             (px(x + middle[0]), px(y + middle[1]))
@@ -262,7 +267,7 @@ mod tests {
             178.5 * 3f32.to_radians().cos(),
             178.5 * 3f32.to_radians().sin(),
         ];
-        let mounting = REST.mounting(&rest([[0.0; 2]; 4], per_focal, [164.5, 115.0]));
+        let mounting = rest_image().mounting(&rest(STILL, per_focal, [164.5, 115.0]));
         assert!(
             mounting
                 .beside_mm
@@ -280,8 +285,8 @@ mod tests {
     #[test]
     fn gluing_that_no_camera_makes_is_found() {
         let taper = [[0.01, 0.0], [-0.01, 0.0], [0.01, 0.0], [-0.01, 0.0]];
-        let mounting = REST.mounting(&rest(taper, [175.0, 0.0], [159.5, 119.5]));
-        for (k, [x, y]) in mounting.beside_mm.into_iter().enumerate() {
+        let mounting = rest_image().mounting(&rest(taper, [175.0, 0.0], [159.5, 119.5]));
+        for (k, [x, y]) in mounting.beside_mm.iter().enumerate() {
             let [sx, sy] = CORNERS[k];
             // 0.01 along x: half of it away from the axis and half across.
             let (away, across) = (taper[k][0] * sx / 2.0, -taper[k][0] * sy / 2.0);
@@ -296,20 +301,20 @@ mod tests {
 
     #[test]
     fn noise_is_along_and_across_what_leads_away() {
-        let [xx, xy, yy] = REST.noise(1, [4.0, 1.0]);
+        let [xx, xy, yy] = rest_image().noise(1, [4.0, 1.0]);
         assert!((xx - 2.5).abs() < 1e-5 && (xy + 1.5).abs() < 1e-5 && (yy - 2.5).abs() < 1e-5);
-        assert_eq!(REST.noise(4, [4.0, 1.0]), [4.0, 0.0, 1.0]);
+        assert_eq!(rest_image().noise(4, [4.0, 1.0]), [4.0, 0.0, 1.0]);
     }
 
     /// Shifted by (2, −1) px, turned by 1°, 1 % larger; then one marker is 0.2 px off that.
     #[test]
     fn a_camera_that_moved_is_told_by_shift_turn_and_scale() {
         let focal = [178.5, 0.0];
-        let before = rest([[0.0; 2]; 4], focal, [160.0, 120.0]);
+        let before = rest(STILL, focal, [160.0, 120.0]);
         let turn = 1f32.to_radians();
         let moved = focal.map(|_| 178.5 * 1.01);
         let moved = [moved[0] * turn.cos(), moved[1] * turn.sin()];
-        let now = rest([[0.0; 2]; 4], moved, [162.0, 119.0]);
+        let now = rest(STILL, moved, [162.0, 119.0]);
         let motion = CameraMotion::between(&before, &now);
         let [along, across] = motion.back;
         assert!((motion.shift_px[0] - 2.0).abs() < 1e-3 && (motion.shift_px[1] + 1.0).abs() < 1e-3);
@@ -324,7 +329,7 @@ mod tests {
 
     #[test]
     fn markers_in_one_place_say_nothing() {
-        let mounting = REST.mounting(&rest([[0.0; 2]; 4], [0.0; 2], [100.0, 100.0]));
+        let mounting = rest_image().mounting(&rest(STILL, [0.0; 2], [100.0, 100.0]));
         assert_eq!(mounting.per_px, [0.0; 2]);
         assert!(
             mounting

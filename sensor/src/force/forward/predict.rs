@@ -7,18 +7,18 @@
 //! nearly symmetric there, and half of the terms are half of the work.
 
 use super::pose::Pose;
-use super::solve::{Column, EQUATIONS, UNKNOWNS};
+use super::solve::{Column, MOST_DOTS, UNKNOWNS};
 use super::table::{Answer, Table};
-use super::terms::{Limits, Powers, Sizes, Terms, Tilts};
+use super::terms::{Limits, OfSize, Powers, Sizes, Terms, Tilts};
 use crate::force::kernels::Factors;
+use heapless::Vec;
+use hivtac_terms::list::List;
 
-/// Number of markers.
-pub const DOTS: usize = EQUATIONS / 2;
 /// Most functions of size and tilt.
 pub const MOST_FUNCTIONS: usize = 16;
 
 /// Positions along x and y for each marker.
-pub type Markers = [[f32; 2]; DOTS];
+pub type Markers = List<[f32; 2], MOST_DOTS>;
 
 /// The film's tables.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,11 +27,11 @@ pub struct Tables<'a> {
     /// Coefficients by function and term, f32 each: functions of even powers of the tilt's second
     /// part, then those of odd powers.
     functions: [&'a [[u8; 4]]; 2],
-    dots: [Table<'a>; DOTS],
+    dots: List<Table<'a>, MOST_DOTS>,
 }
 
 /// The motion of the images.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// x and y of the markers, focal lengths.
     pub moved: Column,
@@ -46,7 +46,7 @@ impl<'a> Tables<'a> {
     pub fn new(
         terms: Terms,
         functions: [&'a [u8]; 2],
-        dots: [Table<'a>; DOTS],
+        dots: List<Table<'a>, MOST_DOTS>,
     ) -> Option<Tables<'a>> {
         let functions = functions.map(|bytes| bytes.as_chunks());
         let whole = functions.iter().all(|(_, rest)| rest.is_empty());
@@ -73,6 +73,11 @@ impl<'a> Tables<'a> {
         })
     }
 
+    /// Number of markers.
+    pub fn dots(&self) -> usize {
+        self.dots.len()
+    }
+
     /// The first and the last place that all tables cover along both axes, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
         let axes = self.dots.iter().flat_map(Table::axes);
@@ -85,64 +90,76 @@ impl<'a> Tables<'a> {
     /// Predicts the motion of markers that are glued `beside_mm` from their nominal places. That
     /// equals a nominal marker with the tip displaced by the opposite.
     pub fn predict(&self, pose: &Pose, limits: &Limits, beside_mm: &Markers) -> Prediction {
-        let sizes = Sizes::at(pose.size, limits);
-        let mut tilts = [Tilts::NONE; DOTS];
-        for (table, tilts) in self.dots.iter().zip(&mut tilts) {
-            let [a, b] = table.tilt(pose.tilt);
-            tilts.set(&Powers::at(a, limits), &Powers::at(b, limits));
-        }
-        let mut functions = [[Factors::default(); MOST_FUNCTIONS]; DOTS];
-        self.set_functions(&sizes, &tilts, &mut functions);
-        let mut prediction = Prediction::default();
-        let dots = self.dots.iter().zip(&functions).zip(beside_mm);
-        for (dot, ((table, functions), beside_mm)) in dots.enumerate() {
-            let [x, y] = [0, 1].map(|i| pose.place_mm[i] - beside_mm[i]);
-            let at = table.place([x, y]);
-            for axis in [0, 1] {
-                prediction.set(2 * dot + axis, &table.answer(axis, &at, functions));
-            }
-        }
+        let mut prediction = Prediction::zeros(2 * self.dots.len());
+        self.put(pose, limits, beside_mm, &mut prediction);
         prediction
     }
 
-    /// Computes the functions under a load of a size, at the tilt as each marker sees it.
-    fn set_functions(
+    /// As [`Tables::predict`], in place.
+    pub(super) fn put(
         &self,
-        sizes: &Sizes,
-        tilts: &[Tilts; DOTS],
-        functions: &mut [Functions; DOTS],
+        pose: &Pose,
+        limits: &Limits,
+        beside_mm: &Markers,
+        prediction: &mut Prediction,
     ) {
+        prediction.reset(2 * self.dots.len());
+        let mut sizes = Vec::new();
+        self.put_sizes(pose.size, limits, &mut sizes);
+        let mut functions = Vec::<Factors, MOST_FUNCTIONS>::new();
+        for (dot, table) in self.dots.iter().enumerate() {
+            let [a, b] = table.tilt(pose.tilt);
+            let tilts = Tilts::of(&Powers::at(a, limits), &Powers::at(b, limits));
+            functions.clear();
+            for function in &sizes {
+                // There are at most as many functions as fit.
+                let _ = functions.push(function.at(&tilts));
+            }
+            let beside_mm = beside_mm.get(dot).copied().unwrap_or_default();
+            let [x, y] = [0, 1].map(|i| pose.place_mm[i] - beside_mm[i]);
+            let at = table.place([x, y]);
+            for axis in [0, 1] {
+                prediction.set(2 * dot + axis, &table.answer(axis, &at, &functions));
+            }
+        }
+    }
+
+    /// The functions at a size, before the tilt, as each marker sees it, is put in.
+    #[inline]
+    fn put_sizes(&self, size: f32, limits: &Limits, functions: &mut Vec<OfSize, MOST_FUNCTIONS>) {
+        let sizes = Sizes::at(size, limits);
         let [even, odd] = self.functions;
         let [terms_even, terms_odd] = self.terms.counts().map(|count| count.max(1));
-        let mut number = 0;
-        for parts in even.chunks_exact(terms_even) {
-            let mut dots = functions.iter_mut();
-            let each = |factors| set(dots.next(), number, factors);
-            self.terms.even(parts, sizes, tilts, each);
-            number += 1;
-        }
-        for parts in odd.chunks_exact(terms_odd) {
-            let mut dots = functions.iter_mut();
-            let each = |factors| set(dots.next(), number, factors);
-            self.terms.odd(parts, sizes, tilts, each);
-            number += 1;
+        let even = even.chunks_exact(terms_even).map(|parts| (parts, false));
+        let odd = odd.chunks_exact(terms_odd).map(|parts| (parts, true));
+        for (parts, is_odd) in even.chain(odd) {
+            // There are at most as many functions as fit.
+            let _ = functions.push(OfSize::new(is_odd));
+            if let Some(of_size) = functions.last_mut() {
+                self.terms.put(parts, &sizes, of_size);
+            }
         }
     }
 }
-
-#[inline]
-fn set(functions: Option<&mut Functions>, number: usize, factors: Factors) {
-    if let Some(place) = functions.and_then(|functions| functions.get_mut(number)) {
-        *place = factors;
-    }
-}
-
-/// Functions of size and tilt under a load, with their slopes.
-type Functions = [Factors; MOST_FUNCTIONS];
 
 impl Prediction {
+    /// No motion of this number of coordinates.
+    pub fn zeros(coordinates: usize) -> Prediction {
+        let column = Column::defaults(coordinates);
+        Prediction {
+            moved: column,
+            slopes: [column; UNKNOWNS],
+        }
+    }
+
+    fn reset(&mut self, coordinates: usize) {
+        self.moved.reset(coordinates, 0.0);
+        for slope in &mut self.slopes {
+            slope.reset(coordinates, 0.0);
+        }
+    }
+
     fn set(&mut self, equation: usize, answer: &Answer) {
-        debug_assert!(equation < EQUATIONS);
         let columns = self.slopes.iter_mut().zip(answer.slopes);
         for (column, part) in columns.chain([(&mut self.moved, answer.value)]) {
             if let Some(place) = column.get_mut(equation) {

@@ -10,15 +10,16 @@ use super::Column;
 use super::covariance::{Covariance, CovarianceGrid, add_square};
 use super::pose::Pose;
 use super::predict::Prediction;
-use super::solve::EQUATIONS;
 use super::terms::Limits;
 use hivtac_terms::contact_shape::ContactShape;
 
 /// Number of motions that each knot holds: the mean over all shapes, then, of a round contact and
 /// of a flat one, the parts in proportion to the [radius](span) and to its square.
 pub const SHIFTS: usize = 5;
+/// Coordinates of a layout of four markers at a square's corners. The table is theirs.
+pub const COORDINATES: usize = 8;
 /// Bytes of a knot's motions: a step, then entries of i16 by motion and coordinate.
-pub const SHIFT_KNOT: usize = 4 + 2 * SHIFTS * EQUATIONS;
+pub const SHIFT_KNOT: usize = 4 + 2 * SHIFTS * COORDINATES;
 /// Largest step of the motions, focal lengths.
 const LARGEST_STEP: f32 = 1e-3;
 /// Radius, mm, of the tables' tip, and the largest of a shape.
@@ -62,17 +63,21 @@ impl Shapes<'static> {
     pub fn nominal() -> Option<Shapes<'static>> {
         let ([sizes, lines, places, _, end @ ..], knots) = NOMINAL.split_first_chunk::<HEAD>()?;
         let (counts, end_mm) = ([*sizes, *lines, *places], f32::from_le_bytes(*end));
-        let (covariance, shifts) = knots.split_at_checked(CovarianceGrid::length(counts))?;
-        Shapes::new(CovarianceGrid::new(counts, end_mm, covariance)?, shifts)
+        let length = CovarianceGrid::length(COORDINATES, counts);
+        let (covariance, shifts) = knots.split_at_checked(length)?;
+        let covariance = CovarianceGrid::new(COORDINATES, counts, end_mm, covariance)?;
+        Shapes::new(covariance, shifts)
     }
 }
 
 impl<'a> Shapes<'a> {
     /// Takes the covariance over all shapes, and bytes of the motions at its knots. Returns `None`
-    /// if their number is wrong, or a step is not between 0 and 0.001.
+    /// if it is not of [`COORDINATES`], their number is wrong, or a step is not between 0 and
+    /// 0.001.
     pub fn new(covariance: CovarianceGrid<'a>, bytes: &'a [u8]) -> Option<Shapes<'a>> {
         let (shifts, rest) = bytes.as_chunks();
         let sound = rest.is_empty()
+            && covariance.coordinates() == COORDINATES
             && shifts.len() == covariance.knots()
             && shifts
                 .iter()
@@ -138,27 +143,27 @@ impl Pressing<'_> {
         let mirror = Mirror::of(pose.place_mm);
         let pose = self.shapes.folded(pose);
         let shift = mirror.column(&self.shift(&pose, limits));
-        for (sum, part) in prediction.moved.iter_mut().zip(&shift) {
+        for (sum, part) in prediction.moved.iter_mut().zip(shift.iter()) {
             *sum += part;
         }
         add_square(covariance, &shift, self.of_own);
         let of_all = self.shapes.covariance.at(&pose, limits);
         let square = self.of_all * self.of_all;
-        for (i, row) in covariance.iter_mut().enumerate() {
-            for (j, sum) in row.iter_mut().enumerate().take(i + 1) {
+        for (i, row) in covariance.rows_mut().enumerate() {
+            for (j, sum) in row.iter_mut().enumerate() {
                 *sum += square * mirror.entry(&of_all, i, j);
             }
         }
     }
 
     fn shift(&self, pose: &Pose, limits: &Limits) -> Column {
-        let mut sum = Column::default();
+        let mut sum = Column::defaults(COORDINATES);
         self.shapes.covariance.around(pose, limits, |knot, part| {
             let Some(knot) = self.shapes.shifts.get(knot) else {
                 return;
             };
             let part = part * step(knot);
-            let motions = knot.as_chunks::<2>().0[2..].as_chunks::<EQUATIONS>().0;
+            let motions = knot.as_chunks::<2>().0[2..].as_chunks::<COORDINATES>().0;
             for (motion, of_motion) in motions.iter().zip(self.parts) {
                 for (sum, bytes) in sum.iter_mut().zip(motion) {
                     *sum += part * of_motion * f32::from(i16::from_le_bytes(*bytes));
@@ -198,7 +203,7 @@ impl Mirror {
     }
 
     fn column(&self, column: &Column) -> Column {
-        core::array::from_fn(|i| {
+        Column::from_fn(column.len(), |i| {
             let (other, sign) = self.of_coordinate(i);
             sign * column.get(other).copied().unwrap_or_default()
         })
@@ -206,9 +211,7 @@ impl Mirror {
 
     fn entry(&self, covariance: &Covariance, i: usize, j: usize) -> f32 {
         let ((i, sign), (j, other)) = (self.of_coordinate(i), self.of_coordinate(j));
-        let row = covariance.get(i.max(j));
-        let entry = row.and_then(|row| row.get(i.min(j)));
-        sign * other * entry.copied().unwrap_or_default()
+        sign * other * covariance.entry(i, j)
     }
 }
 
@@ -230,7 +233,7 @@ mod tests {
             bytes.extend(1e-5f32.to_le_bytes());
             for motion in 0..SHIFTS {
                 let entry = 100 * (1 + motion as i16);
-                bytes.extend([entry; EQUATIONS].map(i16::to_le_bytes).as_flattened());
+                bytes.extend([entry; COORDINATES].map(i16::to_le_bytes).as_flattened());
             }
         }
         bytes
@@ -239,12 +242,13 @@ mod tests {
     /// The motion and the standard deviation that a shape adds to the first coordinate.
     fn added(shape: ContactShape) -> Option<[f32; 2]> {
         let (covariance, shifts) = (knots(|_, k| i16::from(k == 0) * 1000), shifts());
-        let grid = CovarianceGrid::new(COUNTS, 3.0, &covariance).unwrap();
+        let grid = CovarianceGrid::new(COORDINATES, COUNTS, 3.0, &covariance).unwrap();
         let shapes = Shapes::new(grid, &shifts).unwrap();
-        let (mut prediction, mut covariance) = (Prediction::default(), Covariance::default());
+        let mut prediction = Prediction::zeros(COORDINATES);
+        let mut covariance = Covariance::zeros(COORDINATES);
         let pose = pose(0.3, [1.0, 2.0]);
         (shapes.pressing(shape)?).add_to(&pose, &LIMITS, &mut prediction, &mut covariance);
-        Some([prediction.moved[0], covariance[0][0].sqrt()])
+        Some([prediction.moved[0], covariance.entry(0, 0).sqrt()])
     }
 
     #[test]
@@ -270,24 +274,20 @@ mod tests {
     /// Left, right, above and below: a load at a mirrored place moves mirrored markers.
     #[test]
     fn a_mirrored_place_mirrors_the_motion() {
-        let column: Column = core::array::from_fn(|k| k as f32);
+        let column = Column::from_fn(COORDINATES, |k| k as f32);
         let at = |place_mm| Mirror::of(place_mm).column(&column);
         assert_eq!(at([1.0, 2.0]), column);
         assert_eq!(
-            at([-1.0, 2.0]),
+            at([-1.0, 2.0])[..],
             [-2.0, 3.0, -0.0, 1.0, -6.0, 7.0, -4.0, 5.0]
         );
         assert_eq!(
-            at([1.0, -2.0]),
+            at([1.0, -2.0])[..],
             [6.0, -7.0, 4.0, -5.0, 2.0, -3.0, 0.0, -1.0]
         );
         let both = Mirror::of([-1.0, -2.0]);
-        let mut square = Covariance::default();
-        for (i, row) in square.iter_mut().enumerate() {
-            for (sum, part) in row[..=i].iter_mut().zip(&column) {
-                *sum = column[i] * part;
-            }
-        }
+        let mut square = Covariance::zeros(COORDINATES);
+        add_square(&mut square, &column, 1.0);
         let there = both.column(&column);
         for (i, j) in [(0, 0), (3, 1), (7, 2)] {
             assert_eq!(both.entry(&square, i, j), there[i] * there[j]);
@@ -302,7 +302,7 @@ mod tests {
     #[test]
     fn nonsense_is_refused() {
         let (covariance, sound) = (knots(|_, _| 3), shifts());
-        let grid = CovarianceGrid::new(COUNTS, 3.0, &covariance).unwrap();
+        let grid = CovarianceGrid::new(COORDINATES, COUNTS, 3.0, &covariance).unwrap();
         assert!(Shapes::new(grid, &sound).is_some());
         assert!(Shapes::new(grid, &sound[1..]).is_none());
         assert!(Shapes::new(grid, &sound[SHIFT_KNOT..]).is_none());

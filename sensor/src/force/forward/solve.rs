@@ -5,17 +5,24 @@
 //! equations.
 
 use crate::force::kernels::sqrt;
+use hivtac_terms::list::List;
 
 /// Unknowns: size, tilt along x and y, place along x and y.
 pub const UNKNOWNS: usize = 5;
-/// Equations of the markers: x and y of each.
-pub const EQUATIONS: usize = 8;
+/// Most markers.
+pub const MOST_DOTS: usize = 16;
+/// Most equations of the markers: x and y of each.
+pub const MOST_EQUATIONS: usize = 2 * MOST_DOTS;
+/// Equations of the prior that may follow those of the markers.
+pub const PRIOR: usize = 4;
 /// A column whose remainder after Gram–Schmidt is below this fraction of the whole column cannot be
 /// distinguished from those before it. The tables' slopes are exact to some 10⁻³ of the largest.
 const LEAST_OWN: f32 = 1e-3;
 
-/// A column of the markers' equations.
-pub type Column = [f32; EQUATIONS];
+/// A column of the markers' equations: x and y of each marker.
+pub type Column = List<f32, MOST_EQUATIONS>;
+/// A column of the markers' equations and of the prior.
+pub type Rows = List<f32, { MOST_EQUATIONS + PRIOR }>;
 /// Size, tilt along x and y, place along x and y, or their changes.
 pub type Unknowns = [f32; UNKNOWNS];
 
@@ -71,14 +78,14 @@ impl Solved {
     }
 }
 
-/// Returns the unknowns whose combination of `columns` is nearest to `side`, and leaves the
-/// residual in `side`. Returns `None` if the columns do not determine them, or a number is not
-/// finite.
-pub fn solve<const N: usize>(
-    mut columns: [[f32; N]; UNKNOWNS],
-    side: &mut [f32; N],
+/// Returns the unknowns whose combination of `columns` is nearest to `side`. Leaves the residual in
+/// `side`, and orthogonal unit columns in `columns`. Returns `None` if the columns do not determine
+/// the unknowns, or a number is not finite.
+pub fn solve<const MOST: usize>(
+    columns: &mut [List<f32, MOST>; UNKNOWNS],
+    side: &mut [f32],
 ) -> Option<Solved> {
-    let whole = columns.each_ref().map(norm);
+    let whole = columns.each_ref().map(|column| norm(column));
     let mut upper = [[0.0; UNKNOWNS]; UNKNOWNS];
     let mut along = [0.0; UNKNOWNS];
     for k in 0..UNKNOWNS {
@@ -89,13 +96,16 @@ pub fn solve<const N: usize>(
         }
         upper[k][k] = own;
         let per_own = 1.0 / own;
-        let unit = columns[k].map(|part| part * per_own);
-        for j in k + 1..UNKNOWNS {
-            upper[k][j] = dot(&unit, &columns[j]);
-            take(&mut columns[j], &unit, upper[k][j]);
+        let (unit, others) = columns.get_mut(k..)?.split_first_mut()?;
+        for part in unit.iter_mut() {
+            *part *= per_own;
         }
-        along[k] = dot(&unit, side);
-        take(side, &unit, along[k]);
+        for (other, upper) in others.iter_mut().zip(&mut upper[k][k + 1..]) {
+            *upper = dot(unit, other);
+            take(other, unit, *upper);
+        }
+        along[k] = dot(unit, side);
+        take(side, unit, along[k]);
     }
     let left_over = dot(side, side);
     let inverse = inverse(&upper);
@@ -128,20 +138,26 @@ fn inverse(upper: &[[f32; UNKNOWNS]; UNKNOWNS]) -> [[f32; UNKNOWNS]; UNKNOWNS] {
     inverse
 }
 
-fn norm<const N: usize>(column: &[f32; N]) -> f32 {
+fn norm(column: &[f32]) -> f32 {
     sqrt(dot(column, column))
 }
 
 /// Four independent sums, so that none waits for another.
-fn dot<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
+fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0; 4];
-    for (k, (a, b)) in a.iter().zip(b).enumerate() {
-        sums[k % 4] += a * b;
+    let ((a, more_a), (b, more_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    for (a, b) in a.iter().zip(b) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
+    }
+    for (sum, (a, b)) in sums.iter_mut().zip(more_a.iter().zip(more_b)) {
+        *sum += a * b;
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
-fn take<const N: usize>(from: &mut [f32; N], unit: &[f32; N], part: f32) {
+fn take(from: &mut [f32], unit: &[f32], part: f32) {
     for (from, unit) in from.iter_mut().zip(unit) {
         *from -= part * unit;
     }
@@ -153,11 +169,11 @@ mod tests {
     use proptest::prelude::*;
 
     fn columns(parts: [f32; 40]) -> [Column; UNKNOWNS] {
-        core::array::from_fn(|k| core::array::from_fn(|i| parts[8 * k + i]))
+        core::array::from_fn(|k| Column::from_fn(8, |i| parts[8 * k + i]))
     }
 
     fn applied(columns: &[Column; UNKNOWNS], unknowns: [f32; UNKNOWNS]) -> Column {
-        let mut sum = [0.0; EQUATIONS];
+        let mut sum = Column::defaults(8);
         for (column, unknown) in columns.iter().zip(unknowns) {
             take(&mut sum, column, -unknown);
         }
@@ -176,7 +192,7 @@ mod tests {
                 *column = column.map(|part| part * 2f32.powi(scale));
             }
             let side = applied(&columns, unknowns);
-            let Some(solved) = solve(columns, &mut side.clone()) else {
+            let Some(solved) = solve(&mut columns.clone(), &mut side.clone()) else {
                 return Ok(());
             };
             // How far a rounding of the equations may move an unknown.
@@ -197,8 +213,9 @@ mod tests {
             side in prop::array::uniform8(-1.0f32..1.0),
         ) {
             let columns = columns(parts);
+            let side = Column::of(side);
             let mut over = side;
-            let Some(solved) = solve(columns, &mut over) else {
+            let Some(solved) = solve(&mut columns.clone(), &mut over) else {
                 return Ok(());
             };
             let mut left = side;
@@ -206,7 +223,7 @@ mod tests {
                 take(&mut left, column, unknown);
             }
             let largest = solved.unknowns.iter().fold(1.0f32, |most, part| most.max(part.abs()));
-            for (left, over) in left.iter().zip(over) {
+            for (left, over) in left.iter().zip(over.iter()) {
                 prop_assert!((left - over).abs() < 1e-4 * largest);
             }
             for column in &columns {
@@ -222,7 +239,7 @@ mod tests {
             parts in prop::array::uniform(any::<f32>()),
             side in prop::array::uniform8(any::<f32>()),
         ) {
-            if let Some(solved) = solve(columns(parts), &mut side.clone()) {
+            if let Some(solved) = solve(&mut columns(parts), &mut Column::of(side)) {
                 prop_assert!(solved.unknowns.iter().all(|part| part.is_finite()));
             }
         }
@@ -235,21 +252,21 @@ mod tests {
             *part = ((i * i) as f32 * 1.7).sin();
         }
         let mut all = columns(parts);
-        assert!(solve(all, &mut [1.0; 8]).is_some());
+        assert!(solve(&mut all.clone(), &mut Column::filled(8, 1.0)).is_some());
         all[4] = all[1].map(|part| -3.0 * part);
-        assert!(solve(all, &mut [1.0; 8]).is_none());
-        all[4] = [0.0; 8];
-        assert!(solve(all, &mut [1.0; 8]).is_none());
+        assert!(solve(&mut all.clone(), &mut Column::filled(8, 1.0)).is_none());
+        all[4] = Column::defaults(8);
+        assert!(solve(&mut all.clone(), &mut Column::filled(8, 1.0)).is_none());
     }
 
     #[test]
     fn the_covariance_is_that_of_the_normal_equations() {
         // Orthogonal columns of lengths 1, 2, 3, 4 and 5.
-        let mut all = [[0.0; 8]; 5];
+        let mut all = [Column::defaults(8); 5];
         for (k, column) in all.iter_mut().enumerate() {
             column[k] = (k + 1) as f32;
         }
-        let solved = solve(all, &mut [1.0; 8]).unwrap();
+        let solved = solve(&mut all.clone(), &mut Column::filled(8, 1.0)).unwrap();
         for k in 0..5 {
             let expected = 1.0 / ((k + 1) as f32).powi(2);
             assert!((solved.covariance(k, k) - expected).abs() < 1e-6);

@@ -16,7 +16,7 @@ pub const OUTPUTS: usize = 2;
 
 /// How a marker's image moves along x and y. Each is a sum of functions of size and tilt whose
 /// coefficients are splines over the place. Borrowed from a file.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Table<'a> {
     axes: [Axis<'a>; 2],
     /// The direction of the first part of the functions' tilt.

@@ -56,6 +56,15 @@ pub struct Powers {
     slopes: [f32; MOST_TILTS],
 }
 
+/// A function of size and tilt at one size.
+#[derive(Clone, Copy, Debug)]
+pub struct OfSize {
+    /// The sum of each group over the size, and its slope by the size.
+    sums: [[f32; 2]; EVEN.len()],
+    /// Whether the groups are those of odd k.
+    is_odd: bool,
+}
+
 /// The tilt's factors of the terms: a^j·b^k of the groups of even k and of odd k, and their slopes
 /// by both parts of the tilt, 1/rad.
 #[derive(Clone, Copy, Debug)]
@@ -87,49 +96,12 @@ impl Terms {
         self.sizes.get(degree).copied().map_or(0, usize::from)
     }
 
-    /// Computes a function with the coefficients `parts` of the terms of even k, for one size and
-    /// each of these tilts.
+    /// Makes `of_size` the function at one size with the coefficients `parts`: of the terms of odd
+    /// k if it is odd, else of even k.
     #[inline]
-    pub fn even(
-        &self,
-        parts: &[[u8; 4]],
-        sizes: &Sizes,
-        tilts: &[Tilts],
-        mut each: impl FnMut(Factors),
-    ) {
-        let mut sums = [[0.0; 2]; EVEN.len()];
-        self.sum_up(&EVEN, parts, sizes, &mut sums);
-        for tilts in tilts {
-            each(tilted(&sums, &tilts.even));
-        }
-    }
-
-    /// The same for odd k.
-    #[inline]
-    pub fn odd(
-        &self,
-        parts: &[[u8; 4]],
-        sizes: &Sizes,
-        tilts: &[Tilts],
-        mut each: impl FnMut(Factors),
-    ) {
-        let mut sums = [[0.0; 2]; ODD.len()];
-        self.sum_up(&ODD, parts, sizes, &mut sums);
-        for tilts in tilts {
-            each(tilted(&sums, &tilts.odd));
-        }
-    }
-
-    /// Sums each group over the size, and its slope by the size.
-    #[inline]
-    fn sum_up(
-        &self,
-        groups: &[[usize; 2]],
-        mut parts: &[[u8; 4]],
-        sizes: &Sizes,
-        sums: &mut [[f32; 2]],
-    ) {
-        for ([j, k], group) in groups.iter().zip(sums) {
+    pub fn put(&self, mut parts: &[[u8; 4]], sizes: &Sizes, of_size: &mut OfSize) {
+        let groups: &[[usize; 2]] = if of_size.is_odd { &ODD } else { &EVEN };
+        for ([j, k], group) in groups.iter().zip(&mut of_size.sums) {
             let count = self.sizes_of(j + k);
             let (own, rest) = parts.split_at(count.min(parts.len()));
             parts = rest;
@@ -149,17 +121,28 @@ fn sum(parts: &[[u8; 4]], sizes: &Sizes) -> [f32; 2] {
     sums
 }
 
-/// A function under a tilt, from the sums of its groups.
-#[inline]
-fn tilted<const G: usize>(groups: &[[f32; 2]; G], tilts: &[[f32; 3]; G]) -> Factors {
-    let mut sums = Factors::default();
-    for ([value, slope], [whole, by_a, by_b]) in groups.iter().zip(tilts) {
-        let products = [value * whole, slope * whole, value * by_a, value * by_b];
-        for (sum, product) in sums.iter_mut().zip(products) {
-            *sum += product;
+impl OfSize {
+    /// A function without coefficients, of odd k or of even k.
+    pub fn new(is_odd: bool) -> OfSize {
+        OfSize {
+            sums: [[0.0; 2]; EVEN.len()],
+            is_odd,
         }
     }
-    sums
+
+    /// The function under a tilt.
+    #[inline]
+    pub fn at(&self, tilts: &Tilts) -> Factors {
+        let tilts: &[[f32; 3]] = if self.is_odd { &tilts.odd } else { &tilts.even };
+        let mut sums = Factors::default();
+        for ([value, slope], [whole, by_a, by_b]) in self.sums.iter().zip(tilts) {
+            let products = [value * whole, slope * whole, value * by_a, value * by_b];
+            for (sum, product) in sums.iter_mut().zip(products) {
+                *sum += product;
+            }
+        }
+        sums
+    }
 }
 
 impl Sizes {
@@ -197,20 +180,21 @@ impl Powers {
 }
 
 impl Tilts {
-    /// The value before [`Tilts::set`].
-    pub const NONE: Tilts = Tilts {
-        even: [[0.0; 3]; EVEN.len()],
-        odd: [[0.0; 3]; ODD.len()],
-    };
-
-    /// Sets the products of powers of both parts of a tilt.
-    pub fn set(&mut self, a: &Powers, b: &Powers) {
-        let even = EVEN.iter().zip(&mut self.even);
-        for ([j, k], group) in even.chain(ODD.iter().zip(&mut self.odd)) {
+    /// The products of powers of both parts of a tilt. Compiled once, because the near memory is
+    /// scarce.
+    #[inline(never)]
+    pub fn of(a: &Powers, b: &Powers) -> Tilts {
+        let mut tilts = Tilts {
+            even: [[0.0; 3]; EVEN.len()],
+            odd: [[0.0; 3]; ODD.len()],
+        };
+        let even = EVEN.iter().zip(&mut tilts.even);
+        for ([j, k], group) in even.chain(ODD.iter().zip(&mut tilts.odd)) {
             let (value, slope) = (power(&a.values, *j), power(&a.slopes, *j));
             let (other, other_slope) = (power(&b.values, *k), power(&b.slopes, *k));
             *group = [value * other, slope * other, value * other_slope];
         }
+        tilts
     }
 }
 
@@ -232,11 +216,18 @@ mod tests {
 
     const TERMS: [u8; MOST_TILTS] = [4, 3, 2, 1, 1];
 
-    fn at(tilt: [f32; 2]) -> [Tilts; 1] {
+    fn at(tilt: [f32; 2]) -> Tilts {
         let [a, b] = tilt.map(|part| Powers::at(part, &LIMITS));
-        let mut tilts = [Tilts::NONE];
-        tilts[0].set(&a, &b);
-        tilts
+        Tilts::of(&a, &b)
+    }
+
+    /// An even and an odd function.
+    fn at_size(terms: &Terms, parts: [&[[u8; 4]]; 2], sizes: &Sizes) -> [OfSize; 2] {
+        let mut both = [false, true].map(OfSize::new);
+        for (of_size, parts) in both.iter_mut().zip(parts) {
+            terms.put(parts, sizes, of_size);
+        }
+        both
     }
 
     fn parts(count: usize) -> Vec<[u8; 4]> {
@@ -249,7 +240,7 @@ mod tests {
     fn groups_follow_the_degrees() {
         let terms = Terms::new([4, 3, 1, 0, 0]).unwrap();
         assert_eq!(terms.counts(), [4 + 3 + 2, 3 + 1]);
-        let [tilts] = at([0.335, 0.67]);
+        let tilts = at([0.335, 0.67]);
         assert_eq!(
             tilts.even.map(|[value, ..]| value)[..4],
             [1.0, 0.5, 0.25, 1.0]
@@ -279,10 +270,7 @@ mod tests {
         let [even, odd] = terms.counts().map(parts);
         let functions = |[size, a, b]: [f32; 3]| {
             let (sizes, tilts) = (Sizes::at(size, &LIMITS), at([a, b]));
-            let mut both = Vec::new();
-            terms.even(&even, &sizes, &tilts, |factors| both.push(factors));
-            terms.odd(&odd, &sizes, &tilts, |factors| both.push(factors));
-            both
+            at_size(&terms, [&even, &odd], &sizes).map(|of_size| of_size.at(&tilts))
         };
         let here = [0.4, 0.3, -0.5];
         for axis in 0..3 {
@@ -306,13 +294,9 @@ mod tests {
         let sizes = Sizes::at(0.4, &LIMITS);
         let both = [0.2, -0.2].map(|b| {
             let tilts = at([0.3, b]);
-            let mut both = Vec::new();
-            terms.even(&even, &sizes, &tilts, |factors| both.push(factors));
-            terms.odd(&odd, &sizes, &tilts, |factors| both.push(factors));
-            both
+            at_size(&terms, [&even, &odd], &sizes).map(|of_size| of_size.at(&tilts))
         });
-        let [[even, odd], [other_even, other_odd]] =
-            both.map(|both| [0, 1].map(|which| both[which]));
+        let [[even, odd], [other_even, other_odd]] = both;
         for (k, turned) in [1.0, 1.0, 1.0, -1.0].into_iter().enumerate() {
             assert_eq!(even[k], turned * other_even[k]);
             assert_eq!(odd[k], -turned * other_odd[k]);

@@ -7,7 +7,7 @@
 use super::estimate::{Estimate, Observed};
 use super::mounting::{Mounting, RestImage};
 use super::pose::Pose;
-use super::predict::{DOTS, Markers};
+use super::predict::Markers;
 use super::solve::{Column, square};
 use super::{Forward, Unknown};
 
@@ -82,8 +82,11 @@ impl Forward<'_> {
             leave_out(&mut pressed, lost);
             // Motion is nearly proportional to the size.
             let times = product(moved, &pressed) / square(&pressed).max(f32::MIN_POSITIVE);
-            let left: Column = core::array::from_fn(|k| moved[k] - times * pressed[k]);
-            let left = square(&left);
+            let pairs = moved.iter().zip(pressed.iter());
+            let left = pairs.fold(0.0, |sum, (moved, pressed)| {
+                let left = moved - times * pressed;
+                sum + left * left
+            });
             if left < least {
                 let size = times * size;
                 (nearest, least) = (Pose { size, ..press }, left);
@@ -100,12 +103,11 @@ impl Forward<'_> {
 }
 
 fn leave_out(column: &mut Column, lost: usize) {
-    debug_assert!(lost < DOTS);
     for part in column.iter_mut().skip(2 * lost).take(2) {
         *part = 0.0;
     }
 }
 
 fn product(a: &Column, b: &Column) -> f32 {
-    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+    a.iter().zip(b.iter()).fold(0.0, |sum, (a, b)| sum + a * b)
 }

@@ -10,7 +10,7 @@ use super::covariance::{Covariance, add_square, between};
 use super::mounting::Mounting;
 use super::pose::{Pose, Stiffness, limited};
 use super::predict::Prediction;
-use super::solve::{Column, EQUATIONS};
+use super::solve::Column;
 use super::terms::Limits;
 use super::{Forward, Markers};
 use crate::force::kernels::sqrt;
@@ -30,9 +30,13 @@ pub const SIZES: usize = 10;
 pub const TERMS: usize = 9;
 /// Bytes of the additional part at one size by one function of gravity: a step, and a coefficient
 /// of each coordinate and term.
-const BLOCK: usize = 4 + 2 * EQUATIONS * TERMS;
-/// Bytes of all additional parts.
-pub const BYTES: usize = SIZES * UNDER_LOAD * BLOCK;
+const fn block_length(coordinates: usize) -> usize {
+    4 + 2 * coordinates * TERMS
+}
+/// Bytes of all additional parts of this number of coordinates.
+pub const fn length(coordinates: usize) -> usize {
+    SIZES * UNDER_LOAD * block_length(coordinates)
+}
 /// Allowed steps of the additional part.
 pub const LEGAL: core::ops::RangeInclusive<f32> = 0.0..=1e3;
 /// Places are limited to this, mm.
@@ -65,10 +69,12 @@ pub struct Weight<'a> {
     /// Relative standard uncertainty of the effect: of the unit that the model was made on, and of
     /// any other.
     pub unsure: [f32; 2],
-    /// The effect at rest of each function, focal lengths.
-    pub at_rest: [Column; AT_REST],
+    /// Number of coordinates.
+    pub coordinates: usize,
+    /// The effect at rest by function and coordinate, f32 each, focal lengths.
+    pub at_rest: &'a [u8],
     /// The additional part at each size of each function, divided by the film's [softness](soft).
-    pub under_load: &'a [[u8; BLOCK]],
+    pub under_load: &'a [u8],
 }
 
 /// What the functions of gravity need to know of a film.
@@ -99,8 +105,8 @@ pub enum Turned {
 pub struct Hanging {
     /// True if the prediction includes the effect; otherwise only the covariance does.
     is_told: bool,
-    /// The effect by size, coordinate and term, divided by the softness.
-    sizes: [[[f32; TERMS]; EQUATIONS]; SIZES + 1],
+    /// The functions of gravity at each size, relative to those of the tables' film.
+    functions: [[f32; AT_REST]; SIZES + 1],
     /// The part of the effect that the rest position includes.
     at_rest: Column,
     /// The uncertain effect at rest, and its relative standard uncertainty.
@@ -111,24 +117,23 @@ pub struct Hanging {
 }
 
 impl<'a> Weight<'a> {
-    /// Reads the bytes of a file. Returns `None` if their number is not [`BYTES`], or a step is not
-    /// within [`LEGAL`].
-    pub fn under_load_of(bytes: &'a [u8]) -> Option<&'a [[u8; BLOCK]]> {
-        let (blocks, rest) = bytes.as_chunks();
-        let sound = blocks.len() == SIZES * UNDER_LOAD
-            && rest.is_empty()
-            && blocks.iter().all(|block| LEGAL.contains(&step(block)));
-        sound.then_some(blocks)
+    /// Whether these bytes of a file are the additional parts of this number of coordinates: their
+    /// number is [`length`], and all steps are within [`LEGAL`].
+    pub fn is_under_load(bytes: &[u8], coordinates: usize) -> bool {
+        let mut blocks = bytes.chunks(block_length(coordinates).max(1));
+        bytes.len() == length(coordinates) && blocks.all(|block| LEGAL.contains(&step(block)))
+    }
+
+    /// The effect at rest of each function of gravity, focal lengths.
+    fn columns(&self) -> impl Iterator<Item = Column> {
+        let (parts, _) = self.at_rest.as_chunks();
+        let columns = parts.chunks(self.coordinates.max(1));
+        columns.map(|parts| Column::of(parts.iter().map(|part| f32::from_le_bytes(*part))))
     }
 
     /// How far gravity moves the images at rest, compared with a weightless film, focal lengths.
     pub fn hangs(&self, stiffness: &Stiffness, gravity: Gravity) -> Column {
-        let mut sum = Column::default();
-        let parts = self.functions(stiffness).at(0.0, gravity);
-        for (part, column) in parts.iter().zip(&self.at_rest) {
-            add(&mut sum, *part, column);
-        }
-        sum
+        self.at_rest_of(&self.functions(stiffness).at(0.0, gravity))
     }
 
     /// Returns the effect of weight on a turned sensor, in addition to the tables: for the unit
@@ -141,31 +146,37 @@ impl<'a> Weight<'a> {
         is_own: bool,
     ) -> Hanging {
         let unsure = self.unsure[usize::from(!is_own)];
-        let mut hanging = Hanging {
-            is_told: true,
-            sizes: [[[0.0; TERMS]; EQUATIONS]; SIZES + 1],
-            at_rest: Column::default(),
-            moved: Column::default(),
-            unsure,
-            along: None,
-        };
         let parts = match turned {
             Turned::AnyWay => [(0.5, [0.0, 0.0, 1.0]), (-0.5, [0.0, 0.0, -1.0])],
             Turned::From { now, .. } => [(1.0, now), (-1.0, self.down)],
         };
-        for (number, of_size) in hanging.sizes.iter_mut().enumerate() {
-            let root = number as f32 / SIZES as f32;
-            let size = limits.size * root * root;
+        let mut functions = [[0.0; AT_REST]; SIZES + 1];
+        for (number, sum) in functions.iter_mut().enumerate() {
+            let size = size_of(number, limits);
             for (part, gravity) in parts {
-                self.add_at(number, size, stiffness, gravity, part, of_size);
+                let functions = self.functions(stiffness).at(size, gravity);
+                for (sum, function) in sum.iter_mut().zip(functions) {
+                    *sum += part * function;
+                }
             }
         }
-        hanging.at_rest = hanging.sizes[0].map(|[first, ..]| first);
+        let at_rest = self.at_rest_of(&functions[0]);
+        let mut hanging = Hanging {
+            is_told: true,
+            functions,
+            at_rest,
+            moved: Column::defaults(at_rest.len()),
+            unsure,
+            along: None,
+        };
         match turned {
             Turned::AnyWay => {
-                let along = |k: usize| self.at_rest[k].map(|part| ANY_WAY * part);
+                let along = |k: usize| {
+                    let column = self.columns().nth(k).unwrap_or_default();
+                    column.map(|part| ANY_WAY * part)
+                };
                 hanging.is_told = false;
-                hanging.moved = hanging.at_rest;
+                hanging.moved = at_rest;
                 hanging.unsure = ANY_WAY;
                 hanging.along = Some([along(3), along(4)]);
             }
@@ -177,6 +188,15 @@ impl<'a> Weight<'a> {
         hanging
     }
 
+    /// The effect at rest with these functions of gravity.
+    fn at_rest_of(&self, functions: &[f32; AT_REST]) -> Column {
+        let mut sum = Column::defaults(self.coordinates);
+        for (part, column) in functions.iter().zip(self.columns()) {
+            add(&mut sum, *part, &column);
+        }
+        sum
+    }
+
     fn functions(&self, stiffness: &Stiffness) -> Functions {
         Functions {
             stiffness: *stiffness,
@@ -184,29 +204,25 @@ impl<'a> Weight<'a> {
         }
     }
 
-    /// Adds `part` times the effect of a gravity at the size with this number.
-    fn add_at(
+    /// The effect of these functions of gravity at the size with this number, divided by the
+    /// softness.
+    fn under_load_of(
         &self,
         number: usize,
-        size: f32,
-        stiffness: &Stiffness,
-        gravity: Gravity,
-        part: f32,
-        sum: &mut [[f32; TERMS]; EQUATIONS],
-    ) {
-        let functions = self.functions(stiffness).at(size, gravity);
-        let by_softness = part / soft(stiffness, size);
-        for (function, column) in functions.iter().zip(&self.at_rest) {
-            for (sum, value) in sum.iter_mut().zip(column) {
-                sum[0] += by_softness * function * value;
-            }
-        }
-        let [d, square, _, x, y, ..] = functions;
+        softness: f32,
+        functions: &[f32; AT_REST],
+        terms: &[f32; TERMS],
+    ) -> Column {
+        let mut sum = self.at_rest_of(functions).map(|part| part / softness);
+        let [d, square, _, x, y, ..] = *functions;
         let first = number.wrapping_sub(1).saturating_mul(UNDER_LOAD);
-        let blocks = self.under_load.iter().skip(first).take(UNDER_LOAD);
-        for (function, block) in [d, square, x, y].into_iter().zip(blocks) {
-            add_block(block, part * function, sum);
+        let blocks = self
+            .under_load
+            .chunks(block_length(self.coordinates).max(1));
+        for (function, block) in [d, square, x, y].into_iter().zip(blocks.skip(first)) {
+            add_block(block, function, terms, &mut sum);
         }
+        sum
     }
 }
 
@@ -228,11 +244,8 @@ impl Forward<'_> {
         let moved = |from: Gravity, to: Gravity, by: &Mounting| {
             let mut moved = hangs(to);
             add(&mut moved, -1.0, &hangs(from));
-            let mut px = Markers::default();
-            for (px, moved) in px.iter_mut().zip(moved.as_chunks::<2>().0) {
-                *px = by.px(*moved);
-            }
-            rest.displaced(&px)
+            let px = moved.as_chunks().0.iter().map(|moved| by.px(*moved));
+            rest.displaced(&Markers::of(px))
         };
         let mut flat = *rest;
         for _ in 0..READINGS {
@@ -294,20 +307,37 @@ pub fn soft(stiffness: &Stiffness, size: f32) -> f32 {
 }
 
 fn add(sum: &mut Column, part: f32, column: &Column) {
-    for (sum, value) in sum.iter_mut().zip(column) {
+    for (sum, value) in sum.iter_mut().zip(column.iter()) {
         *sum += part * value;
     }
 }
 
-fn step([a, b, c, d, ..]: &[u8; BLOCK]) -> f32 {
-    f32::from_le_bytes([*a, *b, *c, *d])
+fn step(block: &[u8]) -> f32 {
+    let step = block.first_chunk().copied();
+    f32::from_le_bytes(step.unwrap_or_default())
 }
 
-fn add_block(block: &[u8; BLOCK], part: f32, sum: &mut [[f32; TERMS]; EQUATIONS]) {
-    let part = part * step(block);
-    let steps = block.as_chunks::<2>().0.iter().skip(2);
-    for (sum, step) in sum.as_flattened_mut().iter_mut().zip(steps) {
-        *sum += part * f32::from(i16::from_le_bytes(*step));
+/// The size with this number.
+fn size_of(number: usize, limits: &Limits) -> f32 {
+    let root = number as f32 / SIZES as f32;
+    limits.size * root * root
+}
+
+/// Adds `function` times the additional part of a block at these terms.
+fn add_block(block: &[u8], function: f32, terms: &[f32; TERMS], sum: &mut Column) {
+    let part = function * step(block);
+    let (coordinates, _) = block
+        .get(4..)
+        .unwrap_or_default()
+        .as_chunks::<{ 2 * TERMS }>();
+    for (sum, steps) in sum.iter_mut().zip(coordinates) {
+        let steps = steps
+            .as_chunks()
+            .0
+            .iter()
+            .map(|step| i16::from_le_bytes(*step));
+        let products = steps.zip(terms).map(|(step, term)| f32::from(step) * term);
+        *sum += part * products.fold(0.0, |sum, product| sum + product);
     }
 }
 
@@ -317,21 +347,24 @@ impl Hanging {
     pub fn add_to(
         &self,
         pose: &Pose,
-        stiffness: &Stiffness,
-        limits: &Limits,
+        forward: &Forward<'_>,
         prediction: &mut Prediction,
         covariance: &mut Covariance,
     ) {
-        let (more, by_size) = self.more(pose, stiffness, limits);
+        let Some(weight) = &forward.weight else {
+            return;
+        };
+        let (stiffness, limits) = (&forward.stiffness, &forward.limits);
+        let (more, by_size) = self.more(weight, pose, stiffness, limits);
         if self.is_told {
             add(&mut prediction.moved, 1.0, &more);
             add(&mut prediction.slopes[0], 1.0, &by_size);
         }
         let of_turn = LEFT_OF_TURN * soft(stiffness, pose.size);
-        let effects = more.iter().zip(&self.at_rest).zip(&self.moved);
-        for (i, (row, ((more, at_rest), moved))) in covariance.iter_mut().zip(effects).enumerate() {
+        let effects = more.iter().zip(self.at_rest.iter()).zip(self.moved.iter());
+        for (row, ((more, at_rest), moved)) in covariance.rows_mut().zip(effects) {
             let (left, turned) = (LEFT * (more + at_rest), of_turn * moved);
-            if let Some(variance) = row.get_mut(i) {
+            if let Some(variance) = row.last_mut() {
                 *variance += left * left + turned * turned;
             }
         }
@@ -344,24 +377,32 @@ impl Hanging {
     }
 
     /// The effect of weight under a load minus that at rest, and its slope by the size.
-    fn more(&self, pose: &Pose, stiffness: &Stiffness, limits: &Limits) -> (Column, Column) {
+    fn more(
+        &self,
+        weight: &Weight<'_>,
+        pose: &Pose,
+        stiffness: &Stiffness,
+        limits: &Limits,
+    ) -> (Column, Column) {
         let terms = terms(pose.place_mm, pose.tilt);
         let size = limited(pose.size / limits.size, 1e-6, 1.0);
         let root = sqrt(size);
-        let [(first, one), (second, other)] = between(root, SIZES + 1);
+        let [(from, one), (to, other)] = between(root, SIZES + 1).map(|(number, part)| {
+            let softness = soft(stiffness, size_of(number, limits));
+            let functions = self.functions.get(number).copied().unwrap_or_default();
+            (
+                weight.under_load_of(number, softness, &functions, &terms),
+                part,
+            )
+        });
         let (at, per_size_n) = (pose.size, stiffness.per_size_n(pose.size));
         let softness = stiffness.linear_n / per_size_n;
         let softer = -6.0 * stiffness.cubic_n * at * softness / per_size_n;
         let steeper = SIZES as f32 * softness / (2.0 * root * limits.size);
-        let (mut more, mut by_size) = (Column::default(), Column::default());
-        let sizes = self.sizes.get(first).zip(self.sizes.get(second));
-        let terms_of = sizes.into_iter().flat_map(|(a, b)| a.iter().zip(b));
-        let sums = more.iter_mut().zip(&mut by_size).zip(&self.at_rest);
-        for (((more, by_size), at_rest), (from, to)) in sums.zip(terms_of) {
-            let [from, to] = [from, to].map(|parts| {
-                let products = parts.iter().zip(&terms);
-                products.fold(0.0, |sum, (part, term)| sum + part * term)
-            });
+        let [mut more, mut by_size] = [Column::defaults(self.at_rest.len()); 2];
+        let sums = more.iter_mut().zip(by_size.iter_mut());
+        let ends = self.at_rest.iter().zip(from.iter().zip(to.iter()));
+        for ((more, by_size), (at_rest, (from, to))) in sums.zip(ends) {
             let value = one * from + other * to;
             *more = softness * value - at_rest;
             *by_size = softer * value + steeper * (to - from);

@@ -2,10 +2,11 @@
 
 use super::{ModelError, reader::Reader};
 use crate::force::forward::{
-    Axis, CovarianceGrid, DOTS, EQUATIONS, Forward, Gravity, Limits, MOST_FUNCTIONS, MOST_STEPS,
-    Markers, NODES, Noise, Others, RELATIVE, RestImage, Shapes, Stiffness, Table, Tables, Terms,
-    Weight, weight,
+    Axis, CovarianceGrid, Forward, Gravity, Limits, MOST_DOTS, MOST_FUNCTIONS, MOST_STEPS, Markers,
+    NODES, Noise, Others, RELATIVE, RestImage, SHAPES_COORDINATES, Shapes, Stiffness, Table,
+    Tables, Terms, Weight, weight,
 };
+use hivtac_terms::list::List;
 #[cfg(any(test, feature = "encode"))]
 use {
     crate::force::forward::{EVEN, MOST_TILTS, ODD, OUTPUTS, SHIFTS},
@@ -21,6 +22,9 @@ impl<'a> Forward<'a> {
         forward(&mut Reader { bytes, offset: 0 })
     }
 }
+
+/// Fewest markers: a contact has five unknowns.
+const LEAST_DOTS: usize = 4;
 
 /// Optional parts of a file: the covariance of its own unit, the knowledge of other units, and the
 /// effect of the film's weight.
@@ -43,7 +47,7 @@ const PARTS: [[bool; 3]; 8] = {
 pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelError> {
     let steps = reader.u8_in("steps", MOST_STEPS, "0 to 3")?;
     let has_camera = reader.choice("camera", &[false, true], "0 or 1")?;
-    dots(reader)?;
+    let dots = dots(reader)?;
     let [has_own, has_other, has_weight] = reader.choice("parts", &PARTS, "0 to 7")?;
     let limits = Limits {
         size: float(reader, "largest size", [1e-3, 10.0], "0.001 to 10")?,
@@ -51,11 +55,11 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
     };
     let stiffness = stiffness(reader)?;
     let rest_image = RestImage {
-        at: markers(reader, "rest image", [-2.0, 2.0], "-2 to 2")?,
-        film_mm: markers(reader, "film", [0.1, 1e3], "0.1 to 1000 mm")?,
+        at: markers(reader, dots, "rest image", [-2.0, 2.0], "-2 to 2")?,
+        film_mm: markers(reader, dots, "film", [0.1, 1e3], "0.1 to 1000 mm")?,
     };
     let noise = Noise {
-        rest_px: markers(reader, "rest", [-1.0, 1.0], "-1 to 1 px")?,
+        rest_px: markers(reader, dots, "rest", [-1.0, 1.0], "-1 to 1 px")?,
         at_rest_px: pair(reader, "noise", [1e-4, 10.0], "0.0001 to 10 px")?,
         at_four_areas: pair(reader, "noise", [0.1, 10.0], "0.1 to 10")?,
     };
@@ -67,55 +71,59 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         rest_image,
         per_px: has_camera.then_some(per_px),
         noise,
-        tables: tables(reader)?,
-        own: has_own.then(|| covariances(reader)).transpose()?,
-        other: has_other.then(|| others(reader)).transpose()?,
-        weight: has_weight.then(|| weight(reader)).transpose()?,
-        shapes: Shapes::nominal(),
+        tables: tables(reader, dots)?,
+        own: has_own.then(|| covariances(reader, dots)).transpose()?,
+        other: has_other.then(|| others(reader, dots)).transpose()?,
+        weight: has_weight.then(|| weight(reader, dots)).transpose()?,
+        shapes: Shapes::nominal().filter(|_| 2 * dots == SHAPES_COORDINATES),
     })
 }
 
-fn weight<'a>(reader: &mut Reader<'a>) -> Result<Weight<'a>, ModelError> {
+fn weight<'a>(reader: &mut Reader<'a>, dots: usize) -> Result<Weight<'a>, ModelError> {
     let mut down = Gravity::default();
     for part in &mut down {
         *part = float(reader, "gravity", [-2.0, 2.0], "-2 to 2 g")?;
     }
     let press_n = float(reader, "weight", [0.0, 1.0], "0 to 1 N")?;
     let unsure = pair(reader, "weight's uncertainty", [0.0, 10.0], "0 to 10")?;
-    let mut at_rest = [[0.0; EQUATIONS]; weight::AT_REST];
-    for part in at_rest.as_flattened_mut() {
-        *part = float(reader, "weight at rest", [-1e3, 1e3], "-1000 to 1000")?;
+    let from = reader.offset;
+    for _ in 0..2 * dots * weight::AT_REST {
+        float(reader, "weight at rest", [-1e3, 1e3], "-1000 to 1000")?;
     }
+    let at_rest = reader.bytes.get(from..reader.offset).unwrap_or_default();
     let offset = reader.offset;
-    let bytes = reader.take(weight::BYTES)?;
-    let under_load = Weight::under_load_of(bytes).ok_or(ModelError::Field {
-        name: "weight under a load",
-        offset,
-        allowed: "steps of 0 to 1000",
-    })?;
+    let under_load = reader.take(weight::length(2 * dots))?;
+    if !Weight::is_under_load(under_load, 2 * dots) {
+        return Err(ModelError::Field {
+            name: "weight under a load",
+            offset,
+            allowed: "steps of 0 to 1000",
+        });
+    }
     Ok(Weight {
         down,
         press_n,
         unsure,
+        coordinates: 2 * dots,
         at_rest,
         under_load,
     })
 }
 
-/// The number of markers must be this program's.
-fn dots(reader: &mut Reader<'_>) -> Result<(), ModelError> {
+/// Reads the number of markers.
+fn dots(reader: &mut Reader<'_>) -> Result<usize, ModelError> {
     let offset = reader.offset;
     match usize::from(reader.u8()?) {
-        DOTS => Ok(()),
+        dots @ LEAST_DOTS..=MOST_DOTS => Ok(dots),
         _ => Err(ModelError::Field {
             name: "markers",
             offset,
-            allowed: "4",
+            allowed: "4 to 16",
         }),
     }
 }
 
-fn tables<'a>(reader: &mut Reader<'a>) -> Result<Tables<'a>, ModelError> {
+fn tables<'a>(reader: &mut Reader<'a>, dots: usize) -> Result<Tables<'a>, ModelError> {
     let offset = reader.offset;
     let wrong = |name, allowed| ModelError::Field {
         name,
@@ -132,12 +140,11 @@ fn tables<'a>(reader: &mut Reader<'a>) -> Result<Tables<'a>, ModelError> {
     let [terms_even, terms_odd] = terms.counts();
     let even = reader.take(4 * functions[0] * terms_even)?;
     let odd = reader.take(4 * functions[1] * terms_odd)?;
-    let first = table(reader, count)?;
-    let mut dots = [first; DOTS];
-    for dot in dots.iter_mut().skip(1) {
-        *dot = table(reader, count)?;
+    let mut tables = List::default();
+    for _ in 0..dots {
+        tables.push(table(reader, count)?);
     }
-    Tables::new(terms, [even, odd], dots).ok_or(wrong("functions", "-1 to 1"))
+    Tables::new(terms, [even, odd], tables).ok_or(wrong("functions", "-1 to 1"))
 }
 
 fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, ModelError> {
@@ -167,7 +174,7 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
     Table::new(axes, away, functions, steps).ok_or(wrong("table", "1 to 16 functions"))
 }
 
-fn others<'a>(reader: &mut Reader<'a>) -> Result<Others<'a>, ModelError> {
+fn others<'a>(reader: &mut Reader<'a>, dots: usize) -> Result<Others<'a>, ModelError> {
     let stiffness = stiffness(reader)?;
     let mut relative = [0.0; RELATIVE];
     for part in &mut relative {
@@ -176,7 +183,7 @@ fn others<'a>(reader: &mut Reader<'a>) -> Result<Others<'a>, ModelError> {
     Ok(Others {
         stiffness,
         relative,
-        covariance: covariances(reader)?,
+        covariance: covariances(reader, dots)?,
     })
 }
 
@@ -187,13 +194,13 @@ fn stiffness(reader: &mut Reader<'_>) -> Result<Stiffness, ModelError> {
     })
 }
 
-fn covariances<'a>(reader: &mut Reader<'a>) -> Result<CovarianceGrid<'a>, ModelError> {
+fn covariances<'a>(reader: &mut Reader<'a>, dots: usize) -> Result<CovarianceGrid<'a>, ModelError> {
     let offset = reader.offset;
     let counts = reader.array::<3>()?;
     reader.zero("reserved byte")?;
     let end_mm = f32::from_le_bytes(reader.array()?);
-    let knots = reader.take(CovarianceGrid::length(counts))?;
-    CovarianceGrid::new(counts, end_mm, knots).ok_or(ModelError::Field {
+    let knots = reader.take(CovarianceGrid::length(2 * dots, counts))?;
+    CovarianceGrid::new(2 * dots, counts, end_mm, knots).ok_or(ModelError::Field {
         name: "covariances",
         offset,
         allowed: "2 to 16 knots along each axis, an end of 0.1 to 100 mm and steps of 0 to 0.001",
@@ -202,11 +209,12 @@ fn covariances<'a>(reader: &mut Reader<'a>) -> Result<CovarianceGrid<'a>, ModelE
 
 fn markers(
     reader: &mut Reader<'_>,
+    dots: usize,
     name: &'static str,
     range: [f32; 2],
     allowed: &'static str,
 ) -> Result<Markers, ModelError> {
-    let mut markers = Markers::default();
+    let mut markers = Markers::defaults(dots);
     for part in markers.as_flattened_mut() {
         *part = float(reader, name, range, allowed)?;
     }
@@ -278,7 +286,7 @@ pub struct ShapesSpec {
     /// The motions at each of its knots, focal lengths: the mean over all shapes, then those of a
     /// round and of a flat contact in proportion to [`span`](crate::force::forward::span) and to
     /// its square.
-    pub shifts: Vec<[[f64; EQUATIONS]; SHIFTS]>,
+    pub shifts: Vec<[[f64; SHAPES_COORDINATES]; SHIFTS]>,
 }
 
 /// The effect of a film's weight, to be written. The fields mean what [`Weight`]'s do.
@@ -292,10 +300,10 @@ pub struct WeightSpec {
     /// Relative standard uncertainty: of the model's own unit, of any other.
     pub unsure: [f32; 2],
     /// The effect at rest of each function of gravity, focal lengths.
-    pub at_rest: [[f64; EQUATIONS]; weight::AT_REST],
+    pub at_rest: [Vec<f64>; weight::AT_REST],
     /// The additional part by size, function of gravity, coordinate and term, divided by the
     /// softness.
-    pub under_load: [[[[f64; weight::TERMS]; EQUATIONS]; weight::UNDER_LOAD]; weight::SIZES],
+    pub under_load: [[Vec<[f64; weight::TERMS]>; weight::UNDER_LOAD]; weight::SIZES],
 }
 
 /// What is known of other units, to be written. The fields mean what [`Others`]' do.
@@ -347,7 +355,7 @@ pub struct CovarianceSpec {
     pub end_mm: f32,
     /// By size, place along y and place along x: the lower factor of each covariance, focal
     /// lengths.
-    pub factors: Vec<[[f64; EQUATIONS]; EQUATIONS]>,
+    pub factors: Vec<Vec<Vec<f64>>>,
 }
 
 #[cfg(any(test, feature = "encode"))]
@@ -367,7 +375,12 @@ impl ForwardSpec {
         ];
         let parts = PARTS.iter().position(|parts| *parts == has).unwrap_or(0);
         let camera = u8::from(self.per_px.is_some());
-        bytes.extend([self.steps, camera, DOTS as u8, parts as u8]);
+        bytes.extend([
+            self.steps,
+            camera,
+            self.tables.dots.len() as u8,
+            parts as u8,
+        ]);
         let load = [
             self.limits.size,
             self.limits.tilt,
@@ -430,7 +443,7 @@ impl WeightSpec {
     fn push(&self, bytes: &mut Vec<u8>) {
         let parts = self.down.iter().chain([&self.press_n]).chain(&self.unsure);
         bytes.extend(parts.flat_map(|part| part.to_le_bytes()));
-        let at_rest = self.at_rest.as_flattened().iter();
+        let at_rest = self.at_rest.iter().flatten();
         bytes.extend(at_rest.flat_map(|part| (*part as f32).to_le_bytes()));
         for block in self.under_load.as_flattened() {
             push_steps(block.as_flattened(), bytes);
@@ -523,7 +536,8 @@ impl CovarianceSpec {
         bytes.push(0);
         bytes.extend(self.end_mm.to_le_bytes());
         for factor in &self.factors {
-            let entries = (0..EQUATIONS).flat_map(|i| &factor[i][..=i]);
+            let rows = factor.iter().enumerate();
+            let entries = rows.flat_map(|(i, row)| row.iter().take(i + 1));
             push_steps(&entries.copied().collect::<Vec<_>>(), bytes);
         }
     }
