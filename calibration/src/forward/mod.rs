@@ -423,8 +423,7 @@ mod tests {
                 tilt: pose.tilt.map(|part| part as f32),
                 place_mm: pose.place_mm.map(|part| part as f32),
             };
-            let mut covariance = forward::Covariance::zeros(EQUATIONS);
-            hanging.add_to(&chip, &forward, &mut told, &mut covariance);
+            hanging.add_to(&chip, &forward, &mut told);
             for c in 0..8 {
                 let moved = f64::from(told.moved[c]);
                 let off = camera.focal_px() * (moved - (with[c] - without[c]));

@@ -294,15 +294,16 @@ fn a_mounted_film_is_known_turned() {
             let mut told = chip::Prediction::zeros(8);
             let mut covariance = chip::Covariance::zeros(8);
             let hanging = chip.hanging(turned, true).unwrap();
-            hanging.add_to(&pose, &chip, &mut told, &mut covariance);
+            hanging.add_to(&pose, &chip, &mut told);
+            hanging.add_uncertainty(&pose, &chip, &mut covariance);
             let told_px = fit.own.to_px(&told.moved);
             let does = |k: usize| with[k] - without[k];
             let most = (0..8)
                 .map(does)
                 .fold(0.0, |most: f64, does| most.max(does.abs()));
             assert!(most > 0.04, "{most}");
-            for k in 0..8 {
-                let off = told_px[k] - does(k);
+            for (k, told_px) in told_px.iter().enumerate() {
+                let off = told_px - does(k);
                 let sigma = truth.made.focal_px * f64::from(covariance.entry(k, k)).sqrt();
                 let about = format!("{down:?} {force_n:?} {k}: {off} of {} px", does(k));
                 assert!(off.abs() < 0.015 + 0.05 * most, "{about}");

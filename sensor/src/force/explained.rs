@@ -2,8 +2,8 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
-    Column, Covariance, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise,
-    Observed, Pose, Sigma, Strength, Turned,
+    Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
+    Sigma, Strength, Turned,
 };
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
@@ -24,8 +24,8 @@ pub struct Resting {
     is_own: bool,
     px: Markers,
     areas: List<f32, MOST_DOTS>,
-    /// Covariance of the difference between this and where the film rests; `None` if there is none.
-    drift: Option<Covariance>,
+    /// How far the film may rest from this; `None` if there is no difference.
+    drift: Option<Drift>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     hanging: Option<Hanging>,
     shape: ContactShape,
@@ -76,8 +76,7 @@ impl Resting {
 
     /// Sets how far the film may rest from this rest position.
     pub fn set_drift(&mut self, drift: &Drift) {
-        let is_known = *drift == Drift::NONE;
-        self.drift = (!is_known).then(|| drift.covariance(&self.mounting, &self.px));
+        self.drift = Some(*drift).filter(|drift| *drift != Drift::NONE);
     }
 
     /// For markers that rest at `rest`, and at `flat` under the gravity of the model's film. For
@@ -207,7 +206,7 @@ impl Resting {
             });
             noise.push(forward.rest_image.noise(k, variances));
         }
-        let drift = self.drift.as_ref();
+        let drift = self.drift.as_ref().map(|drift| (drift, &self.px));
         let hanging = self.hanging.as_ref();
         Observed {
             moved,

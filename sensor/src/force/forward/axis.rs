@@ -14,7 +14,7 @@ const WHOLE: f32 = 12_582_912.0;
 
 /// The nodes of cubic splines, borrowed from a file. A spline is a sum of B-splines, one for each
 /// node, and smooth over the second and the last but one node (not-a-knot).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis<'a> {
     /// f32 each, mm.
     nodes: &'a [[u8; 4]],
@@ -55,6 +55,11 @@ impl<'a> Axis<'a> {
         let spans = (SPAN - 1..nodes.len()).map(|span| axis.knot_mm(span + 1) - axis.knot_mm(span));
         axis.slope_unit = 6.0 / spans.fold(f32::INFINITY, f32::min);
         Some(axis)
+    }
+
+    /// Nodes that [`Axis::new`] has taken before, and the unit that it found.
+    pub(super) fn taken(nodes: &'a [[u8; 4]], slope_unit: f32) -> Axis<'a> {
+        Axis { nodes, slope_unit }
     }
 
     fn node_mm(&self, nth: usize) -> f32 {

@@ -120,13 +120,6 @@ impl Covariance {
             }
         }
     }
-
-    /// Adds another covariance of as many coordinates.
-    pub fn add_all(&mut self, other: &Covariance) {
-        for (sum, part) in self.entries.iter_mut().zip(&other.entries) {
-            *sum += part;
-        }
-    }
 }
 
 /// Covariances by the load's size and place, borrowed from a model file.
@@ -195,7 +188,7 @@ impl<'a> CovarianceGrid<'a> {
     }
 
     /// As [`CovarianceGrid::at`], in place.
-    fn put(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
+    pub(super) fn put(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
         covariance.reset(self.coordinates);
         let length = knot_length(self.coordinates);
         for (knot, part) in self.corners(pose, limits) {

@@ -1,7 +1,7 @@
 //! Steps downhill to the load that explains the markers best, each by the linearized film.
 
 use super::Forward;
-use super::covariance::{Unknown, Whitening};
+use super::covariance::{Covariance, Unknown, Whitening};
 use super::estimate::{Estimate, Observed};
 use super::mounting::Mounting;
 use super::pose::{Pose, limited};
@@ -30,9 +30,14 @@ const SHORTER: f32 = 0.5;
 pub struct Descent<'a> {
     forward: &'a Forward<'a>,
     markers: Markers<'a>,
-    here: &'a mut Linearization,
-    /// Storage for the load of the next step.
-    there: &'a mut Linearization,
+    here: &'a mut Point,
+    /// The load of the next step.
+    there: &'a mut Point,
+    /// By the covariance, at the load here, of noise and of what is unknown of the unit.
+    whitening: &'a mut Whitening,
+    /// The equations in coordinates in which that covariance is the unit matrix; `None` if it is
+    /// singular or not finite.
+    white: Option<White>,
     /// The fraction of the next step that is tried.
     part: f32,
     /// How the path bends: added to the unknowns, times the square of that fraction.
@@ -50,22 +55,22 @@ struct Markers<'a> {
     unknown: Unknown<'a>,
 }
 
-/// A load, and the linear equations of the markers there. It is large, and therefore changed in
-/// place.
-pub struct Linearization {
+/// The storage of a descent. It is large, and therefore changed in place.
+pub struct Storage {
+    points: [Point; 2],
+    whitening: Whitening,
+}
+
+/// A load, and the linear equations of the markers there.
+struct Point {
     pose: Pose,
     /// The motion under the load, and its slopes.
     prediction: Prediction,
     /// The part of the markers' motion that the load does not explain, focal lengths.
     left: Column,
-    /// By the covariance, at this load, of noise and of what is unknown of the unit.
-    whitening: Whitening,
-    /// In coordinates in which that covariance is the unit matrix; `None` if it is singular or not
-    /// finite.
-    white: Option<White>,
 }
 
-/// A linearization in coordinates in which the covariance is the unit matrix.
+/// The solution of white equations.
 #[derive(Clone, Copy)]
 struct White {
     /// The square of the part of the motion that the load does not explain.
@@ -75,33 +80,53 @@ struct White {
     solved: Option<Solved>,
 }
 
+impl Storage {
+    /// Storage before a descent.
+    pub fn new() -> Storage {
+        let point = || Point {
+            pose: Pose::default(),
+            prediction: Prediction::zeros(0),
+            left: Column::default(),
+        };
+        Storage {
+            points: [point(), point()],
+            whitening: Whitening::EMPTY,
+        }
+    }
+}
+
 impl<'a> Descent<'a> {
-    /// Begins at a guess; outside the tables, at the nearest load inside. It works in the storage
-    /// of two points.
+    /// Begins at a guess; outside the tables, at the nearest load inside.
     pub fn new(
         forward: &'a Forward<'a>,
         observed: &'a Observed<'a>,
         mounting: &'a Mounting,
         unknown: Unknown<'a>,
         guess: Pose,
-        [here, there]: &'a mut [Linearization; 2],
+        storage: &'a mut Storage,
     ) -> Self {
+        let Storage { points, whitening } = storage;
+        let [here, there] = points;
         let markers = Markers {
             observed,
             mounting,
             unknown,
         };
         here.put(forward, &markers, within(forward, guess));
-        Self {
+        let mut descent = Self {
             forward,
             markers,
             here,
             there,
+            whitening,
+            white: None,
             part: 1.0,
             bend: Unknowns::default(),
             has_ended: false,
             looks: 1,
-        }
+        };
+        descent.solve();
+        descent
     }
 
     /// Tries a step. A step that does not lower the residual, weighted by the covariance where it
@@ -109,24 +134,43 @@ impl<'a> Descent<'a> {
     /// whole step's residual says (geodesic acceleration: Transtrum and Sethna 2012). Returns false
     /// if the markers do not determine a step.
     pub fn step(&mut self) -> bool {
-        let Some((square, solved)) = self.here.solved() else {
+        let Some((white, solved)) = self.solved() else {
             return false;
         };
         let pose = after(self.forward, &self.here.pose, solved, self.part, &self.bend);
-        let explained = solved.explained;
+        let (square, explained) = (white.square, solved.explained);
         self.there.put(self.forward, &self.markers, pose);
         self.looks += 1;
-        if self.here.square_of(self.there) < square {
+        if self.there.square(self.whitening) < square {
             core::mem::swap(&mut self.here, &mut self.there);
             (self.part, self.bend) = (1.0, Unknowns::default());
+            self.solve();
         } else {
             self.has_ended = explained <= ROUNDING;
             if self.part == 1.0 {
-                self.bend = self.here.bend(self.there);
+                self.bend = self.bend();
             }
             self.part *= SHORTER;
         }
         true
+    }
+
+    /// Solves the equations here.
+    fn solve(&mut self) {
+        let Self {
+            forward,
+            markers,
+            here,
+            ..
+        } = self;
+        let put = |covariance: &mut Covariance| here.put_covariance(forward, markers, covariance);
+        self.white = self.whitening.set(put).map(|()| here.white(self.whitening));
+    }
+
+    /// The solution, if the markers determine one.
+    fn solved(&self) -> Option<(&White, &Solved)> {
+        let white = self.white.as_ref()?;
+        Some((white, white.solved.as_ref()?))
     }
 
     /// Returns whether more steps would not help, whether or not the load explains the markers.
@@ -136,27 +180,35 @@ impl<'a> Descent<'a> {
 
     /// Whether another step would explain hardly more.
     fn has_converged(&self) -> bool {
-        let solved = self.here.solved();
+        let solved = self.solved();
         solved.is_some_and(|(_, solved)| solved.explained <= LEFT_TO_EXPLAIN)
     }
 
     /// Returns whether the load explains the markers and the steps came to an end.
     pub fn is_done(&self) -> bool {
-        let white = self.here.white.as_ref();
         let stuck = residual::stuck(self.here.left.len());
-        let is_explained = white.is_some_and(|white| white.unexplained <= stuck);
+        let is_explained = self.white.is_some_and(|white| white.unexplained <= stuck);
         is_explained && (self.has_ended || self.has_converged())
+    }
+
+    /// Returns how the path bends if the whole first step leads to `there`: the slopes here, solved
+    /// for the residual there. Not inlined, so that its stack is released on return.
+    #[inline(never)]
+    fn bend(&self) -> Unknowns {
+        let (slopes, there) = (&self.here.prediction.slopes, &self.there);
+        let mut equations = Equations::new(self.whitening, slopes, &there.left, &there.pose);
+        let solved = equations.solve();
+        solved.map_or(Unknowns::default(), |solved| solved.unknowns)
     }
 
     /// The load that it has reached.
     pub fn estimate(self) -> Estimate {
-        let left = self.here.by_noise(self.markers.observed, self.there);
-        let white = self.here.white;
+        let white = self.white;
         Estimate {
             pose: self.here.pose,
             // A load without a covariance explains nothing: infinite residual.
             unexplained: white.map_or(f32::INFINITY, |white| white.unexplained),
-            left,
+            left: self.here.by_noise(self.markers.observed, self.whitening),
             solved: white.and_then(|white| white.solved),
             looks: self.looks,
         }
@@ -210,54 +262,61 @@ fn unlikely(pose: &Pose) -> [f32; LIKELY.len()] {
     core::array::from_fn(|k| -parts[k] / LIKELY[k])
 }
 
-impl Linearization {
-    /// Storage without a load.
-    pub fn empty() -> Linearization {
-        Linearization {
-            pose: Pose::default(),
-            prediction: Prediction::zeros(0),
-            left: Column::default(),
-            whitening: Whitening::EMPTY,
-            white: None,
-        }
-    }
-
-    /// Makes this the linearization at a load. Not inlined, so that its stack is released on
-    /// return.
+impl Point {
+    /// Makes this the point of a load. Not inlined, so that its stack is released on return.
     #[inline(never)]
     fn put(&mut self, forward: &Forward<'_>, markers: &Markers<'_>, pose: Pose) {
+        let Markers {
+            observed, mounting, ..
+        } = markers;
+        let limits = &forward.limits;
+        let Point {
+            prediction, left, ..
+        } = self;
+        (forward.tables).put(&pose, limits, &mounting.beside_mm, prediction);
+        if let Some(hanging) = observed.hanging {
+            hanging.add_to(&pose, forward, prediction);
+        }
+        if let Some(pressing) = &observed.pressing {
+            pressing.add_to(&pose, limits, prediction);
+        }
+        left.reset(observed.moved.len(), 0.0);
+        let pairs = observed.moved.iter().zip(prediction.moved.iter());
+        for (left, (seen, told)) in left.iter_mut().zip(pairs) {
+            *left = seen - told;
+        }
+        self.pose = pose;
+    }
+
+    /// Puts the covariance, at this load, of noise and of what is unknown of the unit into
+    /// `covariance`.
+    fn put_covariance(
+        &self,
+        forward: &Forward<'_>,
+        markers: &Markers<'_>,
+        covariance: &mut Covariance,
+    ) {
         let Markers {
             observed,
             mounting,
             unknown,
         } = markers;
-        let (tables, limits) = (&forward.tables, &forward.limits);
-        let prediction = &mut self.prediction;
-        tables.put(&pose, limits, &mounting.beside_mm, prediction);
-        let is_sound = self.whitening.set(|covariance| {
-            unknown.put(&pose, limits, &prediction.moved, covariance);
-            observed.add_to(covariance);
-            if let Some(hanging) = observed.hanging {
-                hanging.add_to(&pose, forward, prediction, covariance);
-            }
-            if let Some(pressing) = &observed.pressing {
-                pressing.add_to(&pose, limits, prediction, covariance);
-            }
-        });
-        self.pose = pose;
-        self.left.reset(observed.moved.len(), 0.0);
-        let pairs = observed.moved.iter().zip(prediction.moved.iter());
-        for (left, (seen, told)) in self.left.iter_mut().zip(pairs) {
-            *left = seen - told;
+        let (pose, limits) = (&self.pose, &forward.limits);
+        unknown.put(pose, limits, &self.prediction.moved, covariance);
+        observed.add_to(mounting, covariance);
+        if let Some(hanging) = observed.hanging {
+            hanging.add_uncertainty(pose, forward, covariance);
         }
-        self.white = is_sound.map(|()| self.white());
+        if let Some(pressing) = &observed.pressing {
+            pressing.add_uncertainty(pose, limits, covariance);
+        }
     }
 
     /// Not inlined, so that its stack is released on return.
     #[inline(never)]
-    fn white(&self) -> White {
+    fn white(&self, whitening: &Whitening) -> White {
         let slopes = &self.prediction.slopes;
-        let mut equations = Equations::new(&self.whitening, slopes, &self.left, &self.pose);
+        let mut equations = Equations::new(whitening, slopes, &self.left, &self.pose);
         let markers = equations.side.get(..self.left.len());
         White {
             unexplained: square(markers.unwrap_or_default()),
@@ -266,34 +325,17 @@ impl Linearization {
         }
     }
 
-    /// The solution here, and the square that a step must lower.
-    fn solved(&self) -> Option<(f32, &Solved)> {
-        let white = self.white.as_ref()?;
-        Some((white.square, white.solved.as_ref()?))
-    }
-
-    /// The square of another load, weighted by the covariance here.
-    fn square_of(&self, other: &Linearization) -> f32 {
-        let mut left = other.left;
-        self.whitening.whiten(&mut left);
-        square(&left) + square(&unlikely(&other.pose))
-    }
-
-    /// Returns how the path from here bends if its whole first step leads to `there`: the slopes
-    /// here, solved for the residual there. Not inlined, as [`Linearization::white`].
-    #[inline(never)]
-    fn bend(&self, there: &Linearization) -> Unknowns {
-        let slopes = &self.prediction.slopes;
-        let mut equations = Equations::new(&self.whitening, slopes, &there.left, &there.pose);
-        let solved = equations.solve();
-        solved.map_or(Unknowns::default(), |solved| solved.unknowns)
+    /// The square that a step must lower, weighted by the covariance of another load.
+    fn square(&self, whitening: &Whitening) -> f32 {
+        let mut left = self.left;
+        whitening.whiten(&mut left);
+        square(&left) + square(&unlikely(&self.pose))
     }
 
     /// The part of the motion that no load near this one explains, in units of its noise alone. It
-    /// works in the storage of another load.
-    fn by_noise(&self, observed: &Observed<'_>, storage: &mut Linearization) -> Column {
+    /// overwrites the whitening.
+    fn by_noise(&self, observed: &Observed<'_>, whitening: &mut Whitening) -> Column {
         let markers = self.left.len();
-        let whitening = &mut storage.whitening;
         if whitening.set(|noise| observed.put_noise(noise)).is_none() {
             return Column::filled(markers, f32::INFINITY);
         }

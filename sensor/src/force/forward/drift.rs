@@ -43,25 +43,26 @@ impl Drift {
         seen.fold(0.0, |farthest, part| part.abs().max(farthest))
     }
 
-    /// Returns the covariance of the images of markers that rest at these px. Entries above the
-    /// diagonal are unused.
-    pub fn covariance(&self, mounting: &Mounting, rest_px: &Markers) -> Covariance {
-        let about = about_middle(rest_px);
-        let [shift, turn, scale] = self.unseen;
-        let shift_px = shift * radius(&about);
-        let mut covariance = Covariance::zeros(2 * rest_px.len());
+    /// Adds the covariance of the images of markers that rest at these px. Compiled once, because
+    /// the near memory is scarce.
+    #[inline(never)]
+    pub fn add_to(&self, mounting: &Mounting, rest_px: &Markers, covariance: &mut Covariance) {
         let mut add = |px: Markers| {
             let moved = px.map(|px| mounting.moved(px));
-            add_square(&mut covariance, moved.as_flattened(), 1.0);
+            add_square(covariance, moved.as_flattened(), 1.0);
         };
-        add(about.map(|_| [shift_px, 0.0]));
-        add(about.map(|_| [0.0, shift_px]));
-        add(about.map(|[x, y]| [-turn * y, turn * x]));
-        add(about.map(|place| place.map(|part| scale * part)));
+        if self.unseen != Drift::NONE.unseen {
+            let about = about_middle(rest_px);
+            let [shift, turn, scale] = self.unseen;
+            let shift_px = shift * radius(&about);
+            add(about.map(|_| [shift_px, 0.0]));
+            add(about.map(|_| [0.0, shift_px]));
+            add(about.map(|[x, y]| [-turn * y, turn * x]));
+            add(about.map(|place| place.map(|part| scale * part)));
+        }
         if let Some(seen_px) = self.seen_px {
             add(seen_px);
         }
-        covariance
     }
 }
 
@@ -76,7 +77,9 @@ mod tests {
             per_px: [0.01, 0.0],
             beside_mm: Markers::defaults(4),
         };
-        drift.covariance(&mounting, &Markers::of(REST_PX))
+        let mut covariance = Covariance::zeros(8);
+        drift.add_to(&mounting, &Markers::of(REST_PX), &mut covariance);
+        covariance
     }
 
     fn variance(covariance: &Covariance, along: &[[f32; 2]]) -> f32 {

@@ -1,9 +1,11 @@
 //! Takes Gauss–Newton steps from a first guess to the load that explains the markers best.
 
 use super::covariance::{Covariance, Unknown};
-use super::descent::{Descent, Linearization};
+use super::descent::{Descent, Storage};
+use super::drift::Drift;
 use super::mounting::Mounting;
 use super::pose::{Pose, sine_over_angle_and_cosine};
+use super::predict::Markers;
 use super::residual;
 use super::shapes::Pressing;
 use super::solve::{Column, MOST_DOTS, Solved};
@@ -22,9 +24,8 @@ pub struct Observed<'a> {
     pub moved: Column,
     /// The noise of each marker: covariances xx, xy, yy, focal lengths squared; xx and yy > 0.
     pub noise: List<[f32; 3], MOST_DOTS>,
-    /// Covariance of the rest position's distance from where the film rests
-    /// ([`Drift`](super::Drift)); `None` if the distance is 0.
-    pub drift: Option<&'a Covariance>,
+    /// How far the film may rest from the rest position, px; `None` if that is 0.
+    pub drift: Option<(&'a Drift, &'a Markers)>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     pub hanging: Option<&'a Hanging>,
     /// What presses; `None` for the tables' tip.
@@ -39,10 +40,10 @@ impl Observed<'_> {
     }
 
     /// Adds noise, and the covariance of the rest position.
-    pub(super) fn add_to(&self, covariance: &mut Covariance) {
+    pub(super) fn add_to(&self, mounting: &Mounting, covariance: &mut Covariance) {
         self.add_noise(covariance);
-        if let Some(drift) = self.drift {
-            covariance.add_all(drift);
+        if let Some((drift, rest_px)) = self.drift {
+            drift.add_to(mounting, rest_px, covariance);
         }
     }
 
@@ -86,11 +87,11 @@ impl Forward<'_> {
         unknown: Unknown<'_>,
         guess: Pose,
     ) -> Estimate {
-        let mut points = [Linearization::empty(), Linearization::empty()];
+        let mut storage = Storage::new();
         let mut descend = |guess| {
-            let points = &mut points;
+            let storage = &mut storage;
             self.descend(Descent::new(
-                self, observed, mounting, unknown, guess, points,
+                self, observed, mounting, unknown, guess, storage,
             ))
         };
         let (found, is_done) = descend(guess);

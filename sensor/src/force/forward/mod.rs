@@ -51,7 +51,7 @@ pub use drift::Drift;
 pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, stated};
 pub use mounting::{CameraMotion, Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
-pub use predict::{MOST_FUNCTIONS, Markers, Prediction, Tables};
+pub use predict::{Dot, MOST_FUNCTIONS, Markers, Prediction, Tables};
 pub use shapes::{COORDINATES as SHAPES_COORDINATES, Pressing, SHIFT_KNOT, SHIFTS, Shapes, span};
 pub(crate) use solve::square;
 pub use solve::{Column, MOST_DOTS, MOST_EQUATIONS, Solved, UNKNOWNS, solve};

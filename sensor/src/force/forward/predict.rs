@@ -27,7 +27,18 @@ pub struct Tables<'a> {
     /// Coefficients by function and term, f32 each: functions of even powers of the tilt's second
     /// part, then those of odd powers.
     functions: [&'a [[u8; 4]]; 2],
-    dots: List<Table<'a>, MOST_DOTS>,
+    /// The bytes of all markers' tables, one after the other.
+    bytes: &'a [u8],
+    dots: List<Dot, MOST_DOTS>,
+}
+
+/// Where the table of a marker lies, and what was found when it was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dot {
+    /// Index of its first byte.
+    pub at: u32,
+    /// Units of the slopes' weights along x and y, 1/mm.
+    pub slope_units: [f32; 2],
 }
 
 /// The motion of the images.
@@ -41,12 +52,13 @@ pub struct Prediction {
 
 impl<'a> Tables<'a> {
     /// Takes the functions' coefficients of each term, functions of even powers of the tilt's
-    /// second part first, and a table of each marker. Returns `None` if the numbers of terms and
-    /// functions do not fit, or a coefficient is not within ±1.
+    /// second part first, and the tables of the markers, which [`Table::new`] has taken. Returns
+    /// `None` if the numbers of terms and functions do not fit, or a coefficient is not within ±1.
     pub fn new(
         terms: Terms,
         functions: [&'a [u8]; 2],
-        dots: List<Table<'a>, MOST_DOTS>,
+        bytes: &'a [u8],
+        dots: List<Dot, MOST_DOTS>,
     ) -> Option<Tables<'a>> {
         let functions = functions.map(|bytes| bytes.as_chunks());
         let whole = functions.iter().all(|(_, rest)| rest.is_empty());
@@ -62,13 +74,13 @@ impl<'a> Tables<'a> {
         let sound = whole
             && fit
             && (1..=MOST_FUNCTIONS).contains(&count)
-            && dots.iter().all(|table| table.functions() == count)
             && parts
                 .map(|part| f32::from_le_bytes(*part))
                 .all(|part| part.abs() <= 1.0);
         sound.then_some(Tables {
             terms,
             functions,
+            bytes,
             dots,
         })
     }
@@ -78,9 +90,26 @@ impl<'a> Tables<'a> {
         self.dots.len()
     }
 
+    /// The tables of all markers.
+    fn tables(&self) -> impl Iterator<Item = Table<'a>> {
+        let functions = self.functions();
+        self.dots.iter().map_while(move |dot| {
+            let bytes = self.bytes.get(dot.at as usize..)?;
+            Table::taken(bytes, dot.slope_units, functions)
+        })
+    }
+
+    /// Number of functions.
+    fn functions(&self) -> usize {
+        let counts = self.functions.iter().zip(self.terms.counts());
+        counts
+            .map(|(parts, terms)| parts.len() / terms.max(1))
+            .sum()
+    }
+
     /// The first and the last place that all tables cover along both axes, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
-        let axes = self.dots.iter().flat_map(Table::axes);
+        let axes = self.tables().flat_map(|table| *table.axes());
         axes.fold([f32::MIN, f32::MAX], |[from, to], axis| {
             let [first, last] = axis.ends_mm();
             [from.max(first), to.min(last)]
@@ -107,7 +136,7 @@ impl<'a> Tables<'a> {
         let mut sizes = Vec::new();
         self.put_sizes(pose.size, limits, &mut sizes);
         let mut functions = Vec::<Factors, MOST_FUNCTIONS>::new();
-        for (dot, table) in self.dots.iter().enumerate() {
+        for (dot, table) in self.tables().enumerate() {
             let [a, b] = table.tilt(pose.tilt);
             let tilts = Tilts::of(&Powers::at(a, limits), &Powers::at(b, limits));
             functions.clear();

@@ -131,23 +131,23 @@ pub fn span(shape: ContactShape, radius_mm: f32) -> f32 {
 }
 
 impl Pressing<'_> {
-    /// Adds the shape's motion under a load to a prediction, and its uncertainty to a covariance.
+    /// Adds the shape's motion under a load to a prediction.
     #[inline(never)]
-    pub fn add_to(
-        &self,
-        pose: &Pose,
-        limits: &Limits,
-        prediction: &mut Prediction,
-        covariance: &mut Covariance,
-    ) {
-        let mirror = Mirror::of(pose.place_mm);
-        let pose = self.shapes.folded(pose);
-        let shift = mirror.column(&self.shift(&pose, limits));
+    pub fn add_to(&self, pose: &Pose, limits: &Limits, prediction: &mut Prediction) {
+        let shift = self.shift(pose, limits);
         for (sum, part) in prediction.moved.iter_mut().zip(shift.iter()) {
             *sum += part;
         }
-        add_square(covariance, &shift, self.of_own);
-        let of_all = self.shapes.covariance.at(&pose, limits);
+    }
+
+    /// Adds the uncertainty of that motion to a covariance.
+    #[inline(never)]
+    pub fn add_uncertainty(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
+        add_square(covariance, &self.shift(pose, limits), self.of_own);
+        let mirror = Mirror::of(pose.place_mm);
+        let mut of_all = Covariance::EMPTY;
+        let pose = &self.shapes.folded(pose);
+        self.shapes.covariance.put(pose, limits, &mut of_all);
         let square = self.of_all * self.of_all;
         for (i, row) in covariance.rows_mut().enumerate() {
             for (j, sum) in row.iter_mut().enumerate() {
@@ -156,7 +156,10 @@ impl Pressing<'_> {
         }
     }
 
+    /// The motion under a load.
     fn shift(&self, pose: &Pose, limits: &Limits) -> Column {
+        let mirror = Mirror::of(pose.place_mm);
+        let pose = &self.shapes.folded(pose);
         let mut sum = Column::defaults(COORDINATES);
         self.shapes.covariance.around(pose, limits, |knot, part| {
             let Some(knot) = self.shapes.shifts.get(knot) else {
@@ -170,7 +173,7 @@ impl Pressing<'_> {
                 }
             }
         });
-        sum
+        mirror.column(&sum)
     }
 }
 
@@ -247,7 +250,9 @@ mod tests {
         let mut prediction = Prediction::zeros(COORDINATES);
         let mut covariance = Covariance::zeros(COORDINATES);
         let pose = pose(0.3, [1.0, 2.0]);
-        (shapes.pressing(shape)?).add_to(&pose, &LIMITS, &mut prediction, &mut covariance);
+        let pressing = shapes.pressing(shape)?;
+        pressing.add_to(&pose, &LIMITS, &mut prediction);
+        pressing.add_uncertainty(&pose, &LIMITS, &mut covariance);
         Some([prediction.moved[0], covariance.entry(0, 0).sqrt()])
     }
 

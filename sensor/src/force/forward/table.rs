@@ -16,7 +16,7 @@ pub const OUTPUTS: usize = 2;
 
 /// How a marker's image moves along x and y. Each is a sum of functions of size and tilt whose
 /// coefficients are splines over the place. Borrowed from a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Table<'a> {
     axes: [Axis<'a>; 2],
     /// The direction of the first part of the functions' tilt.
@@ -58,6 +58,33 @@ impl<'a> Table<'a> {
         sound.then_some(Table {
             axes,
             away,
+            functions,
+            steps,
+        })
+    }
+
+    /// Reads a table again that a file begins with and that [`Table::new`] has taken before: the
+    /// numbers of nodes along x and y, two zeros, the nodes, the direction, and the steps. Returns
+    /// `None` if the bytes end too early.
+    pub(super) fn taken(
+        bytes: &'a [u8],
+        slope_units: [f32; 2],
+        functions: usize,
+    ) -> Option<Table<'a>> {
+        let ([x, y, ..], rest) = bytes.split_first_chunk::<4>()?;
+        let (words, _) = rest.as_chunks::<4>();
+        let (along_x, words) = words.split_at_checked(usize::from(*x))?;
+        let (along_y, words) = words.split_at_checked(usize::from(*y))?;
+        let ([c, s], _) = words.split_first_chunk()?;
+        let axes = [
+            Axis::taken(along_x, slope_units[0]),
+            Axis::taken(along_y, slope_units[1]),
+        ];
+        let from = 4 * (along_x.len() + along_y.len() + 2);
+        let steps = rest.get(from..)?.get(..Table::length(&axes, functions))?;
+        Some(Table {
+            axes,
+            away: [*c, *s].map(f32::from_le_bytes),
             functions,
             steps,
         })

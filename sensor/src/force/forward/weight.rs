@@ -342,25 +342,21 @@ fn add_block(block: &[u8], function: f32, terms: &[f32; TERMS], sum: &mut Column
 }
 
 impl Hanging {
-    /// Adds the effect of weight under a load to a prediction, and its uncertainty to a covariance.
+    /// Adds the effect of weight under a load to a prediction.
     #[inline(never)]
-    pub fn add_to(
-        &self,
-        pose: &Pose,
-        forward: &Forward<'_>,
-        prediction: &mut Prediction,
-        covariance: &mut Covariance,
-    ) {
-        let Some(weight) = &forward.weight else {
-            return;
-        };
-        let (stiffness, limits) = (&forward.stiffness, &forward.limits);
-        let (more, by_size) = self.more(weight, pose, stiffness, limits);
+    pub fn add_to(&self, pose: &Pose, forward: &Forward<'_>, prediction: &mut Prediction) {
         if self.is_told {
+            let (more, by_size) = self.more(pose, forward);
             add(&mut prediction.moved, 1.0, &more);
             add(&mut prediction.slopes[0], 1.0, &by_size);
         }
-        let of_turn = LEFT_OF_TURN * soft(stiffness, pose.size);
+    }
+
+    /// Adds the uncertainty of that effect to a covariance.
+    #[inline(never)]
+    pub fn add_uncertainty(&self, pose: &Pose, forward: &Forward<'_>, covariance: &mut Covariance) {
+        let (more, _) = self.more(pose, forward);
+        let of_turn = LEFT_OF_TURN * soft(&forward.stiffness, pose.size);
         let effects = more.iter().zip(self.at_rest.iter()).zip(self.moved.iter());
         for (row, ((more, at_rest), moved)) in covariance.rows_mut().zip(effects) {
             let (left, turned) = (LEFT * (more + at_rest), of_turn * moved);
@@ -377,13 +373,12 @@ impl Hanging {
     }
 
     /// The effect of weight under a load minus that at rest, and its slope by the size.
-    fn more(
-        &self,
-        weight: &Weight<'_>,
-        pose: &Pose,
-        stiffness: &Stiffness,
-        limits: &Limits,
-    ) -> (Column, Column) {
+    fn more(&self, pose: &Pose, forward: &Forward<'_>) -> (Column, Column) {
+        let [mut more, mut by_size] = [Column::defaults(self.at_rest.len()); 2];
+        let Some(weight) = &forward.weight else {
+            return (more, by_size);
+        };
+        let (stiffness, limits) = (&forward.stiffness, &forward.limits);
         let terms = terms(pose.place_mm, pose.tilt);
         let size = limited(pose.size / limits.size, 1e-6, 1.0);
         let root = sqrt(size);
@@ -399,7 +394,6 @@ impl Hanging {
         let softness = stiffness.linear_n / per_size_n;
         let softer = -6.0 * stiffness.cubic_n * at * softness / per_size_n;
         let steeper = SIZES as f32 * softness / (2.0 * root * limits.size);
-        let [mut more, mut by_size] = [Column::defaults(self.at_rest.len()); 2];
         let sums = more.iter_mut().zip(by_size.iter_mut());
         let ends = self.at_rest.iter().zip(from.iter().zip(to.iter()));
         for ((more, by_size), (at_rest, (from, to))) in sums.zip(ends) {

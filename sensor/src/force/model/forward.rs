@@ -2,9 +2,9 @@
 
 use super::{ModelError, reader::Reader};
 use crate::force::forward::{
-    Axis, CovarianceGrid, Forward, Gravity, Limits, MOST_DOTS, MOST_FUNCTIONS, MOST_STEPS, Markers,
-    NODES, Noise, Others, RELATIVE, RestImage, SHAPES_COORDINATES, Shapes, Stiffness, Table,
-    Tables, Terms, Weight, weight,
+    Axis, CovarianceGrid, Dot, Forward, Gravity, Limits, MOST_DOTS, MOST_FUNCTIONS, MOST_STEPS,
+    Markers, NODES, Noise, Others, RELATIVE, RestImage, SHAPES_COORDINATES, Shapes, Stiffness,
+    Table, Tables, Terms, Weight, weight,
 };
 use hivtac_terms::list::List;
 #[cfg(any(test, feature = "encode"))]
@@ -140,13 +140,19 @@ fn tables<'a>(reader: &mut Reader<'a>, dots: usize) -> Result<Tables<'a>, ModelE
     let [terms_even, terms_odd] = terms.counts();
     let even = reader.take(4 * functions[0] * terms_even)?;
     let odd = reader.take(4 * functions[1] * terms_odd)?;
+    let from = reader.offset;
     let mut tables = List::default();
     for _ in 0..dots {
-        tables.push(table(reader, count)?);
+        let at = (reader.offset - from) as u32;
+        let slope_units = table(reader, count)?.axes().map(|axis| axis.slope_unit());
+        tables.push(Dot { at, slope_units });
     }
-    Tables::new(terms, [even, odd], tables).ok_or(wrong("functions", "-1 to 1"))
+    let bytes = reader.bytes.get(from..reader.offset).unwrap_or_default();
+    Tables::new(terms, [even, odd], bytes, tables).ok_or(wrong("functions", "-1 to 1"))
 }
 
+/// Not inlined, so that its stack is released on return.
+#[inline(never)]
 fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, ModelError> {
     let offset = reader.offset;
     let wrong = |name, allowed| ModelError::Field {
