@@ -83,7 +83,7 @@ fn frames_of_the_scene_give_the_same_forces() {
 #[test]
 fn frames_without_a_force_give_the_same_reasons() {
     let missing = Options {
-        missing: [false, true, false, false],
+        missing: [false, true, false, false].into(),
         ..Options::default()
     };
     let dark = Options {

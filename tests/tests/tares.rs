@@ -55,7 +55,9 @@ fn built(random: &mut Random) -> Options {
             shift_px: [normal(random, 3.0), normal(random, 3.0)],
             roll_deg: normal(random, 2.0),
         },
-        glued_mm: MARKERS.map(|_| [normal(random, 0.15), normal(random, 0.15)]),
+        glued_mm: MARKERS
+            .map(|_| [normal(random, 0.15), normal(random, 0.15)])
+            .into(),
         lens: Lens {
             pitch_um: Some(2100.0 / (175.0 * longer)),
             blur_px: between(random, 0.0, 1.0),

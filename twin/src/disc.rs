@@ -39,14 +39,6 @@ impl Disc {
         }
     }
 
-    /// Returns the same disc, shifted along x and y, mm.
-    pub(crate) fn moved(&self, [x, y]: [f64; 2]) -> Disc {
-        Disc {
-            centre_mm: [self.centre_mm[0] + x, self.centre_mm[1] + y],
-            ..*self
-        }
-    }
-
     /// Returns the centroid of the disc's image, px, on a film whose points (mm) move by
     /// `displacement`.
     pub fn centroid_px(

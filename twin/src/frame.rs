@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use crate::film::Dots;
 use crate::format::{levels_of_rgb565, levels_of_yuyv, rgb565_of_levels};
 use crate::{Format, Load};
 
@@ -60,7 +61,7 @@ pub struct Truth {
     /// `None` without a force.
     pub touches_mm: Option<[f64; 2]>,
     /// The markers by identity; `None` if a marker is missing or no part of it is in the frame.
-    pub markers: [Option<MarkerTruth>; 4],
+    pub markers: Dots<Option<MarkerTruth>>,
 }
 
 /// The ground truth of one marker's image. Patches over it are not subtracted.

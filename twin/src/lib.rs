@@ -30,6 +30,7 @@
 //! | `exposure` | the place of a disc while its rows are exposed |
 //! | `noise` | seeded sensor noise |
 //! | `format`, `jpeg`, `frame` | RGB565, YUV422, mono and JPEG; the frame and the truth |
+//! | `view` | the motion of a disc, so that the camera sees it where the film has it |
 //! | `mechanics`, `surface` | the film as it is, or simplified |
 //! | `creep` | the film's memory of earlier loads |
 //! | `motion`, `scene` | loads in time; the scene itself |
@@ -60,13 +61,15 @@ mod options;
 mod patch;
 mod scene;
 mod surface;
+mod view;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, PresetCamera};
 pub use creep::{Creep, Memory};
 pub use disc::{Disc, MARKERS};
 pub use error::SceneError;
 pub use film::{
-    Contact, DiscMotion, FilmError, HALF_SIDE_MM, Load, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed,
+    Contact, DiscMotion, Dots, FilmError, HALF_SIDE_MM, Layout, Load, MARKER_RADIUS_MM,
+    MARKER_REST_MM, Pressed,
 };
 pub use format::Format;
 #[cfg(feature = "jpeg")]
@@ -80,3 +83,4 @@ pub use options::{Options, Salt};
 pub use patch::{Paint, Patch, Specks};
 pub use scene::Scene;
 pub use surface::Surface;
+pub use view::{disc_motion, seen_motion};

@@ -2,7 +2,7 @@
 
 use crate::film::DiscMotion;
 use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
-use crate::film::{Film, FilmError, Pressed};
+use crate::film::{Dots, Film, FilmError, Layout, Pressed};
 use crate::{Contact, Creep, Load, SceneError};
 
 /// The parts of the film's answer to a load that a scene uses.
@@ -25,7 +25,7 @@ pub struct Mechanics {
     /// The meaning of labels, for loads that leave it open.
     pub contact: Contact,
     /// The place where the tip first touches, for loads that leave it open: mm from the middle,
-    /// within ±5 (±0.25 if it sticks or slides).
+    /// within ±5 (±8 with another layout, ±0.25 if it sticks or slides).
     pub offset_mm: [f64; 2],
     /// Radius of the disc over which the tip spreads its force, for loads that leave it open, mm,
     /// 0.25 to 2.
@@ -67,21 +67,29 @@ impl Default for Mechanics {
 }
 
 impl Mechanics {
-    /// Returns the film for these settings, with each marker shifted by `markers_mm` from its
-    /// place, by identity, mm.
+    /// Returns the film for these settings, with the dots of a layout, each shifted by `markers_mm`
+    /// from its place, by identity, mm.
     ///
     /// # Errors
     /// If a film differs too much from the nominal one, or a contact is impossible.
-    pub(crate) fn film(&self, markers_mm: [[f64; 2]; 4]) -> Result<Film, SceneError> {
+    pub(crate) fn film(
+        &self,
+        layout: Layout,
+        markers_mm: Dots<[f64; 2]>,
+    ) -> Result<Film, SceneError> {
         if self.down.is_some() && self.stiffness == Stiffness::Linear {
             let why = "a linear film weighs nothing: leave down out, or use computed".to_owned();
             return Err(FilmError::Load(why).into());
+        }
+        if self.stiffness == Stiffness::Linear && layout != Layout::default() {
+            let why = "a linear film has the layout 4 alone: use computed".to_owned();
+            return Err(FilmError::Layout(why).into());
         }
         let film = Film::of(Unit {
             markers_mm,
             ..self.unit
         })?;
-        let film = film.with_down(self.down)?;
+        let film = film.with_down(self.down)?.with_layout(layout)?;
         film.check(&self.completed(&Load::REST.with_contact(self.contact)?))?;
         Ok(film)
     }
@@ -140,13 +148,12 @@ fn scaled(pressed: Pressed, part: f64) -> Pressed {
     Pressed {
         tip_mm: times(pressed.tip_mm),
         force_n: times(pressed.force_n),
-        touches_mm: pressed.touches_mm,
-        centres_mm: pressed.centres_mm,
         discs: pressed.discs.map(|disc| DiscMotion {
             moved_mm: times(disc.moved_mm),
             along_x: times(disc.along_x),
             along_y: times(disc.along_y),
         }),
+        ..pressed
     }
 }
 

@@ -1,5 +1,6 @@
 //! The options of a scene, which make a frame harder or easier than the default.
 
+use crate::film::{Dots, Layout};
 use crate::{Format, Lens, Mechanics, Mounting, Patch, Preset, PresetCamera, SceneError, Shutter};
 use crate::{Paint, Specks};
 
@@ -30,6 +31,8 @@ pub struct Options {
     pub noise: f64,
     /// Pixels that show a colour of their own; different ones in each frame.
     pub salt: Salt,
+    /// The markers at rest: how many, where and how large.
+    pub layout: Layout,
     /// The parts of the film's answer that are used.
     pub film: Mechanics,
     /// Weights, 0 to 1, of red, green and blue in a camera of [`Format::Mono`]. (0, 1, 0) is green
@@ -38,9 +41,9 @@ pub struct Options {
     /// The paint of the markers.
     pub markers: Paint,
     /// Markers (by identity) that came off.
-    pub missing: [bool; 4],
+    pub missing: Dots<bool>,
     /// Each marker's shift from its place (by identity), mm along x and y, −1 to 1 each.
-    pub glued_mm: [[f64; 2]; 4],
+    pub glued_mm: Dots<[f64; 2]>,
     /// Round patches on the film, painted over the markers in this order.
     pub patches: Vec<Patch>,
     /// Red specks all over the film, under the markers.
@@ -80,11 +83,12 @@ impl Default for Options {
                 fraction: 0.0,
                 paint: Paint::Red,
             },
+            layout: Layout::default(),
             film: Mechanics::default(),
             mono: [0.0, 1.0, 0.0],
             markers: Paint::Red,
-            missing: [false; 4],
-            glued_mm: [[0.0; 2]; 4],
+            missing: [false; 4].into(),
+            glued_mm: [[0.0; 2]; 4].into(),
             patches: Vec::new(),
             specks: Specks::default(),
             checkerboard_px: 0,

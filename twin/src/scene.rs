@@ -2,14 +2,14 @@
 
 use crate::coverage::Coverage;
 use crate::exposure::{Exposure, Image};
-use crate::film::{Film, Pressed};
+use crate::film::{Dots, Film, Pressed};
 use crate::frame::Raster;
 use crate::light::{Channel, Light, STEPS};
 use crate::motion::Motion;
 use crate::noise::{LOTS, Noise};
 use crate::{
-    Camera, Disc, Format, Frame, Load, MARKERS, Mechanics, Options, Paint, Preset, SceneError,
-    Shutter, Truth,
+    Camera, Disc, Format, Frame, Load, Mechanics, Options, Paint, Preset, SceneError, Shutter,
+    Truth,
 };
 
 /// A simulated sensor and its load. Frames depend only on the scene and the arguments.
@@ -88,12 +88,12 @@ impl Scene {
     /// motion.
     pub fn with_options(mut self, options: Options) -> Result<Scene, SceneError> {
         options.check()?;
-        self.film = options.film.film(options.glued_mm)?;
+        self.film = options.film.film(options.layout, options.glued_mm)?;
         self.camera = self.camera.fitted(&options.lens, &options.mounting);
         self.light = Light::new(&self.camera, &options, self.seed);
         self.specks = options.specks.discs(self.seed);
         self.noise = Noise::new(options.noise * STEPS, self.seed);
-        let other_film = self.options.film != options.film;
+        let other_film = self.options.film != options.film || self.options.layout != options.layout;
         self.options = options;
         if other_film {
             self.try_motion(&self.motion)?;
@@ -261,18 +261,24 @@ impl Scene {
     }
 
     /// Returns the images of the markers that have not come off.
-    fn marker_images<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>) -> [Option<Image>; 4] {
-        std::array::from_fn(|id| {
-            let there = !self.options.missing[id];
-            there.then(|| exposure.image(&MARKERS[id].moved(self.options.glued_mm[id])))
-        })
+    fn marker_images<L: Fn(f64) -> Load>(&self, exposure: &Exposure<'_, L>) -> Vec<Option<Image>> {
+        let radius_mm = self.options.layout.diameter_mm() / 2.0;
+        let discs = self.film.markers_mm().into_iter().map(|centre_mm| Disc {
+            centre_mm,
+            radius_mm,
+        });
+        let images = discs.enumerate().map(|(id, disc)| {
+            let there = !self.options.missing.at(id);
+            there.then(|| exposure.image(&disc))
+        });
+        images.collect()
     }
 
     /// Returns the picture of film, specks, markers and patches in their light, without noise.
     fn picture<L: Fn(f64) -> Load>(
         &self,
         exposure: &Exposure<'_, L>,
-        markers: &[Option<Image>; 4],
+        markers: &[Option<Image>],
     ) -> Vec<[Channel<i16>; 3]> {
         let mut picture = self.light.bare_film();
         for speck in &self.specks {
@@ -324,7 +330,7 @@ impl Scene {
         &self,
         exposure: &Exposure<'_, L>,
         force: &Load,
-        markers: &[Option<Image>; 4],
+        markers: &[Option<Image>],
     ) -> Truth {
         let Mechanics { creep, .. } = self.options.film;
         let force = self.options.film.completed(force);
@@ -339,7 +345,9 @@ impl Scene {
             on_film_n: touched.force_n,
             tip_mm: exposure.now.tip_mm,
             touches_mm: presses.then_some(touched.touches_mm),
-            markers: std::array::from_fn(|id| markers[id].as_ref()?.truth(&self.camera)),
+            markers: Dots::from_fn(markers.len(), |id| {
+                markers[id].as_ref()?.truth(&self.camera)
+            }),
         }
     }
 }

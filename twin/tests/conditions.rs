@@ -100,7 +100,7 @@ fn salt_is_as_much_as_asked_for_and_elsewhere_in_each_frame() {
             fraction: 0.05,
             paint: Paint::Red,
         },
-        missing: [true; 4],
+        missing: [true; 4].into(),
         ..clear()
     });
     let red = |number| -> Vec<bool> {
@@ -121,7 +121,7 @@ fn specks_lie_on_the_film() {
             count: 200,
             radius_mm: 0.1,
         },
-        missing: [true; 4],
+        missing: [true; 4].into(),
         ..clear()
     });
     let red = redness(&frame).iter().filter(|r| **r > 30.0).count();
@@ -133,7 +133,7 @@ fn specks_lie_on_the_film() {
 fn a_checkerboard_fills_the_picture() {
     let frame = rendered(Options {
         checkerboard_px: 4,
-        missing: [true; 4],
+        missing: [true; 4].into(),
         ..clear()
     });
     near(colour(&frame, 1, 2), [150, 141, 128]);
@@ -145,7 +145,7 @@ fn a_checkerboard_fills_the_picture() {
 fn texture_stays_where_it_is() {
     let uneven = scene(Options {
         texture: 0.1,
-        missing: [true; 4],
+        missing: [true; 4].into(),
         ..clear()
     });
     let frames = [1, 2].map(|number| uneven.render_load(&press(), number).unwrap());

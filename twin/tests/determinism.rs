@@ -68,7 +68,7 @@ fn hard_frames_are_these_bytes_everywhere() {
         gradient: [0.3, -0.2],
         falloff: 0.5,
         noise: 10.0,
-        missing: [false, false, true, false],
+        missing: [false, false, true, false].into(),
         patches: vec![Patch {
             centre_mm: [1.5, -3.0],
             radius_mm: 1.9,

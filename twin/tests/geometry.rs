@@ -3,8 +3,8 @@
 use proptest::prelude::*;
 
 use hivtac_twin::{
-    Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Load, MARKER_REST_MM, Mounting, Options, Preset,
-    Scene, SceneError,
+    Camera, Dots, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, Load, MARKER_REST_MM, Mounting, Options,
+    Preset, Scene, SceneError,
 };
 
 const PRESETS: [Preset; 2] = [Preset::Paper, Preset::Ov7725];
@@ -22,7 +22,7 @@ fn press(force_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
 fn centroids(scene: &Scene, load: Load) -> [[f64; 2]; 4] {
     let camera = *scene.camera();
     let truth = scene.clone().with_load(load).unwrap().truth(0.0);
-    truth.markers.map(|marker| {
+    truth.markers.four().map(|marker| {
         let [x, y] = marker.expect("in the frame").centroid_px;
         [
             x - f64::from(camera.width() - 1) / 2.0,
@@ -151,7 +151,7 @@ fn truth_says_what_is_missing_cut_or_gone() {
         scene.with_load(load).unwrap().truth(0.0).markers
     };
     let missing = Options {
-        missing: [false, true, false, false],
+        missing: [false, true, false, false].into(),
         ..Options::default()
     };
     assert_eq!(
@@ -169,7 +169,7 @@ fn truth_says_what_is_missing_cut_or_gone() {
     // At 0.2 N markers are 91 px from the middle. The upper and the lower border each cut two of
     // them.
     let cut = |down| under(shifted([0.0, down]), press(0.2, 0.0, 0.0)).map(|m| m.unwrap().visible);
-    let is_cut = |parts: [f64; 4]| parts.map(|part| (0.1..0.9).contains(&part));
+    let is_cut = |parts: Dots<f64>| parts.map(|part| (0.1..0.9).contains(&part));
     assert_eq!(is_cut(cut(-24.0)), [true, true, false, false]);
     assert_eq!(is_cut(cut(24.0)), [false, false, true, true]);
     let whole = under(Options::default(), press(0.2, 0.0, 0.0)).map(|m| m.unwrap().visible);

@@ -64,7 +64,7 @@ fn clear() -> Options {
 /// px. The difference from the frame without markers separates each marker from the film.
 fn worst_centroid_error(preset: Preset, size: (u32, u32), options: &Options) -> f64 {
     let bare = Options {
-        missing: [true; 4],
+        missing: [true; 4].into(),
         ..options.clone()
     };
     let mut worst = 0.0_f64;
@@ -121,7 +121,7 @@ fn the_default_threshold_passes_discs_and_nothing_else() {
                 );
             }
             let bare = Options {
-                missing: [true; 4],
+                missing: [true; 4].into(),
                 ..Options::default()
             };
             let film = rendered(preset, size, &bare, &Load::REST);

@@ -66,8 +66,9 @@ fn calibrated() -> Vec<u8> {
 
 fn stretched() -> Unit {
     let told: Value = serde_json::from_str(FILM).unwrap();
+    let glued_mm: [[f64; 2]; 4] = serde_json::from_value(told["glued_mm"].clone()).unwrap();
     let mut options = Options {
-        glued_mm: serde_json::from_value(told["glued_mm"].clone()).unwrap(),
+        glued_mm: glued_mm.into(),
         mounting: Mounting {
             shift_px: serde_json::from_value(told["shift_px"].clone()).unwrap(),
             roll_deg: told["roll_deg"].as_f64().unwrap(),
@@ -87,16 +88,19 @@ fn stretched() -> Unit {
 /// A force, N, and the film under it.
 fn state(told: &Value) -> (f64, Pressed) {
     let force_n: [f64; 3] = serde_json::from_value(told["force_n"].clone()).unwrap();
+    let centres_mm: [[f64; 2]; 4] = serde_json::from_value(told["centres_mm"].clone()).unwrap();
     let discs: [[[f64; 3]; 3]; 4] = serde_json::from_value(told["discs"].clone()).unwrap();
     let pressed = Pressed {
         force_n,
         touches_mm: serde_json::from_value(told["touches_mm"].clone()).unwrap(),
-        centres_mm: serde_json::from_value(told["centres_mm"].clone()).unwrap(),
-        discs: discs.map(|[moved_mm, along_x, along_y]| DiscMotion {
-            moved_mm,
-            along_x,
-            along_y,
-        }),
+        centres_mm: centres_mm.into(),
+        discs: discs
+            .map(|[moved_mm, along_x, along_y]| DiscMotion {
+                moved_mm,
+                along_x,
+                along_y,
+            })
+            .into(),
         ..Pressed::default()
     };
     (force_n[2].abs(), pressed)

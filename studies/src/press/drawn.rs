@@ -42,7 +42,8 @@ impl Drawn {
         let longer = 1.0 + usual(FOCAL);
         let (stiffness, thickness) = (1.0 + usual(STIFFNESS), 1.0 + usual(THICKNESS));
         let posts_mm = std::array::from_fn(|_| [usual(POST_MM), usual(POST_MM)]);
-        let glued_mm = std::array::from_fn(|_| [0, 1].map(|_| drawn(MARKER_MM, MARKER_AT_MOST_MM)));
+        let glued_mm: [[f64; 2]; 4] =
+            std::array::from_fn(|_| [0, 1].map(|_| drawn(MARKER_MM, MARKER_AT_MOST_MM)));
         let [from, to] = TIP_RADIUS_MM;
         Self {
             options: Options {
@@ -55,7 +56,7 @@ impl Drawn {
                     },
                     ..Mechanics::default()
                 },
-                glued_mm,
+                glued_mm: glued_mm.into(),
                 lens: Lens {
                     pitch_um: Some(FOCAL_UM / (focal_px * longer)),
                     ..Lens::default()

@@ -50,7 +50,7 @@ struct Step {
 const STEPS: [Step; 8] = [
     Step {
         caption: "film on its posts",
-        wrong: |options| options.missing = [true; 4],
+        wrong: |options| options.missing = [true; 4].into(),
     },
     Step {
         caption: "lens too near",

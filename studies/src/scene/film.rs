@@ -4,7 +4,7 @@
 use anyhow::Result;
 use clap::{Args, ValueEnum};
 use hivtac_twin::film::Film;
-use hivtac_twin::{Camera, Contact, Load, MARKERS, Preset};
+use hivtac_twin::{Camera, Contact, Disc, Layout, Load, Preset, disc_motion};
 use serde_json::{Value, json};
 
 /// The frame size for the printed pixels.
@@ -38,6 +38,9 @@ pub struct FilmArgs {
     /// nothing.
     #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true, value_parser = numbers::<3>)]
     down: Option<[f64; 3]>,
+    /// The dots: a layout's name (4, 8v).
+    #[arg(long, value_name = "NAME", default_value = "4")]
+    layout: String,
     /// The tables that scenes use, or the finite elements that they were made from.
     #[arg(long, value_enum, default_value_t = Solver::Reduced)]
     solver: Solver,
@@ -66,7 +69,7 @@ struct Answer {
     /// The tip's force on the film, N.
     force_n: [f64; 3],
     /// Mean displacement of each marker over its disc, mm, and the centroid of its image, px.
-    markers: [([f64; 3], [f64; 2]); 4],
+    markers: Vec<([f64; 3], [f64; 2])>,
 }
 
 impl FilmArgs {
@@ -75,9 +78,10 @@ impl FilmArgs {
         let load = load.with_contact(self.contact)?;
         let load = load.with_offset_mm(self.offset_mm)?;
         let camera = Camera::new(self.preset, SIZE[0], SIZE[1])?;
+        let layout: Layout = self.layout.parse()?;
         let answer = match self.solver {
-            Solver::Reduced => reduced(&load, self.down, &camera)?,
-            Solver::Full => full(&load, self.down, &camera)?,
+            Solver::Reduced => self.reduced(&load, &layout, &camera)?,
+            Solver::Full => self.full(&load, &layout, &camera)?,
         };
         if self.json {
             println!("{}", serde_json::to_string_pretty(&answer.to_json())?);
@@ -86,37 +90,52 @@ impl FilmArgs {
         }
         Ok(())
     }
+
+    fn reduced(&self, load: &Load, layout: &Layout, camera: &Camera) -> Result<Answer> {
+        let film = Film::default().with_down(self.down)?.with_layout(*layout)?;
+        film.check(load)?;
+        let pressed = film.press(load);
+        let seen = |disc: &Disc| disc.centroid_px(|rest| pressed.displacement(rest), camera);
+        let moved = pressed.discs.iter().map(|disc| disc.moved_mm);
+        Ok(Answer {
+            tip_mm: pressed.tip_mm,
+            force_n: pressed.force_n,
+            markers: moved.zip(discs(layout).iter().map(seen)).collect(),
+        })
+    }
+
+    fn full(&self, load: &Load, layout: &Layout, camera: &Camera) -> Result<Answer> {
+        use hivtac_shell::{Design, Film, press_load};
+
+        let mut film = Film::new(&Design {
+            down: self.down.unwrap_or_default(),
+            ..Design::default()
+        })?;
+        let state = press_load(&mut film, load)?.state;
+        let moved = |rest| film.displacement(&state, rest);
+        let marker = |disc: &Disc| {
+            (
+                disc_motion(moved, disc).moved_mm,
+                disc.centroid_px(moved, camera),
+            )
+        };
+        Ok(Answer {
+            tip_mm: state.tip_mm,
+            force_n: state.force_n,
+            markers: discs(layout).iter().map(marker).collect(),
+        })
+    }
 }
 
-fn reduced(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> {
-    let film = Film::default().with_down(down)?;
-    film.check(load)?;
-    let pressed = film.press(load);
-    let seen_px = |id: usize| {
-        let rest = MARKERS[id];
-        rest.centroid_px(|rest| pressed.displacement(rest), camera)
+/// Returns a layout's dots.
+fn discs(layout: &Layout) -> Vec<Disc> {
+    let radius_mm = layout.diameter_mm() / 2.0;
+    let centres = layout.centres_mm().into_iter();
+    let disc = |centre_mm| Disc {
+        centre_mm,
+        radius_mm,
     };
-    Ok(Answer {
-        tip_mm: pressed.tip_mm,
-        force_n: pressed.force_n,
-        markers: std::array::from_fn(|id| (pressed.discs[id].moved_mm, seen_px(id))),
-    })
-}
-
-fn full(load: &Load, down: Option<[f64; 3]>, camera: &Camera) -> Result<Answer> {
-    use hivtac_shell::{Design, Film, markers, press_load};
-
-    let mut film = Film::new(&Design {
-        down: down.unwrap_or_default(),
-        ..Design::default()
-    })?;
-    let state = press_load(&mut film, load)?.state;
-    let markers = markers(&film, &state, camera);
-    Ok(Answer {
-        tip_mm: state.tip_mm,
-        force_n: state.force_n,
-        markers: markers.map(|marker| (marker.moved_mm, marker.seen_px)),
-    })
+    centres.map(disc).collect()
 }
 
 impl Answer {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use hivtac_twin::hard_cases::hard_cases;
-use hivtac_twin::{Preset, Scene, Truth};
+use hivtac_twin::{Layout, Options, Preset, Scene, Truth};
 
 use super::canvas::{BLACK, CHARACTER, CYAN, Canvas};
 use super::figures::{SHOWN_S, SIZE};
@@ -20,6 +20,9 @@ pub struct RenderArgs {
     /// The PNG file to write.
     #[arg(long)]
     out: PathBuf,
+    /// The dots instead of the scene's: a layout's name (4, 8v).
+    #[arg(long, value_name = "NAME")]
+    layout: Option<String>,
     /// Draw a cross at the true centroid of every marker, and its identity.
     #[arg(long)]
     overlay: bool,
@@ -40,7 +43,12 @@ impl RenderArgs {
         if let Some(at) = self.at.filter(|at| !at.is_finite() || *at < 0.0) {
             bail!("--at {at}: use seconds from 0 on");
         }
-        let (scene, usual_s) = scene(&self.scene)?;
+        let (mut scene, usual_s) = scene(&self.scene)?;
+        if let Some(name) = &self.layout {
+            let layout: Layout = name.parse()?;
+            let options = scene.options().clone();
+            scene = scene.with_options(Options { layout, ..options })?;
+        }
         let frame = scene.frame(self.number, self.at.unwrap_or(usual_s));
         let mut canvas = Canvas::of_frame(&frame, self.scale);
         if self.overlay {

@@ -19,8 +19,7 @@ const POST_POINTS: usize = 20;
 /// Rings and rays of the points on which a tip presses.
 const TIP_RINGS: usize = 10;
 const TIP_RAYS: usize = 32;
-/// The largest distance from the middle, mm, that a tip's disc may reach within the small cells.
-/// This is a tip of half a millimetre anywhere within ±5 mm, or a larger one a little nearer.
+/// The usual [`Design::tip_reach_mm`]: for a tip of half a millimetre anywhere within ±5 mm.
 const TIP_REACH_MM: f64 = 5.5;
 /// Growth of cells away from posts and tip, mm per mm.
 const GROWTH: f64 = 0.25;
@@ -76,6 +75,9 @@ pub struct Design {
     pub tip_radius_mm: f64,
     /// The place where the tip meets the film at rest, from the centre.
     pub tip_offset_mm: [f64; 2],
+    /// The largest distance from the middle, along x and along y, that a tip's disc reaches within
+    /// the small cells, > 0. A tip beyond it meets larger ones.
+    pub tip_reach_mm: f64,
     /// Fineness of the mesh, 0.25 to 8. 1 is the default mesh; 2 has cells of half the size.
     pub fineness: f64,
     /// Number of cells along half of the edge, 4 to 400; `None` follows the fineness. Films with
@@ -108,6 +110,7 @@ impl Default for Design {
             post_grip_n_per_mm3: 20.0,
             tip_radius_mm: 0.5,
             tip_offset_mm: [0.0; 2],
+            tip_reach_mm: TIP_REACH_MM,
             fineness: 1.0,
             cells: None,
             gauss_points: 3,
@@ -368,7 +371,7 @@ impl Design {
     /// Returns the wanted size of a cell `at` mm from the middle: small in the tip's range and at
     /// the posts.
     fn cell_mm(&self, at: f64) -> f64 {
-        let tip = TIP_CELL_MM + GROWTH * (at - TIP_REACH_MM).max(0.0);
+        let tip = TIP_CELL_MM + GROWTH * (at - self.tip_reach_mm).max(0.0);
         let outside = (at - self.span_mm / 2.0).abs() - self.post_radius_mm;
         let post = POST_CELL_MM + GROWTH * outside.max(0.0);
         tip.min(post).min(LARGEST_CELL_MM) / self.fineness

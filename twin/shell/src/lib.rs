@@ -33,6 +33,7 @@ mod tables;
 mod verification;
 mod view;
 mod weight;
+pub mod whole;
 
 pub use answers::{Change, Response};
 pub use body::{Body, Ends, RIGID_N_PER_MM3, Shape, Touch};

@@ -3,15 +3,14 @@
 
 use hivtac_twin::film::DiscMotion;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose};
-use hivtac_twin::{Camera, MARKERS};
+use hivtac_twin::{Camera, MARKERS, seen_motion};
 
 use crate::path::Path;
-use crate::view::seen_motion;
 use crate::{Change, Contact, Equilibrium, Film, Response, ShellError};
 
 /// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, at which the
 /// film does not move.
-const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
+pub(crate) const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
 /// Rings of tilts: radius in parts of the largest, and the angle of the first of their four tilts,
 /// °.
 const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];

@@ -36,6 +36,7 @@ fn agree(unit: &Unit, loads: &[Load], most_px: f64) {
         }
         for (id, disc) in reduced
             .markers_mm()
+            .four()
             .map(Disc::marker)
             .into_iter()
             .enumerate()
@@ -69,7 +70,7 @@ fn a_film_built_by_hand_is_its_full_solution() {
         thickness: 1.1,
         grip: 1.5,
         posts_mm: [[0.3, -0.2], [-0.3, 0.1], [0.2, 0.3], [0.1, -0.3]],
-        markers_mm: [[0.25, -0.2], [-0.15, 0.3], [0.2, 0.25], [-0.3, -0.1]],
+        markers_mm: [[0.25, -0.2], [-0.15, 0.3], [0.2, 0.25], [-0.3, -0.1]].into(),
     };
     let cases = [
         ([0.01, -0.02, -0.1], [0.5, -0.3], 0.5),
@@ -91,7 +92,7 @@ type Images = [[f64; 2]; 4];
 fn images(down: [f64; 3], loads: &[Load]) -> Vec<[Images; 2]> {
     let weighed = Some(down).filter(|down| *down != [0.0; 3]);
     let reduced = ReducedFilm::default().with_down(weighed).unwrap();
-    let discs = reduced.markers_mm().map(Disc::marker);
+    let discs = reduced.markers_mm().four().map(Disc::marker);
     let design = Design {
         down,
         ..Design::default()

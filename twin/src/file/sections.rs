@@ -3,6 +3,7 @@
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 
+use crate::film::{Dots, Layout};
 use crate::{
     Catch, Drag, Format, Grasp, JPEG_QUALITY, Lens, Load, Mechanics, Motion, Mounting, Options,
     Paint, Patch, Preset, PresetCamera, Press, Salt, Scene, SceneError, Shutter, Specks, Vibration,
@@ -14,6 +15,7 @@ use crate::{
 pub(super) struct SceneFile {
     seed: u64,
     camera: CameraSection,
+    layout: Layout,
     film: Mechanics,
     lens: Lens,
     mounting: Mounting,
@@ -79,7 +81,7 @@ struct NoiseSection {
 struct MarksSection {
     paint: Option<Paint>,
     missing: Vec<u8>,
-    glued_mm: [[f64; 2]; 4],
+    glued_mm: Option<Vec<[f64; 2]>>,
     patch: Vec<Patch>,
     specks: u32,
     speck_radius_mm: f64,
@@ -154,8 +156,9 @@ impl SceneFile {
                 fraction: self.noise.salt,
                 paint: self.noise.salt_paint,
             },
-            missing: self.marks.missing()?,
-            glued_mm: self.marks.glued_mm,
+            missing: self.marks.missing(self.layout.count())?,
+            glued_mm: self.marks.glued_mm(self.layout.count())?,
+            layout: self.layout,
             patches: self.marks.patch.clone(),
             specks: Specks {
                 count: self.marks.specks,
@@ -199,12 +202,25 @@ impl CameraSection {
 }
 
 impl MarksSection {
-    fn missing(&self) -> Result<[bool; 4], SceneError> {
-        match self.missing.iter().find(|id| **id > 3) {
-            None => Ok(std::array::from_fn(|id| self.missing.contains(&(id as u8)))),
+    fn missing(&self, count: usize) -> Result<Dots<bool>, SceneError> {
+        match self.missing.iter().find(|id| usize::from(**id) >= count) {
+            None => Ok(Dots::from_fn(count, |id| {
+                self.missing.contains(&(id as u8))
+            })),
             Some(id) => Err(SceneError::Key {
                 key: "missing",
-                why: format!("there is no marker {id}: use 0 to 3"),
+                why: format!("there is no marker {id}: use 0 to {}", count - 1),
+            }),
+        }
+    }
+
+    fn glued_mm(&self, count: usize) -> Result<Dots<[f64; 2]>, SceneError> {
+        match &self.glued_mm {
+            None => Ok(Dots::from_fn(count, |_| [0.0; 2])),
+            Some(places) if places.len() == count => Ok(Dots::of(places)),
+            Some(places) => Err(SceneError::Key {
+                key: "glued_mm",
+                why: format!("{} shifts: use one for each of {count} dots", places.len()),
             }),
         }
     }
@@ -298,7 +314,7 @@ impl Default for MarksSection {
         MarksSection {
             paint: None,
             missing: Vec::new(),
-            glued_mm: usual.glued_mm,
+            glued_mm: None,
             patch: Vec::new(),
             specks: usual.specks.count,
             speck_radius_mm: usual.specks.radius_mm,

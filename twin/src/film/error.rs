@@ -9,6 +9,8 @@ pub enum FilmError {
     /// A load that is not a number, pulls, or presses the film further than it can go; or a film
     /// that differs too much from the nominal one.
     Load(String),
+    /// Dots that no film can have.
+    Layout(String),
     /// The bytes are not the tables of a film.
     Tables(String),
 }
@@ -17,6 +19,7 @@ impl fmt::Display for FilmError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             FilmError::Load(why) => write!(f, "load: {why}"),
+            FilmError::Layout(why) => write!(f, "layout: {why}"),
             FilmError::Tables(why) => write!(f, "film's tables: {why}"),
         }
     }

@@ -2,45 +2,51 @@
 //!
 //! The film follows the tip by a share that depends only on the place relative to the tip. The
 //! difference that remains at the markers is spread around them. Close to a marker the film moves
-//! as the marker does.
+//! as the marker does. A film by the tables of the whole film moves as they say.
 
-use crate::film::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM, Pressed};
+use crate::film::whole::WholeFilm;
+use crate::film::{Dots, HALF_SIDE_MM, MARKER_REST_MM, Pressed};
 
-/// Within this distance of a marker's centre, mm, the film moves as the marker does. The marker's
-/// rim, drawn as a polygon, is inside.
-const OWN_MM: f64 = 1.05 * MARKER_RADIUS_MM;
-/// Beyond this distance, mm, the motion is the one of tip and markers together.
-const OTHERS_MM: f64 = 2.0;
+/// Within this distance of a marker's centre, in parts of its radius, the film moves as the marker
+/// does. The marker's rim, drawn as a polygon, is inside.
+const OWN: f64 = 1.05;
+/// Beyond this distance, in parts of the radius, the motion is the one of tip and markers together.
+const OTHERS: f64 = 4.0;
 
 pub fn displacement(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
-    let k = nearest(rest_mm);
+    let k = nearest(pressed, rest_mm);
     let centre = pressed.centres_mm[k];
     let from = [rest_mm[0] - centre[0], rest_mm[1] - centre[1]];
     let away = length(from);
     let own = pressed.discs[k].at(from);
-    if away <= OWN_MM {
+    let [own_mm, others_mm] = [OWN, OTHERS].map(|part| part * pressed.radius_mm);
+    if away <= own_mm {
         return own;
     }
-    if away >= OTHERS_MM {
+    if away >= others_mm {
         return rough(pressed, rest_mm);
     }
     let rough = rough(pressed, rest_mm);
-    let part = smooth((away - OWN_MM) / (OTHERS_MM - OWN_MM));
+    let part = smooth((away - own_mm) / (others_mm - own_mm));
     std::array::from_fn(|c| own[c] + part * (rough[c] - own[c]))
 }
 
-fn nearest([x, y]: [f64; 2]) -> usize {
-    match (x >= 0.0, y >= 0.0) {
-        (false, false) => 0,
-        (true, false) => 1,
-        (true, true) => 2,
-        (false, true) => 3,
-    }
+fn nearest(pressed: &Pressed, [x, y]: [f64; 2]) -> usize {
+    let away = |k: &usize| {
+        let [a, b] = pressed.centres_mm[*k];
+        length([x - a, y - b])
+    };
+    let dots = 0..pressed.centres_mm.len();
+    dots.min_by(|a, b| away(a).total_cmp(&away(b)))
+        .unwrap_or_default()
 }
 
 fn rough(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
     // The motion beyond the posts is unknown.
     let place = rest_mm.map(|part| part.clamp(-HALF_SIDE_MM, HALF_SIDE_MM));
+    if let Some(pose) = &pressed.whole {
+        return WholeFilm::nominal().displacement(pose, place);
+    }
     let (of_tip, of_markers) = (share(from_tip(pressed, place)), spread(pressed, place));
     let at_markers = pressed
         .centres_mm
@@ -82,7 +88,7 @@ fn share(place: [f64; 2]) -> f64 {
 
 /// The part of each marker at a place: 1 at the marker itself, 0 at the others, at the tip and at
 /// the film's border.
-fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
+fn spread(pressed: &Pressed, place: [f64; 2]) -> Dots<f64> {
     let near = |from: [f64; 2]| length([place[0] - from[0], place[1] - from[1]]);
     // From the markers outwards the part falls to 0 at the border.
     let border = place.map(|part| {
@@ -96,14 +102,18 @@ fn spread(pressed: &Pressed, place: [f64; 2]) -> [f64; 4] {
         let apart = |from: [f64; 2]| length([centre[0] - from[0], centre[1] - from[1]]);
         let clear =
             smooth((near(pressed.touches_mm) / apart(pressed.touches_mm).max(0.1)).min(1.0));
-        let others = (0..4).filter(|other| *other != k).map(|other| {
-            let other = pressed.centres_mm[other];
-            (near(other) / apart(other)).min(1.0)
-        });
+        let others = (0..pressed.centres_mm.len())
+            .filter(|other| *other != k)
+            .map(|other| {
+                let other = pressed.centres_mm[other];
+                (near(other) / apart(other)).min(1.0)
+            });
         let far = (near(centre) / MARKER_REST_MM).min(2.0);
         clear * others.map(smooth).product::<f64>() * (1.0 - smooth(far / 2.0))
     };
-    std::array::from_fn(|k| weigh(k) * border[0] * border[1])
+    Dots::from_fn(pressed.centres_mm.len(), |k| {
+        weigh(k) * border[0] * border[1]
+    })
 }
 
 /// A smooth step from 0 to 1 with slope 0 at both ends.

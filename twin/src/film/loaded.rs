@@ -2,11 +2,15 @@
 
 use std::sync::{Arc, LazyLock};
 
+use crate::disc::Disc;
 use crate::film::label::{Felt, Reached, Stage};
 use crate::film::reduced::{
-    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit, Weight,
+    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, SMALLEST_RADIUS_MM,
+    Tables, Unit, Weight,
 };
-use crate::film::{Contact, DiscMotion, FilmError, Load, MARKER_CENTRES_MM, field};
+use crate::film::whole::{MAX_TIP_MM, WholeFilm};
+use crate::film::{Contact, DiscMotion, Dots, FilmError, Layout, Load, field};
+use crate::film::{MARKER_CENTRES_MM, MARKER_RADIUS_MM};
 
 /// Half the distance between the posts that hold the film, in mm (the paper's a = 14 mm).
 pub const HALF_SIDE_MM: f64 = 14.0;
@@ -14,7 +18,8 @@ pub const HALF_SIDE_MM: f64 = 14.0;
 pub const MAX_FORCE_N: f64 = 0.25;
 /// The largest ratio of tangential to normal force.
 pub const MAX_RATIO: f64 = 0.8;
-/// The largest distance of a tip's place from the middle, along x and along y, mm.
+/// The largest distance of a tip's place from the middle, along x and along y, mm, on a film with
+/// the nominal dots.
 pub const MAX_PLACE_MM: f64 = 5.0;
 /// The largest label if the tip sticks or slides, N. The force on the film is larger.
 pub const MAX_LABEL_N: f64 = 0.22;
@@ -31,6 +36,7 @@ static NOMINAL: LazyLock<Film> = LazyLock::new(|| {
         tables: Arc::new(tables.expect("the committed tables are a film's")),
         unit: Unit::default(),
         down: None,
+        layout: Layout::default(),
     }
 });
 
@@ -51,6 +57,7 @@ pub struct Film {
     unit: Unit,
     /// Direction of gravity in parts of g; `None` means that the film weighs nothing.
     down: Option<[f64; 3]>,
+    layout: Layout,
 }
 
 impl Default for Film {
@@ -91,6 +98,45 @@ impl Film {
         Ok(Film { down, ..self })
     }
 
+    /// Returns the same film with other dots. Dots other than the nominal ones move by the tables of
+    /// the whole film, which are those of the nominal film: of a unit's own differences they have
+    /// its stiffness and its markers' places.
+    ///
+    /// # Errors
+    /// If the film has another difference from the nominal one, or a weight.
+    pub fn with_layout(self, layout: Layout) -> Result<Film, FilmError> {
+        if layout.is_nominal() {
+            return Ok(Film { layout, ..self });
+        }
+        let nominal = Unit::default();
+        let parts = [
+            ("thickness", self.unit.thickness == nominal.thickness),
+            ("the posts' grip", self.unit.grip == nominal.grip),
+            ("the posts' places", self.unit.posts_mm == nominal.posts_mm),
+            ("down", self.down.is_none()),
+        ];
+        match parts.into_iter().find(|(_, is_nominal)| !is_nominal) {
+            None => Ok(Film { layout, ..self }),
+            Some((part, _)) => Err(FilmError::Layout(format!(
+                "the film differs from the nominal one in {part}, and that is known of the \
+                 layout 4 alone: leave it out, or use the layout 4"
+            ))),
+        }
+    }
+
+    /// Returns the film's dots.
+    pub fn layout(&self) -> &Layout {
+        &self.layout
+    }
+
+    /// Returns the largest distance of a tip's place from the middle, along x and along y, mm.
+    pub fn most_place_mm(&self) -> f64 {
+        match self.layout.is_nominal() {
+            true => MAX_PLACE_MM,
+            false => MAX_TIP_MM,
+        }
+    }
+
     /// Checks that the film can take this load.
     ///
     /// # Errors
@@ -100,6 +146,12 @@ impl Film {
         if !(SMALLEST_RADIUS_MM..=LARGEST_RADIUS_MM).contains(&radius) {
             return Err(FilmError::Load(format!(
                 "the tip's radius is {radius} mm: use {SMALLEST_RADIUS_MM} to {LARGEST_RADIUS_MM}"
+            )));
+        }
+        if !self.layout.is_nominal() && radius != NOMINAL_RADIUS_MM {
+            return Err(FilmError::Load(format!(
+                "the tip's radius is {radius} mm: use {NOMINAL_RADIUS_MM} where the layout is not \
+                 4"
             )));
         }
         if load.magnitude_n() == 0.0 {
@@ -114,7 +166,7 @@ impl Film {
                 "",
             )?;
             for part in load.offset_mm() {
-                within("the tip's offset", part.abs(), MAX_PLACE_MM, "mm")?;
+                within("the tip's offset", part.abs(), self.most_place_mm(), "mm")?;
             }
             return within("|F|", load.magnitude_n(), MAX_FORCE_N, "N");
         }
@@ -148,18 +200,51 @@ impl Film {
         if load.magnitude_n() == 0.0 {
             return Pressed {
                 touches_mm: load.offset_mm(),
-                centres_mm: self.markers_mm(),
-                ..Pressed::default()
+                ..self.at_rest()
             };
         }
         let (pose, force_n) = self.reached(load);
-        let disc = |k| self.tables.disc(&pose, load.tip_radius_mm(), &self.unit, k);
+        let at_rest = self.at_rest();
+        let disc = |k| self.disc(&pose, load, k);
         Pressed {
-            tip_mm: self.tables.tip_mm(&pose, load.tip_radius_mm()),
+            tip_mm: self.tip_mm(&pose, load.tip_radius_mm()),
             force_n,
             touches_mm: pose.place_mm,
-            centres_mm: self.markers_mm(),
-            discs: std::array::from_fn(disc),
+            discs: Dots::from_fn(self.layout.count(), disc),
+            whole: at_rest.whole.map(|_| pose),
+            ..at_rest
+        }
+    }
+
+    /// Returns the film at rest, without its weight.
+    fn at_rest(&self) -> Pressed {
+        let centres_mm = self.markers_mm();
+        Pressed {
+            centres_mm,
+            discs: centres_mm.map(|_| DiscMotion::default()),
+            radius_mm: self.layout.diameter_mm() / 2.0,
+            whole: (!self.layout.is_nominal()).then(Pose::default),
+            ..Pressed::default()
+        }
+    }
+
+    /// Returns the motion of the film around a marker under a load with this pose.
+    fn disc(&self, pose: &Pose, load: &Load, marker: usize) -> DiscMotion {
+        if self.layout.is_nominal() {
+            return (self.tables).disc(pose, load.tip_radius_mm(), &self.unit, marker);
+        }
+        let disc = Disc {
+            centre_mm: self.marker_mm(marker),
+            radius_mm: self.layout.diameter_mm() / 2.0,
+        };
+        WholeFilm::nominal().disc(pose, &disc)
+    }
+
+    /// Returns the displacement of a tip of a radius, mm.
+    fn tip_mm(&self, pose: &Pose, radius_mm: f64) -> [f64; 3] {
+        match self.layout.is_nominal() {
+            true => self.tables.tip_mm(pose, radius_mm),
+            false => WholeFilm::nominal().tip_mm(pose),
         }
     }
 
@@ -176,14 +261,14 @@ impl Film {
         pressed
     }
 
-    /// Returns the motion of the film around one marker, by its identity 0–3. It is the marker's
-    /// part of [`Self::press`], without the other markers and the tip.
+    /// Returns the motion of the film around one marker, by its identity. It is the marker's part
+    /// of [`Self::press`], without the other markers and the tip.
     pub fn marker_motion(&self, load: &Load, marker: usize) -> DiscMotion {
         let mut pose = Pose::default();
         let mut disc = DiscMotion::default();
         if load.magnitude_n() > 0.0 {
             (pose, _) = self.reached(load);
-            disc = (self.tables).disc(&pose, load.tip_radius_mm(), &self.unit, marker);
+            disc = self.disc(&pose, load, marker);
         }
         match self.down {
             None => disc,
@@ -231,9 +316,16 @@ impl Film {
     }
 
     /// Returns the places of the markers' centres at rest, by identity, mm.
-    pub fn markers_mm(&self) -> [[f64; 2]; 4] {
-        let centre = |k: usize, c: usize| MARKER_CENTRES_MM[k][c] + self.unit.markers_mm[k][c];
-        std::array::from_fn(|k| [0, 1].map(|c| centre(k, c)))
+    pub fn markers_mm(&self) -> Dots<[f64; 2]> {
+        Dots::from_fn(self.layout.count(), |k| self.marker_mm(k))
+    }
+
+    fn marker_mm(&self, marker: usize) -> [f64; 2] {
+        let (place, shift) = (
+            self.layout.centres_mm().at(marker),
+            self.unit.markers_mm.at(marker),
+        );
+        [0, 1].map(|c| place[c] + shift[c])
     }
 }
 
@@ -245,7 +337,7 @@ struct Under<'a> {
 
 impl Felt for Under<'_> {
     fn tip_mm(&self, pose: &Pose) -> [f64; 3] {
-        self.film.tables.tip_mm(pose, self.radius_mm)
+        self.film.tip_mm(pose, self.radius_mm)
     }
 
     fn size_of(&self, force_n: f64) -> f64 {
@@ -264,9 +356,14 @@ pub struct Pressed {
     /// the load's offset if the tip slides.
     pub touches_mm: [f64; 2],
     /// The markers' centres at rest, by identity, mm.
-    pub centres_mm: [[f64; 2]; 4],
+    pub centres_mm: Dots<[f64; 2]>,
     /// The motion of the film at the markers, by identity.
-    pub discs: [DiscMotion; 4],
+    pub discs: Dots<DiscMotion>,
+    /// The markers' radius, mm.
+    pub radius_mm: f64,
+    /// The load by which the tables of the whole film give the motion between the markers; `None`
+    /// where it is interpolated.
+    pub whole: Option<Pose>,
 }
 
 impl Default for Pressed {
@@ -276,8 +373,10 @@ impl Default for Pressed {
             tip_mm: [0.0; 3],
             force_n: [0.0; 3],
             touches_mm: [0.0; 2],
-            centres_mm: MARKER_CENTRES_MM,
-            discs: [DiscMotion::default(); 4],
+            centres_mm: MARKER_CENTRES_MM.into(),
+            discs: [DiscMotion::default(); 4].into(),
+            radius_mm: MARKER_RADIUS_MM,
+            whole: None,
         }
     }
 }

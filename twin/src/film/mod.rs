@@ -14,21 +14,27 @@
 //! | `load` | the force on the film and its convention |
 //! | `loaded` | the film of a unit, under a load |
 //! | `label` | the force that a label of the paper's stage means |
-//! | `markers` | where the markers are at rest |
+//! | `markers`, `layout`, `dots` | where the markers are at rest, and one value for each |
 //! | `disc_motion`, `field` | how the film moves at the markers, and roughly between them |
-//! | [`reduced`] | the tables, and what they are made of |
+//! | [`reduced`] | the tables of four markers, and what they are made of |
+//! | [`whole`] | the tables of the whole film |
 
 mod disc_motion;
+mod dots;
 mod error;
 mod field;
 mod label;
+mod layout;
 mod load;
 mod loaded;
 mod markers;
 pub mod reduced;
+pub mod whole;
 
 pub use disc_motion::DiscMotion;
+pub use dots::{Dots, MOST_DOTS};
 pub use error::FilmError;
+pub use layout::Layout;
 pub use load::{Contact, Load};
 pub use loaded::{
     Film, HALF_SIDE_MM, MAX_FORCE_N, MAX_LABEL_N, MAX_OFFSET_MM, MAX_PLACE_MM, MAX_RATIO,

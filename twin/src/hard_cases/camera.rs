@@ -209,7 +209,7 @@ pub(super) fn compressed() -> Vec<HardCase> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Load, Preset};
+    use crate::{Dots, Load, Preset};
 
     #[test]
     fn markers_leave_the_frame_as_far_as_said() {
@@ -219,7 +219,7 @@ mod tests {
                 let case = cases.iter().find(|case| case.name == name).unwrap();
                 let scene = case.scene(preset, 320, 240, 1).unwrap();
                 let rest = scene.render_load(&Load::REST, 0).unwrap();
-                let seen = |markers: [Option<crate::MarkerTruth>; 4]| {
+                let seen = |markers: Dots<Option<crate::MarkerTruth>>| {
                     markers[0].map_or(0.0, |marker| marker.visible)
                 };
                 [seen(rest.truth.markers), seen(scene.truth(0.0).markers)]

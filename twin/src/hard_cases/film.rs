@@ -1,6 +1,7 @@
 //! Hard cases on the film: extra things, and damaged markers.
 
 use super::{Expected, HardCase, patched};
+use crate::film::Dots;
 use crate::{MARKERS, Options, Paint, Patch, Specks};
 
 /// The marker that a case changes: upper right.
@@ -132,7 +133,7 @@ pub(super) fn missing() -> Vec<HardCase> {
             false => Expected::Rejected,
         };
         HardCase::new(name, what, expected, move |_| Options {
-            missing: std::array::from_fn(|id| gone.contains(&id)),
+            missing: Dots::from_fn(4, |id| gone.contains(&id)),
             ..patched(patches.clone())
         })
     };

@@ -69,6 +69,12 @@ type Nodes = Vec<Vec<Vec<f64>>>;
 /// Returns the coefficients of splines through rows of numbers at an axis' nodes, along y and,
 /// within, along x.
 pub fn splines(axis: &Axis, rows: Nodes) -> Nodes {
+    let inverse = inverse(axis);
+    turned(&inverse, &turned(&inverse, &rows))
+}
+
+/// Returns the matrix that makes coefficients of splines from values at an axis' nodes.
+pub fn inverse(axis: &Axis) -> Mat<f64> {
     let count = axis.nodes().len();
     let mut matrix = Mat::<f64>::zeros(count, count);
     for (i, node) in axis.nodes().iter().enumerate() {
@@ -77,10 +83,9 @@ pub fn splines(axis: &Axis, rows: Nodes) -> Nodes {
             matrix[(i, weights.first + k)] = part;
         }
     }
-    let inverse = matrix
+    matrix
         .partial_piv_lu()
-        .solve(Mat::<f64>::identity(count, count));
-    turned(&inverse, &turned(&inverse, &rows))
+        .solve(Mat::<f64>::identity(count, count))
 }
 
 /// Solves along the inner axis, and exchanges the axes.

@@ -114,7 +114,7 @@ fn value(pose: Pose, values: Row) -> Known {
 }
 
 /// A film at rest has derivatives for a load of any tilt.
-fn poses(pose: Pose) -> Vec<Pose> {
+pub fn poses(pose: Pose) -> Vec<Pose> {
     if pose.size > 0.0 {
         return vec![pose];
     }
@@ -153,7 +153,7 @@ fn by_force(mirror: &Mirror, solved: &Solved, of: impl Fn(&Moved) -> Row) -> [Ro
 }
 
 /// Returns slopes by size and tilt from slopes by force.
-fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
+pub fn slopes(pose: &Pose, by_force: &[Row; 3]) -> [Row; 3] {
     let moved = |axis: usize, step: f64| {
         let mut there = *pose;
         match axis {

@@ -8,9 +8,9 @@ use hivtac_twin::film::reduced::{Kind, Tables};
 
 use crate::ShellError;
 use crate::sweep::Solved;
-pub(crate) use fit::{Known, nearest, splines};
+pub(crate) use fit::{Known, inverse, nearest, splines};
 use known::Sweeps;
-pub(crate) use known::same;
+pub(crate) use known::{poses, same, slopes};
 pub(crate) use symmetry::Mirror;
 
 /// Places nearer to each other than this are the same, mm.

@@ -11,7 +11,7 @@ mod terms;
 mod unit;
 mod weight;
 
-pub use axis::Axis;
+pub use axis::{Axis, SPAN};
 pub use pose::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose};
 pub use table::Table;
 pub use tables::{Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Tables, rho};

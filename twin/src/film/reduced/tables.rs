@@ -156,7 +156,7 @@ impl Tables {
         let signs = MARKER_CENTRES_MM[k].map(f64::signum);
         let here = pose.mirrored(signs);
         let own = (parts != [0.0; UNIT_PARTS]).then(|| mirrored(parts, signs));
-        let [x, y] = unit.markers_mm[k];
+        let [x, y] = unit.markers_mm.at(k);
         let disc = match [signs[0] * x, signs[1] * y] {
             [0.0, 0.0] => self.corner_disc(&here, radius_mm, own.as_ref()),
             beside_mm => self.beside(&here, radius_mm, own.as_ref(), beside_mm),

@@ -61,6 +61,19 @@ impl Terms {
         values
     }
 
+    /// Returns the terms' values at a pose in double precision.
+    pub fn exact(&self, pose: &Pose) -> Vec<f64> {
+        let at = Factors::at(pose);
+        let value = |[i, j, k]: [usize; 3]| at.sizes[i] * (at.x[j] * at.y[k]);
+        let powers = self.powers.iter();
+        powers.map(|p| value(p.map(usize::from))).collect()
+    }
+
+    /// Returns each term's powers: of the size, and of the tilt along x and along y.
+    pub fn powers(&self) -> &[[u8; 3]] {
+        &self.powers
+    }
+
     /// Returns the terms' values and their derivatives by size and tilt (1/rad), row by row.
     pub fn rows(&self, pose: &Pose) -> [Vec<f64>; 4] {
         let at = Factors::at(pose);

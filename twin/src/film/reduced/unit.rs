@@ -1,6 +1,6 @@
 //! The differences of one film from the nominal one.
 
-use crate::film::FilmError;
+use crate::film::{Dots, FilmError};
 
 /// A film as it was made, relative to the nominal film.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,9 +16,9 @@ pub struct Unit {
     /// Each post's shift from its nominal place, by the identity of the marker next to it, mm,
     /// within ±1.
     pub posts_mm: [[f64; 2]; 4],
-    /// Shift of each marker's centre from its nominal place, mm, within ±1.
+    /// Shift of each marker's centre from its place, mm, within ±1; 0 where none is given.
     #[cfg_attr(feature = "file", serde(skip))]
-    pub markers_mm: [[f64; 2]; 4],
+    pub markers_mm: Dots<[f64; 2]>,
 }
 
 impl Default for Unit {
@@ -29,7 +29,7 @@ impl Default for Unit {
             thickness: 1.0,
             grip: 1.0,
             posts_mm: [[0.0; 2]; 4],
-            markers_mm: [[0.0; 2]; 4],
+            markers_mm: [[0.0; 2]; 4].into(),
         }
     }
 }
@@ -53,11 +53,15 @@ impl Unit {
             ("the film's thickness", self.thickness, [0.7, 1.3]),
             ("the posts' grip", self.grip, [0.2, 5.0]),
         ];
-        let places = [("a post's", self.posts_mm), ("a marker's", self.markers_mm)];
-        let places = places.into_iter().flat_map(|(what, places)| {
-            let parts = places.into_iter().flatten();
-            parts.map(move |part| (what, part, [-1.0, 1.0]))
-        });
+        let posts = self.posts_mm.map(|place| ("a post's", place));
+        let markers = self
+            .markers_mm
+            .into_iter()
+            .map(|place| ("a marker's", place));
+        let places = posts
+            .into_iter()
+            .chain(markers)
+            .flat_map(|(what, place)| place.map(|part| (what, part, [-1.0, 1.0])));
         for (what, value, [from, to]) in parts.into_iter().chain(places) {
             if !(from..=to).contains(&value) {
                 return Err(FilmError::Load(format!(

@@ -162,7 +162,7 @@ impl Weight {
             }
         }
         let disc = disc(&own);
-        let [bx, by] = unit.markers_mm[k];
+        let [bx, by] = unit.markers_mm.at(k);
         let moved_mm = disc.at([signs[0] * bx, signs[1] * by]);
         super::tables::mirrored_disc(DiscMotion { moved_mm, ..disc }, signs)
     }

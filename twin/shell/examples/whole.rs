@@ -1,0 +1,163 @@
+//! Makes the tables of the whole film and checks them against the full solution.
+//!
+//! `cargo run --release -p hivtac-shell --example whole -- twin/data`
+
+use std::error::Error;
+use std::fs::{File, OpenOptions};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use hivtac_shell::ShellError;
+use hivtac_shell::parallel::in_parallel;
+use hivtac_shell::sweep::octant;
+use hivtac_shell::whole::{self, Errors, Sampled, check_whole};
+use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM};
+use hivtac_twin::film::whole::WholeFilm;
+
+const USAGE: &str = "whole FOLDER [--check] [--threads N] [--functions N]
+Makes FOLDER/whole.bin from solutions in target/whole-RADIUS.bin, which it adds to where they are \
+incomplete.
+--check: hold FOLDER/whole.bin against the full solution instead
+--functions: how many functions of the load it has at most, 1 to 255";
+
+/// Number of functions of the load.
+const FUNCTIONS: usize = 16;
+/// Distances of the tip from the middle within which the tables are checked, mm, and the number of
+/// loads.
+const REACHES_MM: [f64; 3] = [4.0, 6.0, 8.0];
+const LOADS: usize = 40;
+
+fn main() -> ExitCode {
+    // The reader of the output may close it early.
+    sigpipe::reset();
+    match Request::parse(std::env::args().skip(1)).and_then(|request| request.run()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("{why}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// What the command line asks for.
+struct Request {
+    folder: PathBuf,
+    check: bool,
+    threads: usize,
+    functions: usize,
+}
+
+impl Request {
+    fn parse(mut words: impl Iterator<Item = String>) -> Result<Request, Box<dyn Error>> {
+        let mut request = Request {
+            folder: words.next().ok_or(USAGE)?.into(),
+            check: false,
+            threads: 1,
+            functions: FUNCTIONS,
+        };
+        while let Some(word) = words.next() {
+            let mut number = || words.next().and_then(|word| word.parse().ok()).ok_or(USAGE);
+            match word.as_str() {
+                "--check" => request.check = true,
+                "--threads" => request.threads = number()?,
+                "--functions" => request.functions = number()?,
+                _ => return Err(USAGE.into()),
+            }
+        }
+        match request.functions {
+            1..=255 => Ok(request),
+            _ => Err(USAGE.into()),
+        }
+    }
+
+    fn run(&self) -> Result<(), Box<dyn Error>> {
+        let path = self.folder.join("whole.bin");
+        if self.check {
+            return self.look(&path);
+        }
+        let nominal = sampled(NOMINAL_RADIUS_MM, WholeFilm::NODES.places_mm, self.threads)?;
+        let _largest = sampled(LARGEST_RADIUS_MM, &[0.0, 4.0, 8.0], self.threads)?;
+        let bytes = whole::whole(&nominal, self.functions)?;
+        std::fs::write(&path, &bytes)?;
+        println!("{}: {} bytes", path.display(), bytes.len());
+        Ok(())
+    }
+
+    fn look(&self, path: &Path) -> Result<(), Box<dyn Error>> {
+        let film = WholeFilm::from_bytes(&std::fs::read(path)?)?;
+        for reach_mm in REACHES_MM {
+            let task = format!("within {reach_mm} mm");
+            let found = check_whole(&film, reach_mm, LOADS, self.threads, progress(&task))?;
+            println!(
+                "{LOADS} loads within ±{reach_mm} mm, the tip within {:.3} mm",
+                found.worst_tip_mm
+            );
+            for (dots, errors) in [
+                ("dots anywhere", found.anywhere),
+                ("dots near the tip", found.near),
+                ("the four dots", found.four),
+                ("the four dots by their own tables", found.four_by_own),
+            ] {
+                let Errors {
+                    count, worst_px, ..
+                } = errors;
+                let rms_px = errors.rms_px();
+                println!("  {dots}: {count} seen, rms {rms_px:.4} px, at most {worst_px:.3} px");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns all solutions under a tip of a radius. They come from its file; the missing ones are
+/// solved and added to the file.
+fn sampled(
+    radius_mm: f64,
+    half_mm: &[f64],
+    threads: usize,
+) -> Result<Vec<Sampled>, Box<dyn Error>> {
+    let path = PathBuf::from(format!("target/whole-{radius_mm}.bin"));
+    let known = read(&path)?;
+    let is_new = |place: &[f64; 2]| !known.iter().any(|one| one.pose.place_mm == *place);
+    let places: Vec<[f64; 2]> = octant(half_mm).into_iter().filter(is_new).collect();
+    let file = Mutex::new(OpenOptions::new().create(true).append(true).open(&path)?);
+    let unwritten = || ShellError::Solver(format!("{}: cannot be written", path.display()));
+    in_parallel(
+        &whole::design(radius_mm),
+        &places,
+        threads,
+        progress(&format!("tip of {radius_mm} mm")),
+        |film, place| {
+            let sampled = whole::sample_place(film, *place)?;
+            let numbers = sampled.iter().flat_map(Sampled::numbers);
+            let bytes: Vec<u8> = numbers.flat_map(f32::to_le_bytes).collect();
+            let mut file = file.lock().map_err(|_| unwritten())?;
+            file.write_all(&bytes).map_err(|_| unwritten())
+        },
+    )?;
+    read(&path)
+}
+
+fn read(path: &Path) -> Result<Vec<Sampled>, Box<dyn Error>> {
+    let mut bytes = Vec::new();
+    if path.exists() {
+        File::open(path)?.read_to_end(&mut bytes)?;
+    }
+    let numbers = bytes.as_chunks().0.iter();
+    let numbers: Vec<f32> = numbers.map(|four| f32::from_le_bytes(*four)).collect();
+    let records = numbers.chunks(whole::length()).map(Sampled::of_numbers);
+    let all: Option<Vec<Sampled>> = records.collect();
+    all.ok_or_else(|| format!("{}: cut off; delete it", path.display()).into())
+}
+
+/// Shows a counting line.
+fn progress(task: &str) -> impl Fn(usize, usize) + Sync {
+    let (begin, task) = (Instant::now(), task.to_owned());
+    move |done, all| {
+        let left = begin.elapsed().as_secs_f64() * (all - done) as f64 / done as f64;
+        eprintln!("{task}: {done} of {all}, {left:.0} s left");
+    }
+}
