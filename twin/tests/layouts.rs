@@ -102,6 +102,8 @@ fn glue_and_stiffness_are_exact() {
         film: Mechanics {
             unit: Unit {
                 stiffness: 1.5,
+                // The posts of a stiffer film hold it as well if they are stiffer, too.
+                grip: 1.5,
                 ..Unit::default()
             },
             ..Mechanics::default()
@@ -112,6 +114,54 @@ fn glue_and_stiffness_are_exact() {
     assert!(libm::hypot(a[0] - c, a[1] - d) < 1e-9);
 }
 
+/// The four dots by tables of their own: each difference moves them as much in both.
+#[test]
+fn units_and_tips_differ_as_with_the_nominal_dots() {
+    // A fifth dot makes another layout of the same four.
+    let mut centres = hivtac_twin::film::MARKER_CENTRES_MM.to_vec();
+    centres.push([0.0, 7.0]);
+    let layout = Layout::new(&centres, 1.0).unwrap();
+    let load = press(0.12, 5.0, [1.3, -2.1]);
+    let change = |change: &dyn Fn(&mut Mechanics)| {
+        let mut film = Mechanics::default();
+        change(&mut film);
+        let seen = [layout, Layout::default()].map(|layout| {
+            let of = |film: Mechanics| {
+                let options = Options {
+                    layout,
+                    film,
+                    ..Options::default()
+                };
+                scene(options).with_load(load).unwrap().truth(0.0).markers
+            };
+            let pairs = of(film)
+                .four()
+                .into_iter()
+                .zip(of(Mechanics::default()).four());
+            pairs.map(|(changed, usual)| {
+                let [a, b] = [changed, usual].map(|marker| marker.unwrap().centroid_px);
+                [a[0] - b[0], a[1] - b[1]]
+            })
+        });
+        let [whole, own] = seen.map(|moves| moves.collect::<Vec<_>>());
+        let size = own
+            .iter()
+            .flatten()
+            .fold(0.0, |most: f64, part| most.max(part.abs()));
+        assert!(size > 0.1, "{own:?}");
+        for (a, b) in whole.iter().flatten().zip(own.iter().flatten()) {
+            assert!((a - b).abs() < 0.02 + 0.02 * size, "{whole:?} {own:?}");
+        }
+    };
+    change(&|film| film.unit.thickness = 1.1);
+    change(&|film| film.unit.grip = 1.6);
+    change(&|film| film.unit.posts_mm[0] = [0.3, 0.0]);
+    change(&|film| film.unit.posts_mm[1] = [0.0, 0.3]);
+    change(&|film| film.unit.posts_mm[2] = [0.2, -0.3]);
+    change(&|film| film.unit.posts_mm[3] = [-0.2, 0.1]);
+    change(&|film| film.tip_radius_mm = 2.0);
+}
+
 #[test]
 fn what_other_layouts_do_not_have_is_refused_by_name() {
     let refused = |change: &dyn Fn(&mut Options)| {
@@ -120,11 +170,8 @@ fn what_other_layouts_do_not_have_is_refused_by_name() {
         let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
         scene.with_options(options).unwrap_err().to_string()
     };
-    assert!(refused(&|o| o.film.unit.thickness = 1.1).contains("thickness"));
-    assert!(refused(&|o| o.film.unit.grip = 1.1).contains("grip"));
-    assert!(refused(&|o| o.film.unit.posts_mm[0][1] = 0.1).contains("posts' places"));
-    assert!(refused(&|o| o.film.down = Some([0.0, 0.0, 1.0])).contains("down"));
-    assert!(refused(&|o| o.film.tip_radius_mm = 1.0).contains("radius"));
+    assert!(refused(&|o| o.film.down = Some([0.0, 0.0, 1.0])).contains("weight"));
+    assert!(refused(&|o| o.film.tip_radius_mm = 2.5).contains("radius"));
     assert!(refused(&|o| o.film.stiffness = hivtac_twin::Stiffness::Linear).contains("linear"));
     let far = scene(eight()).truth_under(&press(0.1, 0.0, [8.1, 0.0]));
     assert!(far.unwrap_err().to_string().contains("offset is 8.1"));
@@ -158,8 +205,8 @@ fn files_choose_layouts_by_name_or_by_places() {
             ["marks.glued_mm", "8 dots"],
         ),
         (
-            "layout = \"8v\"\n[film.unit]\nthickness = 1.1",
-            ["thickness", "layout 4"],
+            "layout = \"8v\"\n[film]\ndown = [0, 0, 1]",
+            ["weight", "layout 4"],
         ),
     ] {
         let said = read(text).unwrap_err().to_string();

@@ -13,21 +13,25 @@ use std::time::Instant;
 use hivtac_shell::ShellError;
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::octant;
-use hivtac_shell::whole::{self, Errors, Sampled, check_whole};
-use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM};
-use hivtac_twin::film::whole::WholeFilm;
+use hivtac_shell::whole::{self, Errors, Sampled, Samples, WholeCheck, WholeDomain, check_whole};
+use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
+use hivtac_twin::film::whole::{Difference, WholeFilm};
 
-const USAGE: &str = "whole FOLDER [--check] [--threads N] [--functions N]
-Makes FOLDER/whole.bin from solutions in target/whole-RADIUS.bin, which it adds to where they are \
+const USAGE: &str = "whole FOLDER [--check [--loads N]] [--threads N] [--functions N]
+Makes FOLDER/whole.bin and FOLDER/whole-differences.bin from solutions in target/whole-RADIUS.bin, which it adds to where they are \
 incomplete.
 --check: hold FOLDER/whole.bin against the full solution instead
 --functions: how many functions of the load it has at most, 1 to 255";
 
 /// Number of functions of the load.
 const FUNCTIONS: usize = 16;
-/// Distances of the tip from the middle within which the tables are checked, mm, and the number of
-/// loads.
+/// The same for what a film's own differences and another tip add.
+const OF_DIFFERENCES: usize = 8;
+/// Distances of the tip from the middle within which the tables are checked, mm.
 const REACHES_MM: [f64; 3] = [4.0, 6.0, 8.0];
+/// Ranges of the tip's radius, mm.
+const TIPS_MM: [[f64; 2]; 2] = [[SMALLEST_RADIUS_MM, 1.0], [1.0, LARGEST_RADIUS_MM]];
+/// Number of loads of a check.
 const LOADS: usize = 40;
 
 fn main() -> ExitCode {
@@ -46,6 +50,7 @@ fn main() -> ExitCode {
 struct Request {
     folder: PathBuf,
     check: bool,
+    loads: usize,
     threads: usize,
     functions: usize,
 }
@@ -55,6 +60,7 @@ impl Request {
         let mut request = Request {
             folder: words.next().ok_or(USAGE)?.into(),
             check: false,
+            loads: LOADS,
             threads: 1,
             functions: FUNCTIONS,
         };
@@ -62,6 +68,7 @@ impl Request {
             let mut number = || words.next().and_then(|word| word.parse().ok()).ok_or(USAGE);
             match word.as_str() {
                 "--check" => request.check = true,
+                "--loads" => request.loads = number()?,
                 "--threads" => request.threads = number()?,
                 "--functions" => request.functions = number()?,
                 _ => return Err(USAGE.into()),
@@ -79,37 +86,79 @@ impl Request {
             return self.look(&path);
         }
         let nominal = sampled(NOMINAL_RADIUS_MM, WholeFilm::NODES.places_mm, self.threads)?;
-        let _largest = sampled(LARGEST_RADIUS_MM, &[0.0, 4.0, 8.0], self.threads)?;
         let bytes = whole::whole(&nominal, self.functions)?;
-        std::fs::write(&path, &bytes)?;
-        println!("{}: {} bytes", path.display(), bytes.len());
-        Ok(())
+        write(&path, &bytes)?;
+        let places_mm = Difference::Radius(0).nodes().places_mm;
+        let samples = Samples {
+            nominal: &nominal,
+            largest: &sampled(LARGEST_RADIUS_MM, places_mm, self.threads)?,
+        };
+        let bytes = whole::differences(&samples, OF_DIFFERENCES)?;
+        write(&self.folder.join("whole-differences.bin"), &bytes)
     }
 
     fn look(&self, path: &Path) -> Result<(), Box<dyn Error>> {
         let film = WholeFilm::from_bytes(&std::fs::read(path)?)?;
-        for reach_mm in REACHES_MM {
+        for domain in domains() {
+            let WholeDomain {
+                reach_mm,
+                radii_mm: [from, to],
+                unit,
+            } = domain;
+            let loads = self.loads;
             let task = format!("within {reach_mm} mm");
-            let found = check_whole(&film, reach_mm, LOADS, self.threads, progress(&task))?;
+            let found = check_whole(&film, &domain, self.loads, self.threads, progress(&task))?;
             println!(
-                "{LOADS} loads within ±{reach_mm} mm, the tip within {:.3} mm",
+                "{loads} loads within ±{reach_mm} mm, tips of {from} to {to} mm, {unit:?}: the \
+                 tip within {:.3} mm",
                 found.worst_tip_mm
             );
-            for (dots, errors) in [
-                ("dots anywhere", found.anywhere),
-                ("dots near the tip", found.near),
-                ("the four dots", found.four),
-                ("the four dots by their own tables", found.four_by_own),
-            ] {
-                let Errors {
-                    count, worst_px, ..
-                } = errors;
-                let rms_px = errors.rms_px();
-                println!("  {dots}: {count} seen, rms {rms_px:.4} px, at most {worst_px:.3} px");
-            }
+            show(&found);
         }
         Ok(())
     }
+}
+
+/// Returns the loads with which the tables are checked: of the nominal film, of other tips, and of
+/// a film as one builds it by hand.
+fn domains() -> Vec<WholeDomain> {
+    let nominal = REACHES_MM.map(WholeDomain::within);
+    let tips = TIPS_MM.map(|radii_mm| WholeDomain {
+        radii_mm,
+        ..WholeDomain::within(REACHES_MM[1])
+    });
+    let by_hand = WholeDomain {
+        unit: Unit {
+            stiffness: 0.8,
+            thickness: 1.1,
+            grip: 1.5,
+            posts_mm: [[0.3, -0.2], [-0.3, 0.1], [0.2, 0.3], [0.1, -0.3]],
+            ..Unit::default()
+        },
+        ..WholeDomain::within(REACHES_MM[1])
+    };
+    nominal.into_iter().chain(tips).chain([by_hand]).collect()
+}
+
+fn show(found: &WholeCheck) {
+    for (dots, errors) in [
+        ("dots anywhere", found.anywhere),
+        ("dots near the tip", found.near),
+        ("the four dots", found.four),
+        ("the four dots by their own tables", found.four_by_own),
+    ] {
+        let Errors {
+            count, worst_px, ..
+        } = errors;
+        let rms_px = errors.rms_px();
+        println!("  {dots}: {count} seen, rms {rms_px:.4} px, at most {worst_px:.3} px");
+    }
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<(), Box<dyn Error>> {
+    std::fs::write(path, bytes)?;
+    println!("{}: {} bytes", path.display(), bytes.len());
+    Ok(())
 }
 
 /// Returns all solutions under a tip of a radius. They come from its file; the missing ones are

@@ -5,8 +5,7 @@ use std::sync::{Arc, LazyLock};
 use crate::disc::Disc;
 use crate::film::label::{Felt, Reached, Stage};
 use crate::film::reduced::{
-    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, SMALLEST_RADIUS_MM,
-    Tables, Unit, Weight,
+    LARGEST_RADIUS_MM, LARGEST_SIZE, LARGEST_TILT, Pose, SMALLEST_RADIUS_MM, Tables, Unit, Weight,
 };
 use crate::film::whole::{MAX_TIP_MM, WholeFilm};
 use crate::film::{Contact, DiscMotion, Dots, FilmError, Layout, Load, field};
@@ -85,7 +84,7 @@ impl Film {
     /// full solution (`shell/README.md`) at rest and from 20 mN on.
     ///
     /// # Errors
-    /// If `down` is not a unit vector.
+    /// If `down` is not a unit vector, or the dots are not the nominal ones.
     pub fn with_down(self, down: Option<[f64; 3]>) -> Result<Film, FilmError> {
         let length = |[x, y, z]: [f64; 3]| libm::sqrt(x * x + y * y + z * z);
         let length = down.map_or(1.0, length);
@@ -95,33 +94,24 @@ impl Film {
             )));
         }
         let down = down.map(|down| down.map(|part| part / length));
-        Ok(Film { down, ..self })
+        let layout = self.layout;
+        Film { down, ..self }.with_layout(layout)
     }
 
     /// Returns the same film with other dots. Dots other than the nominal ones move by the tables of
-    /// the whole film, which are those of the nominal film: of a unit's own differences they have
-    /// its stiffness and its markers' places.
+    /// the whole film.
     ///
     /// # Errors
-    /// If the film has another difference from the nominal one, or a weight.
+    /// If the film has a weight: what that does is known of the nominal dots alone.
     pub fn with_layout(self, layout: Layout) -> Result<Film, FilmError> {
-        if layout.is_nominal() {
+        if layout.is_nominal() || self.down.is_none() {
             return Ok(Film { layout, ..self });
         }
-        let nominal = Unit::default();
-        let parts = [
-            ("thickness", self.unit.thickness == nominal.thickness),
-            ("the posts' grip", self.unit.grip == nominal.grip),
-            ("the posts' places", self.unit.posts_mm == nominal.posts_mm),
-            ("down", self.down.is_none()),
-        ];
-        match parts.into_iter().find(|(_, is_nominal)| !is_nominal) {
-            None => Ok(Film { layout, ..self }),
-            Some((part, _)) => Err(FilmError::Layout(format!(
-                "the film differs from the nominal one in {part}, and that is known of the \
-                 layout 4 alone: leave it out, or use the layout 4"
-            ))),
-        }
+        Err(FilmError::Layout(
+            "the film has a weight, and what that does is known of the layout 4 alone: leave \
+             down out, or use the layout 4"
+                .to_owned(),
+        ))
     }
 
     /// Returns the film's dots.
@@ -146,12 +136,6 @@ impl Film {
         if !(SMALLEST_RADIUS_MM..=LARGEST_RADIUS_MM).contains(&radius) {
             return Err(FilmError::Load(format!(
                 "the tip's radius is {radius} mm: use {SMALLEST_RADIUS_MM} to {LARGEST_RADIUS_MM}"
-            )));
-        }
-        if !self.layout.is_nominal() && radius != NOMINAL_RADIUS_MM {
-            return Err(FilmError::Load(format!(
-                "the tip's radius is {radius} mm: use {NOMINAL_RADIUS_MM} where the layout is not \
-                 4"
             )));
         }
         if load.magnitude_n() == 0.0 {
@@ -237,14 +221,14 @@ impl Film {
             centre_mm: self.marker_mm(marker),
             radius_mm: self.layout.diameter_mm() / 2.0,
         };
-        WholeFilm::nominal().disc(pose, &disc)
+        WholeFilm::nominal().disc(pose, load.tip_radius_mm(), &self.unit, &disc)
     }
 
     /// Returns the displacement of a tip of a radius, mm.
     fn tip_mm(&self, pose: &Pose, radius_mm: f64) -> [f64; 3] {
         match self.layout.is_nominal() {
             true => self.tables.tip_mm(pose, radius_mm),
-            false => WholeFilm::nominal().tip_mm(pose),
+            false => WholeFilm::nominal().tip_mm(pose, radius_mm, &self.unit),
         }
     }
 

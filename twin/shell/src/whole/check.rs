@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Pose};
+use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::film::whole::WholeFilm;
 use hivtac_twin::film::{Film as FourDots, Load, MAX_PLACE_MM, MAX_RATIO};
 use hivtac_twin::{Camera, Disc, MARKERS, Preset};
@@ -10,7 +10,7 @@ use hivtac_twin::{Camera, Disc, MARKERS, Preset};
 use super::sampled::design;
 use crate::parallel::in_parallel;
 use crate::path::halton;
-use crate::{Contact, Equilibrium, Film, ShellError};
+use crate::{Contact, Design, Equilibrium, Film, ShellError};
 
 /// The random draw: sizes of forces uniformly, tilts and places uniformly over their areas, N.
 const FORCE_N: [f64; 2] = [0.002, 0.25];
@@ -61,26 +61,62 @@ pub struct WholeCheck {
     pub worst_tip_mm: f64,
 }
 
-/// Compares the whole film with its full solution at a number of random loads whose places are
-/// within a reach. Dots that leave the picture do not count.
+/// The films and loads of a comparison.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WholeDomain {
+    /// The largest distance of the tip from the middle along x and along y, mm.
+    pub reach_mm: f64,
+    /// The range of the tip's radius, mm.
+    pub radii_mm: [f64; 2],
+    /// The film's own differences from the nominal one.
+    pub unit: Unit,
+}
+
+impl WholeDomain {
+    /// Returns the loads of the nominal tip on the nominal film.
+    pub fn within(reach_mm: f64) -> WholeDomain {
+        WholeDomain {
+            reach_mm,
+            radii_mm: [NOMINAL_RADIUS_MM; 2],
+            unit: Unit::default(),
+        }
+    }
+}
+
+/// A load of a comparison.
+struct Case {
+    index: usize,
+    force_n: [f64; 3],
+    place_mm: [f64; 2],
+    radius_mm: f64,
+    unit: Unit,
+}
+
+/// Compares the whole film with its full solution at a number of random loads of a domain. Dots
+/// that leave the picture do not count.
 ///
 /// # Errors
 /// If an equilibrium is not found.
 pub fn check_whole(
     whole: &WholeFilm,
-    reach_mm: f64,
+    domain: &WholeDomain,
     loads: usize,
     threads: usize,
     progress: impl Fn(usize, usize) + Sync,
 ) -> Result<WholeCheck, ShellError> {
     let camera = Camera::new(Preset::Ov7725, PICTURE[0], PICTURE[1])?;
-    let cases: Vec<usize> = (0..loads).collect();
-    let design = design(NOMINAL_RADIUS_MM);
-    let found = in_parallel(&design, &cases, threads, progress, |film, index| {
-        let pose = case(*index, reach_mm);
-        film.move_tip(pose.place_mm, NOMINAL_RADIUS_MM)?;
-        let state = film.press(Contact::Force(pose.force_n()), &film.rest())?;
-        compared(whole, film, &state, &pose, &camera, *index)
+    let cases: Vec<Case> = (0..loads).map(|index| case(index, domain)).collect();
+    let mesh = design(NOMINAL_RADIUS_MM);
+    let design = Design {
+        tip_reach_mm: mesh.tip_reach_mm,
+        fineness: mesh.fineness,
+        gauss_points: mesh.gauss_points,
+        ..Design::of(&domain.unit)
+    };
+    let found = in_parallel(&design, &cases, threads, progress, |film, case| {
+        film.move_tip(case.place_mm, case.radius_mm)?;
+        let state = film.press(Contact::Force(case.force_n), &film.rest())?;
+        compared(whole, film, &state, case, &camera)
     })?;
     Ok(found
         .iter()
@@ -109,19 +145,25 @@ fn compared(
     whole: &WholeFilm,
     film: &Film,
     state: &Equilibrium,
-    pose: &Pose,
+    case: &Case,
     camera: &Camera,
-    index: usize,
 ) -> Result<WholeCheck, ShellError> {
+    let Case {
+        place_mm,
+        radius_mm,
+        unit,
+        ..
+    } = case;
+    let pose = &Pose::of_force(case.force_n, *place_mm, unit.bending_and_stretching());
     let mut check = WholeCheck::default();
     let full = |disc: &Disc| disc.centroid_px(|rest| film.displacement(state, rest), camera);
     let told = |disc: &Disc| {
-        let motion = whole.disc(pose, disc);
+        let motion = whole.disc(pose, *radius_mm, unit, disc);
         let [x, y] = disc.centre_mm;
         disc.centroid_px(|rest| motion.at([rest[0] - x, rest[1] - y]), camera)
     };
     let error = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
-    let (anywhere, near) = dots(index, pose.place_mm);
+    let (anywhere, near) = dots(case.index, *place_mm);
     for (discs, errors) in [(anywhere, &mut check.anywhere), (near, &mut check.near)] {
         for disc in &discs {
             let seen = full(disc);
@@ -130,10 +172,10 @@ fn compared(
             }
         }
     }
-    let own = pose.place_mm.iter().all(|part| part.abs() <= MAX_PLACE_MM);
+    let own = place_mm.iter().all(|part| part.abs() <= MAX_PLACE_MM);
     if own {
-        let load = Load::from_vector(pose.force_n())?.with_offset_mm(pose.place_mm)?;
-        let pressed = FourDots::default().press(&load);
+        let load = Load::from_vector(case.force_n)?.with_offset_mm(*place_mm)?;
+        let pressed = FourDots::of(*unit)?.press(&load.with_tip_radius_mm(*radius_mm)?);
         for disc in &MARKERS {
             let seen = full(disc);
             if is_seen(seen) {
@@ -143,7 +185,7 @@ fn compared(
             }
         }
     }
-    let tip = whole.tip_mm(pose);
+    let tip = whole.tip_mm(pose, *radius_mm, unit);
     let off = (0..3).map(|c| (tip[c] - state.tip_mm[c]).powi(2));
     check.worst_tip_mm = off.sum::<f64>().sqrt();
     Ok(check)
@@ -177,7 +219,7 @@ fn dots(index: usize, tip_mm: [f64; 2]) -> (Vec<Disc>, Vec<Disc>) {
 }
 
 /// Returns a load, from a sequence that fills the range evenly.
-fn case(index: usize, reach_mm: f64) -> Pose {
+fn case(index: usize, domain: &WholeDomain) -> Case {
     let part = |base| halton(index + 2000, base);
     let force_n = FORCE_N[0] + (FORCE_N[1] - FORCE_N[0]) * part(2);
     let (tilt, turn) = ((MAX_RATIO * part(3).sqrt()).atan(), TAU * part(5));
@@ -187,6 +229,13 @@ fn case(index: usize, reach_mm: f64) -> Pose {
         sideways * turn.sin(),
         -force_n * tilt.cos(),
     ];
-    let place = [7, 11].map(|base| reach_mm * (2.0 * part(base) - 1.0));
-    Pose::of_force(force, place, [1.0; 2])
+    let place = [7, 11].map(|base| domain.reach_mm * (2.0 * part(base) - 1.0));
+    let [from, to] = domain.radii_mm;
+    Case {
+        index,
+        force_n: force,
+        place_mm: place,
+        radius_mm: from + (to - from) * part(13),
+        unit: domain.unit,
+    }
 }

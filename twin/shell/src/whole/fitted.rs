@@ -1,7 +1,6 @@
 //! The terms and the splines of the whole film's motion, from its samples.
 
 use faer::prelude::*;
-use hivtac_twin::film::reduced::Axis;
 use hivtac_twin::film::whole::{LoadFunctions, MAX_POINT_MM, MAX_TIP_MM, Nodes, WholeFilm};
 
 use super::functions::{Parts, functions};
@@ -15,9 +14,9 @@ const AWAY_COUNTS: f64 = 0.7;
 const FAR_COUNTS: f64 = 1e-3;
 
 /// Motions at one place of the tip: the coefficients of terms, by number of the row and term.
-struct Fitted {
-    place_mm: [f64; 2],
-    coefficients: Vec<f64>,
+pub struct Fitted {
+    pub place_mm: [f64; 2],
+    pub coefficients: Vec<f64>,
 }
 
 /// Returns the bytes of the whole film's tables, with at most `count` functions of the load.
@@ -31,9 +30,12 @@ pub fn whole(sampled: &[Sampled], count: usize) -> Result<Vec<u8>, ShellError> {
         fit(sampled, place_mm)
     });
     let fitted: Vec<Fitted> = fitted.collect::<Result<_, _>>()?;
-    let columns: Vec<_> = fitted.iter().flat_map(weighted).collect();
+    let columns: Vec<_> = fitted
+        .iter()
+        .flat_map(|one| weighted(&nodes, one))
+        .collect();
     let functions = functions(&columns, count)?;
-    let octant = splined(&nodes, &functions, &fitted);
+    let octant = over_octant(&nodes, &functions, &at_places(&nodes, &functions, &fitted));
     Ok(WholeFilm::to_bytes(&functions, &octant))
 }
 
@@ -73,13 +75,14 @@ fn fit(sampled: &[Sampled], place_mm: [f64; 2]) -> Result<Fitted, ShellError> {
     })
 }
 
-fn rate(sampled: &Sampled, change: Change) -> &[f32] {
+/// Returns a solution's derivative by a change.
+pub fn rate(sampled: &Sampled, change: Change) -> &[f32] {
     let place = changes().position(|one| one == change);
     place.map_or(&[], |k| &sampled.rates[k])
 }
 
 /// Returns a row of motions mirrored.
-fn mirrored(mirror: &Mirror, row: &[f32]) -> Vec<f64> {
+pub fn mirrored(mirror: &Mirror, row: &[f32]) -> Vec<f64> {
     let count = nodes_mm().len();
     let middle = (count - 1) as f64 / 2.0;
     let mut seen = vec![0.0; row.len()];
@@ -96,18 +99,19 @@ fn mirrored(mirror: &Mirror, row: &[f32]) -> Vec<f64> {
 }
 
 /// Returns each motion's coefficients with its weight among all.
-fn weighted(fitted: &Fitted) -> Vec<(Vec<f64>, f64)> {
+pub fn weighted(nodes: &Nodes, fitted: &Fitted) -> Vec<(Vec<f64>, f64)> {
     let count = LoadFunctions::terms().count();
     let rows = fitted.coefficients.chunks(count).enumerate();
-    rows.map(|(k, row)| (row.to_vec(), weight(fitted.place_mm, k)))
+    rows.map(|(k, row)| (row.to_vec(), weight(nodes, fitted.place_mm, k)))
         .collect()
 }
 
 /// Returns the weight of a number of the row: of the square root of the area around its point, and
 /// nearly none where no dot may be.
-fn weight(place_mm: [f64; 2], number: usize) -> f64 {
+fn weight(nodes: &Nodes, place_mm: [f64; 2], number: usize) -> f64 {
     let component = if number % 3 == 2 { AWAY_COUNTS } else { 1.0 };
-    let nodes = nodes_mm();
+    let [_, axis] = nodes.axes();
+    let nodes = axis.nodes();
     let Some(point) = (number / 3).checked_sub(1) else {
         return component;
     };
@@ -123,26 +127,24 @@ fn weight(place_mm: [f64; 2], number: usize) -> f64 {
     component * (width(along[0]) * width(along[1])).sqrt()
 }
 
-/// Returns the splines' coefficients at the places of the octant, by place, function and number of
-/// the row.
-fn splined(nodes: &Nodes, functions: &LoadFunctions, fitted: &[Fitted]) -> Vec<f32> {
+/// Returns each place's rows of splines over the distance from the tip, by function.
+pub fn at_places(
+    nodes: &Nodes,
+    functions: &LoadFunctions,
+    fitted: &[Fitted],
+) -> Vec<Vec<Vec<f64>>> {
     let parts = Parts::of(functions.coefficients());
-    let [places, around] = nodes.axes();
+    let [_, around] = nodes.axes();
     let around = inverse(&around);
     let terms = LoadFunctions::terms().count();
     let of_place = |fitted: &Fitted| -> Vec<Vec<f64>> {
-        let rows = fitted
-            .coefficients
-            .chunks(terms)
-            .map(|row| parts.in_motion(row));
-        let rows: Vec<Vec<f64>> = rows.collect();
+        let rows = fitted.coefficients.chunks(terms);
+        let rows: Vec<Vec<f64>> = rows.map(|row| parts.in_motion(row)).collect();
         let of = |k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
-        (0..functions.count())
-            .map(|k| smooth(&around, &of(k)))
-            .collect()
+        let functions = 0..functions.count();
+        functions.map(|k| smooth(&around, &of(k))).collect()
     };
-    let octant: Vec<Vec<Vec<f64>>> = fitted.iter().map(of_place).collect();
-    over_places(nodes, functions, &places, &octant)
+    fitted.iter().map(of_place).collect()
 }
 
 /// Returns a row with the coefficients of splines through its points.
@@ -162,14 +164,32 @@ fn smooth(inverse: &Mat<f64>, row: &[f64]) -> Vec<f64> {
     found
 }
 
-/// Returns the coefficients of splines over the places, from rows at those of the octant.
-fn over_places(
-    nodes: &Nodes,
-    functions: &LoadFunctions,
-    places: &Axis,
-    octant: &[Vec<Vec<f64>>],
-) -> Vec<f32> {
-    let inverse = inverse(places);
+/// Returns the coefficients of splines over all places, from rows at all of them, along y and,
+/// within, along x.
+pub fn over_all(nodes: &Nodes, rows: &[Vec<Vec<f64>>]) -> Vec<f32> {
+    let [places, _] = nodes.axes();
+    let inverse = inverse(&places);
+    let count = inverse.nrows();
+    let mut all = Vec::new();
+    for place in 0..count * count {
+        let mut sum = vec![0.0; rows[0].len() * rows[0][0].len()];
+        for (from, own) in rows.iter().enumerate() {
+            let part =
+                inverse[(place % count, from % count)] * inverse[(place / count, from / count)];
+            for (sum, value) in sum.iter_mut().zip(own.iter().flatten()) {
+                *sum += part * value;
+            }
+        }
+        all.extend(sum.into_iter().map(|value| value as f32));
+    }
+    all
+}
+
+/// Returns the coefficients of splines at the places of the octant, from rows there, by place,
+/// function and number of the row.
+pub fn over_octant(nodes: &Nodes, functions: &LoadFunctions, octant: &[Vec<Vec<f64>>]) -> Vec<f32> {
+    let [places, _] = nodes.axes();
+    let inverse = inverse(&places);
     let half = nodes.places_mm.len() - 1;
     let mut all = Vec::new();
     for place in nodes.octant() {

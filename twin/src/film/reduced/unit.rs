@@ -36,7 +36,7 @@ impl Default for Unit {
 
 impl Unit {
     /// Returns the factors of bending and stretching stiffness over the nominal film's.
-    pub(crate) fn bending_and_stretching(&self) -> [f64; 2] {
+    pub fn bending_and_stretching(&self) -> [f64; 2] {
         let Unit {
             stiffness: e,
             thickness: t,
@@ -72,8 +72,9 @@ impl Unit {
         Ok(())
     }
 
-    /// Returns the factors of the film's tables: see [`super::tables::UNIT_PARTS`].
-    pub(super) fn parts(&self) -> [f64; 10] {
+    /// Returns the factors of the film's tables: the logarithms of thickness and of grip over
+    /// stiffness, then the posts' shifts.
+    pub(crate) fn parts(&self) -> [f64; 10] {
         let grip = libm::log(self.grip / self.stiffness);
         let thickness = libm::log(self.thickness);
         let [a, b, c, d] = self.posts_mm;

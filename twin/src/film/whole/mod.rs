@@ -1,21 +1,25 @@
-//! The motion of any part of the nominal film under the nominal tip, by tables made from full
-//! solutions.
+//! The motion of any part of the film, by tables made from full solutions.
 //!
 //! The tables are over the tip's place and over the distance from the tip: at one distance the
 //! film's motion hardly changes with the place, while at one place of the film it changes quickly
 //! as the tip comes near. A load enters by a few functions of its size and tilt that are common to
 //! all places.
 
+mod differences;
 mod functions;
 mod table;
 
+pub use differences::{Difference, Differences};
 pub use functions::{LoadFunctions, Mirrored};
+use table::Window;
 pub use table::{Nodes, Table};
 
 use std::sync::LazyLock;
 
+use differences::Part;
+
 use crate::disc::Disc;
-use crate::film::reduced::Pose;
+use crate::film::reduced::{NOMINAL_RADIUS_MM, Pose, Unit};
 use crate::film::{DiscMotion, FilmError};
 use crate::view;
 
@@ -74,39 +78,121 @@ impl WholeFilm {
         &NOMINAL
     }
 
-    /// Returns the tip's displacement, mm.
-    pub fn tip_mm(&self, pose: &Pose) -> [f64; 3] {
-        let (_, weights) = self.weights(pose);
-        self.table.tip_mm(&weights)
+    /// Returns the displacement of a tip of a radius on a unit's film, mm.
+    pub fn tip_mm(&self, pose: &Pose, radius_mm: f64, unit: &Unit) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for share in self.shares(pose, radius_mm, unit) {
+            add(&mut sum, share.back(share.table.tip_mm(&share.weights)));
+        }
+        sum
     }
 
-    /// Returns the displacement, mm, of the point of the film's camera side that rests at (x, y)
-    /// mm.
+    /// Returns the displacement, mm, of the point of the nominal film's camera side that rests at
+    /// (x, y) mm, under the nominal tip.
     pub fn displacement(&self, pose: &Pose, point_mm: [f64; 2]) -> [f64; 3] {
-        let (tip, weights) = self.weights(pose);
-        let from_tip = [0, 1].map(|c| point_mm[c] - tip[c]);
-        self.table.window(&weights, from_tip, 0.0).at(from_tip)
+        let share = self.own(pose);
+        let from_tip = share.away_mm(point_mm);
+        share
+            .table
+            .window(&share.weights, from_tip, 0.0)
+            .at(from_tip)
     }
 
-    /// Returns the motion of the film over a disc.
-    pub fn disc(&self, pose: &Pose, disc: &Disc) -> DiscMotion {
-        let (tip, weights) = self.weights(pose);
-        let from_tip = |[x, y]: [f64; 2]| [x - tip[0], y - tip[1]];
-        let within = OUTSIDE * disc.radius_mm;
-        let window = (self.table).window(&weights, from_tip(disc.centre_mm), within);
-        view::seen_motion(
-            |point| window.at(from_tip(point)),
-            disc,
-            view::paper_camera(),
-        )
+    /// Returns the motion over a disc of a unit's film under a tip of a radius.
+    pub fn disc(&self, pose: &Pose, radius_mm: f64, unit: &Unit, disc: &Disc) -> DiscMotion {
+        let shares = self.shares(pose, radius_mm, unit);
+        let windows: Vec<_> = shares.iter().map(|share| share.window(disc)).collect();
+        let moved = |point| {
+            let mut sum = [0.0; 3];
+            for (share, window) in shares.iter().zip(&windows) {
+                add(&mut sum, share.back(window.at(share.away_mm(point))));
+            }
+            sum
+        };
+        view::seen_motion(moved, disc, view::paper_camera())
     }
 
-    /// Returns the tip's place, mm, within the table's limits, and the weights of rows.
-    fn weights(&self, pose: &Pose) -> ([f64; 2], table::Weights) {
-        let tip = pose
-            .place_mm
-            .map(|part| part.clamp(-MAX_TIP_MM, MAX_TIP_MM));
-        (tip, self.table.weights(tip, &self.functions.values(pose)))
+    /// Returns all tables whose sum is the motion of a unit's film under a tip of a radius.
+    fn shares(&self, pose: &Pose, radius_mm: f64, unit: &Unit) -> Vec<Share<'_>> {
+        let own = std::iter::once(self.own(pose));
+        if radius_mm == NOMINAL_RADIUS_MM && unit.parts().iter().all(|part| *part == 0.0) {
+            return own.collect();
+        }
+        let parts = Differences::nominal().parts(unit, radius_mm);
+        own.chain(parts.iter().map(|part| Share::of(part, pose)))
+            .collect()
+    }
+
+    /// Returns the nominal film's share.
+    fn own(&self, pose: &Pose) -> Share<'_> {
+        let part = Part {
+            table: &self.table,
+            functions: &self.functions,
+            factor: 1.0,
+            swap: false,
+            signs: [1.0; 2],
+        };
+        Share::of(&part, pose)
+    }
+}
+
+/// A table's share of a motion under a load.
+struct Share<'a> {
+    table: &'a Table,
+    weights: table::Weights,
+    /// The tip's place, in the film that the table is seen in, mm.
+    tip_mm: [f64; 2],
+    swap: bool,
+    signs: [f64; 2],
+}
+
+impl<'a> Share<'a> {
+    fn of(part: &Part<'a>, pose: &Pose) -> Share<'a> {
+        let limit = |part: f64| part.clamp(-MAX_TIP_MM, MAX_TIP_MM);
+        let mirrored = pose.mirrored(part.signs);
+        let seen = if part.swap {
+            mirrored.swapped()
+        } else {
+            mirrored
+        };
+        let tip_mm = seen.place_mm.map(limit);
+        let values = part.functions.values(&seen);
+        let values: Vec<f64> = values
+            .into_iter()
+            .map(|value| part.factor * value)
+            .collect();
+        Share {
+            table: part.table,
+            weights: part.table.weights(tip_mm, &values),
+            tip_mm,
+            swap: part.swap,
+            signs: part.signs,
+        }
+    }
+
+    /// Returns the motions around a disc.
+    fn window(&self, disc: &Disc) -> Window<'a> {
+        let from_tip = self.away_mm(disc.centre_mm);
+        (self.table).window(&self.weights, from_tip, OUTSIDE * disc.radius_mm)
+    }
+
+    /// Returns a point's distance from the tip, in the film that the table is seen in.
+    fn away_mm(&self, point_mm: [f64; 2]) -> [f64; 2] {
+        let [x, y] = [0, 1].map(|c| self.signs[c] * point_mm[c]);
+        let [x, y] = if self.swap { [y, x] } else { [x, y] };
+        [x - self.tip_mm[0], y - self.tip_mm[1]]
+    }
+
+    /// Returns a motion of the film that the table is seen in as one of the film itself.
+    fn back(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        let [x, y] = if self.swap { [y, x] } else { [x, y] };
+        [self.signs[0] * x, self.signs[1] * y, z]
+    }
+}
+
+fn add(sum: &mut [f64; 3], more: [f64; 3]) {
+    for (sum, more) in sum.iter_mut().zip(more) {
+        *sum += more;
     }
 }
 
@@ -156,12 +242,16 @@ mod tests {
             let pose = Pose::of_force(force_n, place_mm, [1.0; 2]);
             let film = WholeFilm::nominal();
             for (centre_mm, disc) in MARKER_CENTRES_MM.into_iter().zip(pressed.discs) {
-                let moved = film.disc(&pose, &Disc::marker(centre_mm));
+                let moved = film.disc(&pose, 0.5, &Unit::default(), &Disc::marker(centre_mm));
                 close(moved.moved_mm, disc.moved_mm, 0.01);
                 close(moved.along_x, disc.along_x, 0.02);
                 close(moved.along_y, disc.along_y, 0.02);
             }
-            close(film.tip_mm(&pose), pressed.tip_mm, 0.01);
+            close(
+                film.tip_mm(&pose, 0.5, &Unit::default()),
+                pressed.tip_mm,
+                0.01,
+            );
         }
     }
 
@@ -169,12 +259,12 @@ mod tests {
     fn a_disc_moves_as_its_points_do() {
         let (film, load) = (WholeFilm::nominal(), pose([0.1, 0.3], [-7.1, 2.0]));
         let disc = Disc::marker([-6.4, 2.3]);
-        let motion = film.disc(&load, &disc);
+        let motion = film.disc(&load, 0.5, &Unit::default(), &disc);
         for at in [[0.0, 0.0], [0.3, 0.0], [0.0, -0.4]] {
             let point = [disc.centre_mm[0] + at[0], disc.centre_mm[1] + at[1]];
             close(motion.at(at), film.displacement(&load, point), 0.05);
         }
-        let nothing = film.disc(&Pose::default(), &disc);
+        let nothing = film.disc(&Pose::default(), 0.5, &Unit::default(), &disc);
         close(nothing.moved_mm, [0.0; 3], 1e-12);
     }
 

@@ -151,7 +151,19 @@ impl Table {
         sized.chain(steps.flat_map(i16::to_le_bytes)).collect()
     }
 
-    /// Takes a table from the front of a file's bytes.
+    /// Makes a table from the coefficients at all places, by place along y, place along x, function
+    /// and number of the row.
+    pub fn of_all(nodes: &Nodes, functions: &LoadFunctions, rows: Vec<f32>) -> Table {
+        let [places, around] = nodes.axes();
+        Table {
+            places,
+            around,
+            functions: functions.count(),
+            rows,
+        }
+    }
+
+    /// Takes a table of an octant's places from the front of a file's bytes.
     ///
     /// # Errors
     /// If the bytes end too early.
@@ -160,24 +172,22 @@ impl Table {
         functions: &LoadFunctions,
         bytes: &mut &[u8],
     ) -> Result<Table, FilmError> {
-        let (row, count) = (nodes.row(), functions.count());
-        let sizes = 4 * count * COMPONENTS;
-        let length = sizes + 2 * nodes.octant().count() * count * row;
-        let Some((own, rest)) = bytes.split_at_checked(length) else {
-            return Err(FilmError::Tables(format!(
-                "a table of {length} bytes is cut off after {}: make the file anew",
-                bytes.len()
-            )));
-        };
-        *bytes = rest;
-        let (sizes, steps) = own.split_at(sizes);
-        let sizes = sizes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
-        let sizes: Vec<f32> = sizes.collect();
-        let steps = steps.as_chunks().0.iter().map(|b| i16::from_le_bytes(*b));
-        let octant = steps.enumerate().map(|(k, step)| {
-            f32::from(step) * sizes[(k / row) % count * COMPONENTS + k % COMPONENTS]
-        });
-        Ok(Table::new(nodes, functions, &octant.collect::<Vec<_>>()))
+        let octant = read(nodes, functions.count(), nodes.octant().count(), bytes)?;
+        Ok(Table::new(nodes, functions, &octant))
+    }
+
+    /// Takes a table of all places from the front of a file's bytes.
+    ///
+    /// # Errors
+    /// If the bytes end too early.
+    pub fn take_all(
+        nodes: &Nodes,
+        functions: &LoadFunctions,
+        bytes: &mut &[u8],
+    ) -> Result<Table, FilmError> {
+        let full = 2 * nodes.places_mm.len() - 1;
+        let rows = read(nodes, functions.count(), full * full, bytes)?;
+        Ok(Table::of_all(nodes, functions, rows))
     }
 
     /// Returns the count of numbers of a row.
@@ -238,6 +248,33 @@ impl Table {
             values,
         }
     }
+}
+
+/// Takes the coefficients at a number of places from the front of a file's bytes.
+fn read(
+    nodes: &Nodes,
+    functions: usize,
+    places: usize,
+    bytes: &mut &[u8],
+) -> Result<Vec<f32>, FilmError> {
+    let row = nodes.row();
+    let sizes = 4 * functions * COMPONENTS;
+    let length = sizes + 2 * places * functions * row;
+    let Some((own, rest)) = bytes.split_at_checked(length) else {
+        return Err(FilmError::Tables(format!(
+            "a table of {length} bytes is cut off after {}: make the file anew",
+            bytes.len()
+        )));
+    };
+    *bytes = rest;
+    let (sizes, steps) = own.split_at(sizes);
+    let sizes = sizes.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b));
+    let sizes: Vec<f32> = sizes.collect();
+    let steps = steps.as_chunks().0.iter().map(|b| i16::from_le_bytes(*b));
+    let values = steps.enumerate().map(|(k, step)| {
+        f32::from(step) * sizes[(k / row) % functions * COMPONENTS + k % COMPONENTS]
+    });
+    Ok(values.collect())
 }
 
 impl Window<'_> {
