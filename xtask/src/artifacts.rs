@@ -50,16 +50,16 @@ impl Programs {
             copy(&elf, &bugs.join(name).with_extension("elf"))
         };
         for bug in SEEDED_BUGS.split(' ') {
-            keep(firmware_command(Board::Weact, bug), bug)?;
+            keep(with_bug(Board::Weact, bug)?, bug)?;
         }
         let mut yuv422 = firmware_command(Board::Weact, "");
         yuv422.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
         keep(yuv422, "yuv422")?;
-        for bug in ["", "bug-polarity", "bug-camera-register"] {
-            let name = format!("openmv-h7-{bug}");
-            let command = firmware_command(Board::OpenmvH7, bug);
-            keep(command, name.trim_end_matches('-'))?;
+        for bug in ["bug-polarity", "bug-camera-register"] {
+            let command = with_bug(Board::OpenmvH7, bug)?;
+            keep(command, &format!("openmv-h7-{bug}"))?;
         }
+        keep(firmware_command(Board::OpenmvH7, ""), "openmv-h7")?;
         // Last, because cargo's own file must be the firmware without a bug.
         let firmware = firmware(Board::Weact)?;
         Ok(Programs { firmware, bugs })
@@ -85,6 +85,24 @@ pub fn firmware_command(board: Board, feature: &str) -> Command {
         command.args(["--no-default-features", "--features", "board-openmv-h7"]);
     }
     command
+}
+
+/// The cargo command that builds the firmware with a seeded bug, which is never flashed. It lints
+/// as builds for this computer do.
+fn with_bug(board: Board, bug: &str) -> Result<Command> {
+    let mut command = firmware_command(board, bug);
+    if LINTING.load(Ordering::Relaxed) {
+        toolchain::lint_for_target(&mut command)?;
+    }
+    Ok(command)
+}
+
+/// The cargo commands that build what lints of the microcontroller's programs check: a firmware of
+/// the tests for each board, and the image for QEMU.
+pub fn for_target() -> [Command; 3] {
+    let [weact, openmv] =
+        [Board::Weact, Board::OpenmvH7].map(|board| firmware_command(board, "bug-polarity"));
+    [weact, openmv, qemu_image_command()]
 }
 
 /// Builds the host tool as it is installed.
@@ -146,7 +164,7 @@ pub fn everything(serving: bool) -> Vec<Command> {
     [all, by_name].into_iter().chain(serving).collect()
 }
 
-/// Whether builds for this computer also lint this project's packages.
+/// Whether builds for this computer also lint this project's packages, and those with a seeded bug.
 static LINTING: AtomicBool = AtomicBool::new(false);
 
 /// From now on, builds for this computer also lint. Each package is checked once, and no separate
@@ -189,7 +207,7 @@ pub fn qemu_image() -> Result<PathBuf> {
 }
 
 /// The cargo command that builds it.
-pub fn qemu_image_command() -> Command {
+fn qemu_image_command() -> Command {
     build_for_target("tests/qemu")
 }
 

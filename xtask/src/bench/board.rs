@@ -32,9 +32,11 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Builds the image and lints it, without a board.
+/// Builds the image and lints it, without a board. Its dependencies are the firmware's, with the
+/// same features, and are built once.
 pub fn lint() -> Result<()> {
     let mut command = command()?;
+    command.args(["--package", "hivtac-firmware", "--bin", PACKAGE]);
     toolchain::lint_for_target(&mut command)?;
     artifacts::without_warnings(command)
 }
