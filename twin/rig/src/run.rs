@@ -4,7 +4,8 @@ use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 use rigless::emulator::{self, AccessKind, Driver, Settled, Start, Stop};
@@ -37,6 +38,11 @@ pub const INSTRUCTIONS_PER_SECOND: u64 = 400_000_000;
 const LOOK_NS: u64 = 1_000_000;
 /// Time for which a run goes on after its client left, before it waits for the next one, ns.
 const LINGER_NS: u64 = 100_000_000;
+/// Time without a byte on a client's port after which the run goes on slowly, ns. The longest erase
+/// of the flash is shorter. A client that waits in real time leaves the processor to others.
+const SILENCE_NS: u64 = 1_500_000_000;
+/// Pause after each look at a silent port.
+const PAUSE: Duration = Duration::from_millis(20);
 /// Time for which clocks and pins are checked after a change, ns: oscillators and loops take up to
 /// 2.1 ms.
 const SETTLING_NS: u64 = 10_000_000;
@@ -168,6 +174,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         interrupt: options.interrupt.clone(),
         bytes: Vec::new(),
         client: Client::None,
+        heard_at: 0,
         settling_until: 0,
         next_look: 0,
         settled_at_ns: 0,
@@ -233,6 +240,8 @@ struct Conductor {
     interrupt: Arc<AtomicBool>,
     bytes: Vec<u8>,
     client: Client,
+    /// Time of the client's arrival or of the last byte, ns.
+    heard_at: u64,
     /// Time until which clocks or pins may change by themselves, ns.
     settling_until: u64,
     /// Time of their next check, ns.
@@ -350,9 +359,18 @@ impl Conductor {
     /// on.
     fn serve_client(&mut self, now: u64) -> bool {
         while !self.interrupt.load(Ordering::Relaxed) {
+            let before = self.client;
             self.client = self.look_for_client(now);
+            if before != self.client {
+                self.heard_at = now;
+            }
             match self.exchange(now) {
-                Turn::Over => return true,
+                Turn::Over => {
+                    if self.client == Client::Here && now >= self.heard_at + SILENCE_NS {
+                        thread::sleep(PAUSE);
+                    }
+                    return true;
+                }
                 Turn::End => return false,
                 Turn::Wait => {
                     if let Program::Client { link, .. } = &self.program {
@@ -391,7 +409,11 @@ impl Conductor {
             to_device,
             ..
         } = &mut *host;
+        let waiting = (from_device.len(), to_device.len());
         link.exchange(from_device, to_device);
+        if waiting != (from_device.len(), to_device.len()) {
+            self.heard_at = now;
+        }
         let held_up = match self.client {
             // A slow client slows the run down; it does not make the device lose samples.
             Client::Here => !from_device.is_empty(),
