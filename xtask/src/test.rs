@@ -45,7 +45,11 @@ static STEPS: [Step; 14] = [
     ("tests: host", host_tests, None),
     ("tests: across rooms", cross_room_tests, None),
     ("attacks", |_, _| fuzz::run(), Some(fuzz::obstacle)),
-    ("tests: rig at half speed", rig_tests_at_half_speed, None),
+    (
+        "tests: rig at half speed",
+        rig_tests_at_half_speed,
+        Some(|| None),
+    ),
     (
         "tests: python",
         |_, tally| python::test_package(tally),
