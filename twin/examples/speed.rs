@@ -4,13 +4,13 @@
 use std::time::Instant;
 
 use hivtac_twin::film::Film;
-use hivtac_twin::{Contact, Load, Preset, Scene, SceneError};
+use hivtac_twin::{Contact, Layout, Load, Preset, Scene, SceneError};
 
 /// Frames per measurement. The fastest of several is printed, because others may use the machine.
 const FRAMES: u32 = 100;
 const REPEATS: u32 = 5;
 /// The film's measurements are short; with many, some are undisturbed by other programs.
-const FILM_REPEATS: u32 = 400;
+const FILM_REPEATS: u32 = 40;
 
 fn main() -> Result<(), SceneError> {
     // The reader of the output may close it early.
@@ -25,20 +25,22 @@ fn main() -> Result<(), SceneError> {
             println!("{preset:6} {width}×{height}: {rate:5.0} frames/s");
         }
     }
-    for contact in [Contact::Force, Contact::Stick, Contact::Slip { mu: 0.6 }] {
-        let microseconds = (0..FILM_REPEATS)
-            .map(|_| film_us(contact))
-            .collect::<Result<Vec<_>, _>>()?;
-        let fastest = microseconds.into_iter().fold(f64::MAX, f64::min);
-        println!("film, {contact}: {fastest:.2} µs for tip and markers");
+    for name in Layout::NAMES {
+        let film = Film::default().with_layout(name.parse()?)?;
+        for contact in [Contact::Force, Contact::Stick, Contact::Slip { mu: 0.6 }] {
+            let microseconds = (0..FILM_REPEATS)
+                .map(|_| film_us(&film, contact))
+                .collect::<Result<Vec<_>, _>>()?;
+            let fastest = microseconds.into_iter().fold(f64::MAX, f64::min);
+            println!("film, layout {name}, {contact}: {fastest:.2} µs for tip and markers");
+        }
     }
     Ok(())
 }
 
 /// Returns the time of one load, µs, as the mean of many.
-fn film_us(contact: Contact) -> Result<f64, SceneError> {
+fn film_us(film: &Film, contact: Contact) -> Result<f64, SceneError> {
     const LOADS: u32 = 250;
-    let film = Film::default();
     let start = Instant::now();
     for k in 1..=LOADS {
         let size_n = 0.25 * f64::from(k) / f64::from(LOADS);

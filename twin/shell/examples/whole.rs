@@ -18,8 +18,8 @@ use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_
 use hivtac_twin::film::whole::{Difference, WholeFilm};
 
 const USAGE: &str = "whole FOLDER [--check [--loads N]] [--threads N] [--functions N]
-Makes FOLDER/whole.bin and FOLDER/whole-differences.bin from solutions in target/whole-RADIUS.bin, which it adds to where they are \
-incomplete.
+Makes FOLDER/whole.bin and FOLDER/whole-differences.bin from solutions in \
+target/whole-RADIUS.bin, which it adds to where they are incomplete.
 --check: hold FOLDER/whole.bin against the full solution instead
 --functions: how many functions of the load it has at most, 1 to 255";
 

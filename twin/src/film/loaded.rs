@@ -98,8 +98,8 @@ impl Film {
         Film { down, ..self }.with_layout(layout)
     }
 
-    /// Returns the same film with other dots. Dots other than the nominal ones move by the tables of
-    /// the whole film.
+    /// Returns the same film with other dots. Dots other than the nominal ones move by the tables
+    /// of the whole film.
     ///
     /// # Errors
     /// If the film has a weight: what that does is known of the nominal dots alone.

@@ -3,7 +3,8 @@
 use crate::film::FilmError;
 use crate::film::reduced::{Pose, Terms};
 
-/// Functions of a load, the same at all places of the film. Each is a sum of [`LoadFunctions::terms`].
+/// Functions of a load, the same at all places of the film. Each is a sum of
+/// [`LoadFunctions::terms`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct LoadFunctions {
     terms: Terms,
