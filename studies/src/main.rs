@@ -3,6 +3,7 @@
 
 mod anywhere;
 mod contacts;
+mod dots;
 mod maps;
 mod page;
 mod paper;
@@ -28,6 +29,7 @@ struct Cli {
 enum Command {
     Anywhere(anywhere::Anywhere),
     Contacts(contacts::Contacts),
+    Dots(dots::DotsStudy),
     Paper(paper::Paper),
     #[command(subcommand)]
     Scene(scene::SceneCommand),
@@ -44,6 +46,7 @@ fn main() -> Result<()> {
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),
         Command::Contacts(study) => study.run(),
+        Command::Dots(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
         Command::Slip(study) => study.run(),

@@ -4,6 +4,7 @@
 mod contact_shapes;
 mod covariances;
 mod coverage_scale;
+mod dots;
 mod functions;
 mod least_squares;
 mod matrix;
@@ -29,6 +30,7 @@ use crate::weights::Weights;
 pub use contact_shapes::contact_shapes;
 use covariances::even;
 pub use covariances::{Covariance, EQUATIONS, KNOTS, Moved, covariances, knots, sum_of_squares};
+pub use dots::of_layout;
 pub use functions::{Sampled, compressed};
 pub(crate) use least_squares::{LeastSquares, dot};
 pub use noise::Noise;

@@ -104,9 +104,14 @@ pub struct Dot {
 impl Dot {
     /// At a place, with `count` nodes (6 to 16) along each axis, closer together near it.
     pub fn new(place_mm: [f64; 2], count: usize) -> Dot {
+        Dot::within(place_mm, count, MAX_PLACE_MM)
+    }
+
+    /// As [`Dot::new`], for tips within ±`last_mm` along each axis.
+    pub fn within(place_mm: [f64; 2], count: usize, last_mm: f64) -> Dot {
         Dot {
             place_mm,
-            nodes_mm: place_mm.map(|part| nodes_near(part, count)),
+            nodes_mm: place_mm.map(|part| nodes_near(part, count, last_mm)),
         }
     }
 
@@ -138,15 +143,15 @@ impl Dot {
 }
 
 /// Nodes with even steps of a measure that is densest at a place.
-fn nodes_near(place_mm: f64, count: usize) -> Vec<f64> {
+fn nodes_near(place_mm: f64, count: usize, last_mm: f64) -> Vec<f64> {
     let measure = |at_mm: f64| {
         let far = (at_mm - place_mm).abs() / TWICE_MM;
         libm::log1p(far).copysign(at_mm - place_mm)
     };
-    let (last, [from, to]) = (count - 1, [-MAX_PLACE_MM, MAX_PLACE_MM].map(measure));
+    let (last, [from, to]) = (count - 1, [-last_mm, last_mm].map(measure));
     let at = |k: usize| match k {
-        0 => -MAX_PLACE_MM,
-        k if k == last => MAX_PLACE_MM,
+        0 => -last_mm,
+        k if k == last => last_mm,
         k => {
             let measure = from + (to - from) * k as f64 / last as f64;
             place_mm + (TWICE_MM * libm::expm1(measure.abs())).copysign(measure)

@@ -1,0 +1,276 @@
+//! Measures what another layout of dots tells of a contact: the film run forwards for its dots, on
+//! contacts of the simulated film, without frames.
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use hivtac_calibration::evaluation::errors::angle_deg;
+use hivtac_calibration::forward::{UnitSetup, of_layout};
+use hivtac_sensor::force::forward::{Column, Estimate, Forward, Markers, Mounting, Observed, Pose};
+use hivtac_terms::list::List;
+use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Unit};
+use hivtac_twin::film::{Film, Layout};
+use hivtac_twin::{Camera, Load, Preset};
+use rand::Rng;
+use rayon::prelude::*;
+use serde::Serialize;
+
+use crate::page;
+use crate::press::{normal, seeded};
+
+/// Forces, mN.
+const FORCES_MN: [u32; 3] = [50, 100, 200];
+/// The largest distance of a tip from the middle along each axis, mm: of contacts, and of the
+/// tables.
+const WITHIN_MM: f64 = 4.0;
+const LAST_MM: f64 = 4.6;
+/// Tilts of a force, degrees.
+const TILT_DEG: f64 = 8.0;
+/// Noise of each coordinate of a centroid, px: what the simulated camera's frames have.
+const NOISE_PX: f64 = 0.011;
+/// Gauss–Newton steps, as models ask for.
+const STEPS: u8 = 2;
+/// Where steps begin, as a part of the largest size.
+const FIRST_SIZE: f32 = 0.5;
+/// Variance of the coordinates of a dot that is not seen, focal lengths squared.
+const LOST: f32 = 1e6;
+/// 95 of 100 normal errors are within this many standard uncertainties.
+const WITHIN_95: f64 = 1.96;
+
+/// Measure contacts by another layout of dots.
+#[derive(Args)]
+pub struct DotsStudy {
+    /// The layout.
+    #[arg(long, default_value = "8v")]
+    layout: Layout,
+    /// Contacts of each row.
+    #[arg(long, default_value_t = 400)]
+    contacts: u32,
+    /// Print one JSON object and write no page.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The results for contacts within an area.
+#[derive(Serialize)]
+struct Row {
+    force_mn: u32,
+    /// Number of dots that are not seen.
+    lost: u32,
+    /// Percentage that the found load explains.
+    kept: f64,
+    /// Root mean square and 95th percentile of the direction's error, degrees.
+    direction_deg: [f64; 2],
+    /// Root mean square of the errors of |F|, mN, and of the place, µm.
+    magnitude_mn: f64,
+    place_um: f64,
+    /// Percentage within the stated 95 %: direction, |F|, place.
+    within: [f64; 3],
+}
+
+/// Errors of a found load, and its stated standard uncertainties: direction, degrees; |F|, mN;
+/// place, µm.
+struct Found {
+    errors: [f64; 3],
+    sigma: [f64; 3],
+}
+
+/// The simulated sensor, and its film run forwards.
+struct Bench<'a> {
+    camera: &'a Camera,
+    film: Film,
+    forward: Forward<'a>,
+    mounting: Mounting,
+}
+
+impl DotsStudy {
+    /// Runs the study.
+    pub fn run(&self) -> Result<()> {
+        let (rows, about) = self.rows(&FORCES_MN)?;
+        if self.json {
+            return page::print_rows(&rows);
+        }
+        let mut text = format!(
+            "{about}\n\n\
+             | dots lost | force | explained | direction, rms and 95 % | \\|F\\| | place | \
+             within the stated 95 %: direction, \\|F\\|, place |\n\
+             |--:|--:|--:|--:|--:|--:|--:|\n"
+        );
+        text.extend(rows.iter().map(Row::line));
+        print!("{text}");
+        page::write("dots.md", include_str!("dots.md"), &text)
+    }
+
+    /// The results at these forces, mN, and a sentence about the tables.
+    fn rows(&self, forces_mn: &[u32]) -> Result<(Vec<Row>, String)> {
+        let camera = Camera::new(Preset::Ov7725, 320, 240)?;
+        let (spec, left) = of_layout(self.layout, LAST_MM, STEPS, NOISE_PX, &camera)?;
+        let bytes = spec.to_bytes();
+        let forward = Forward::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+        let dots = forward.tables.dots();
+        let (kib, left) = (bytes.len() / 1024, left * camera.focal_px());
+        let about = format!(
+            "{dots} dots: tables of {kib} KiB, within {left:.4} px of the simulated film (root \
+             mean square)."
+        );
+        let bench = Bench {
+            camera: &camera,
+            film: Film::default().with_layout(self.layout)?,
+            mounting: Mounting {
+                per_px: [1.0 / camera.focal_px() as f32, 0.0],
+                beside_mm: Markers::defaults(dots),
+            },
+            forward,
+        };
+        let cases = [0, 1].map(|lost| forces_mn.iter().map(move |force_mn| (*force_mn, lost)));
+        let cases = cases.into_iter().flatten();
+        let rows = cases.map(|(force_mn, lost)| self.row(&bench, force_mn, lost));
+        Ok((rows.collect::<Result<_>>()?, about))
+    }
+
+    fn row(&self, bench: &Bench<'_>, force_mn: u32, lost: u32) -> Result<Row> {
+        let contacts = (0..self.contacts).into_par_iter();
+        let found = contacts.map(|number| {
+            let number = u64::from(number) + 1_000 * u64::from(force_mn);
+            bench.contact(number, f64::from(force_mn) * 1e-3, lost)
+        });
+        let all = found.collect::<Result<Vec<Option<Found>>>>()?;
+        let found: Vec<&Found> = all.iter().flatten().collect();
+        let count = found.len().max(1) as f64;
+        let rms = |k: usize| {
+            let squares = found.iter().map(|found| found.errors[k] * found.errors[k]);
+            (squares.sum::<f64>() / count).sqrt()
+        };
+        let mut directions: Vec<f64> = found.iter().map(|found| found.errors[0]).collect();
+        directions.sort_by(f64::total_cmp);
+        let last = directions.get(directions.len() * 95 / 100).copied();
+        let is_within = |k: usize| {
+            let within = found.iter().filter(|own| own.errors[k] <= own.limit(k));
+            100.0 * within.count() as f64 / count
+        };
+        Ok(Row {
+            force_mn,
+            lost,
+            kept: 100.0 * found.len() as f64 / f64::from(self.contacts),
+            direction_deg: [rms(0), last.context("no contact is explained")?],
+            magnitude_mn: rms(1),
+            place_um: rms(2),
+            within: [0, 1, 2].map(is_within),
+        })
+    }
+}
+
+impl Bench<'_> {
+    /// The answer to a contact; `None` if none explains the dots.
+    fn contact(&self, number: u64, force_n: f64, lost: u32) -> Result<Option<Found>> {
+        let mut random = seeded(number);
+        let mut between = |most: f64| random.random_range(-most..most);
+        let [alpha, beta] = [TILT_DEG; 2].map(&mut between);
+        let place_mm = [WITHIN_MM; 2].map(&mut between);
+        let load = Load::from_angles(force_n, alpha, beta)?.with_offset_mm(place_mm)?;
+        let setup = UnitSetup {
+            unit: Unit::default(),
+            tip_radius_mm: NOMINAL_RADIUS_MM,
+            camera: self.camera,
+        };
+        let dots = self.forward.tables.dots();
+        let mut moved = Column::defaults(2 * dots);
+        for (dot, moved) in moved.as_chunks_mut().0.iter_mut().enumerate() {
+            let seen = setup.moved_by(&self.film, &load, dot)?;
+            let noise = self.mounting.scale() as f64 * NOISE_PX;
+            *moved = seen.map(|part| (part + noise * normal(&mut random)) as f32);
+        }
+        let variance = (self.mounting.scale() * NOISE_PX as f32).powi(2);
+        let mut noise = List::from_fn(dots, |_| [variance, 0.0, variance]);
+        for _ in 0..lost {
+            noise[random.random_range(0..dots)] = [LOST, 0.0, LOST];
+        }
+        let observed = Observed {
+            moved,
+            noise,
+            drift: None,
+            hanging: None,
+            pressing: None,
+        };
+        let guess = Pose {
+            size: FIRST_SIZE * self.forward.limits.size,
+            place_mm: self.forward.rest_image.where_most(&moved),
+            ..Pose::default()
+        };
+        let unknown = self.forward.unknown(true);
+        let found = (self.forward).estimate(&observed, &self.mounting, unknown, guess);
+        Ok(self.judged(&found, &load))
+    }
+
+    fn judged(&self, found: &Estimate, load: &Load) -> Option<Found> {
+        let strength = self.forward.strength(true);
+        let sigma = found.sigma(&strength).filter(|_| found.is_explained())?;
+        let direction = found.pose.direction().map(f64::from);
+        let magnitude_n = f64::from(self.forward.stiffness.magnitude_n(found.pose.size));
+        let [x, y] = [0, 1].map(|i| f64::from(found.pose.place_mm[i]) - load.offset_mm()[i]);
+        let true_direction = load.vector_n().map(|part| part / load.magnitude_n());
+        Some(Found {
+            errors: [
+                angle_deg(direction, true_direction).unwrap_or(180.0),
+                1e3 * (magnitude_n - load.magnitude_n()).abs(),
+                1e3 * x.hypot(y),
+            ],
+            sigma: [
+                f64::from(sigma.direction).to_degrees(),
+                1e3 * f64::from(sigma.magnitude_n),
+                1e3 * f64::from(sigma.place_mm),
+            ],
+        })
+    }
+}
+
+impl Found {
+    /// The largest error within the stated 95 %. For direction and place, of two axes each, the
+    /// sensor states what 95 of 100 errors are within 1.731 times of, and for each axis.
+    fn limit(&self, k: usize) -> f64 {
+        let times = [1.731, WITHIN_95, 1.731 * std::f64::consts::SQRT_2];
+        times[k] * self.sigma[k]
+    }
+}
+
+impl Row {
+    fn line(&self) -> String {
+        let [rms, last] = self.direction_deg;
+        let [direction, magnitude, place] = self.within;
+        format!(
+            "| {} | {} mN | {:.1} % | {rms:.3}°, {last:.3}° | {:.3} mN | {:.1} µm | \
+             {direction:.0}, {magnitude:.0}, {place:.0} % |\n",
+            self.lost, self.force_mn, self.kept, self.magnitude_mn, self.place_um,
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contacts are found without a network, with an honest uncertainty; also with a dot lost.
+    #[test]
+    fn eight_dots_tell_a_contact() {
+        let study = DotsStudy {
+            layout: "8v".parse().unwrap(),
+            contacts: 40,
+            json: true,
+        };
+        for row in study.rows(&[100]).unwrap().0 {
+            let Row {
+                kept,
+                direction_deg: [rms, _],
+                magnitude_mn,
+                place_um,
+                within,
+                ..
+            } = row;
+            assert!(kept >= 97.0, "{kept} %");
+            assert!(
+                rms < 0.15 && magnitude_mn < 0.1 && place_um < 8.0,
+                "{rms} {magnitude_mn}"
+            );
+            assert!(within.iter().all(|part| *part >= 85.0), "{within:?}");
+        }
+    }
+}
