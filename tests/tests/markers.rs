@@ -207,7 +207,7 @@ fn stand_ins() -> Vec<(Options, f64)> {
                 let [x, y] = SPOILT_MM;
                 let patch = red_patch([x + distance * cos, y + distance * sin], radius_mm);
                 let options = Options {
-                    missing,
+                    missing: missing.into(),
                     patches: vec![patch],
                     ..Options::default()
                 };
