@@ -17,6 +17,9 @@ pub(crate) struct Exposure<'a, L: Fn(f64) -> Load> {
     pub(crate) load: L,
     /// The film at the frame's time.
     pub(crate) now: Pressed,
+    /// Displacement of the film's points at that time, mm, of a film that `now` describes too
+    /// coarsely. Then the shutter takes no time.
+    pub(crate) exactly: Option<&'a dyn Fn([f64; 2]) -> [f64; 3]>,
 }
 
 /// The image of one disc.
@@ -31,8 +34,8 @@ pub(crate) struct Image {
 impl<L: Fn(f64) -> Load> Exposure<'_, L> {
     /// Returns the image of a disc.
     pub(crate) fn image(&self, disc: &Disc) -> Image {
-        let now = self.outline(disc, &self.now);
-        let still = *self.shutter == Shutter::default();
+        let now = self.outline(disc, |rest| self.displacement(rest));
+        let still = self.exactly.is_some() || *self.shutter == Shutter::default();
         let outlines = match still {
             true => vec![now],
             false => self.smeared(disc, &now),
@@ -52,11 +55,21 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
         let below = (row - centre(self.camera.height())) / height;
         let instants = self.shutter.instants(below);
         let pressed = instants.map(|time_s| self.mechanics.seen(self.film, &(self.load)(time_s)));
-        pressed.map(|film| self.outline(disc, &film)).collect()
+        pressed
+            .map(|film| self.outline(disc, |rest| film.displacement(rest)))
+            .collect()
     }
 
-    fn outline(&self, disc: &Disc, film: &Pressed) -> Outline {
-        let outline = disc.image(|rest| film.displacement(rest), self.camera);
+    /// Returns the displacement of a point of the film at the frame's time, mm.
+    fn displacement(&self, rest_mm: [f64; 2]) -> [f64; 3] {
+        match self.exactly {
+            Some(exactly) => exactly(rest_mm),
+            None => self.now.displacement(rest_mm),
+        }
+    }
+
+    fn outline(&self, disc: &Disc, film: impl Fn([f64; 2]) -> [f64; 3]) -> Outline {
+        let outline = disc.image(&film, self.camera);
         match self.lens.discs {
             Discs::Whole => outline,
             Discs::ByCentre => {
@@ -71,16 +84,16 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
         if self.lens.aperture_mm == 0.0 {
             return self.lens.blur_px;
         }
-        let [_, _, z] = centre_mm(disc, &self.now);
+        let [_, _, z] = centre_mm(disc, |rest| self.displacement(rest));
         self.lens
             .blur_px_at(FILM_DISTANCE_MM + z, self.camera.focal_px())
     }
 }
 
 /// Returns the position of a disc's centre on a pressed film, mm.
-fn centre_mm(disc: &Disc, film: &Pressed) -> [f64; 3] {
+fn centre_mm(disc: &Disc, film: impl Fn([f64; 2]) -> [f64; 3]) -> [f64; 3] {
     let [x, y] = disc.centre_mm;
-    let [dx, dy, dz] = film.displacement([x, y]);
+    let [dx, dy, dz] = film([x, y]);
     [x + dx, y + dy, dz]
 }
 

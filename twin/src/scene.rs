@@ -198,7 +198,24 @@ impl Scene {
         self.expose(&exposure, load, number)
     }
 
-    /// Returns the ground truth of such a film, without rendering.
+    /// As [`Self::render_pressed`], of a film whose points move by `displacement`, mm from rest, of
+    /// a point in mm. So the discs' images have their true shape, also where the film is curved
+    /// within a disc. The frame's truth has the scene's own tip.
+    pub fn render_film(
+        &self,
+        displacement: impl Fn([f64; 2]) -> [f64; 3],
+        load: &Load,
+        number: u64,
+    ) -> Frame {
+        let shutter = Shutter::default();
+        let exposure = Exposure {
+            exactly: Some(&displacement),
+            ..self.exposure(&shutter, |_| *load)
+        };
+        self.expose(&exposure, load, number)
+    }
+
+    /// Returns the ground truth of a film as [`Self::render_pressed`] takes it, without rendering.
     pub fn truth_of_pressed(&self, pressed: Pressed, load: &Load) -> Truth {
         let shutter = Shutter::default();
         let exposure = Exposure {
@@ -237,6 +254,7 @@ impl Scene {
             lens: &self.options.lens,
             shutter,
             now: self.options.film.seen(&self.film, &load(0.0)),
+            exactly: None,
             load,
         }
     }

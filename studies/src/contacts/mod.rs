@@ -12,12 +12,13 @@ use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
+use hivtac_sensor::pipeline::Measurement;
 use hivtac_shell::{Design, Film};
 use hivtac_terms::contact_shape::ContactShape;
+use rayon::prelude::*;
 
 use crate::anywhere::WEIGHTS;
 use crate::page;
-use crate::press::seeded;
 
 pub use objects::{KINDS, Kind};
 pub use presses::{Plan, Press, presses};
@@ -46,6 +47,9 @@ pub struct Contacts {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
+    /// Draw the image of each dot as that of a plane disc, moved and tilted as the film in the mean.
+    #[arg(long)]
+    plane: bool,
     /// Print the presses with their truth as one JSON object, and read none.
     #[arg(long)]
     truth: bool,
@@ -73,50 +77,55 @@ impl Contacts {
         if self.truth {
             return page::print_rows(&presses);
         }
-        let mut reader = Reader::new(model, &weights, seeded(self.seed))?;
+        let how = (self.frames, self.seed, self.plane);
+        let reader = Reader::new((&model, &weights), &film, how)?;
+        let numbered = presses.par_iter().enumerate();
+        let read = numbered.map(|(number, press)| {
+            let shapes = Setting::ALL.map(|setting| setting.shape(press));
+            reader.read((number, press), shapes)
+        });
+        let answers = read.collect::<Result<Vec<_>>>()?;
         let mut rows = Vec::new();
-        for setting in Setting::ALL {
-            rows.extend(self.rows(&mut reader, setting, &presses)?);
+        for (k, setting) in Setting::ALL.into_iter().enumerate() {
+            let answers = answers.iter().map(|answers| answers[k].as_slice());
+            rows.extend(rows_of(setting, presses.iter().zip(answers))?);
         }
         if self.json {
             return page::print_rows(&rows);
         }
         let table = row::table(&rows);
         print!("{table}");
+        if self.plane {
+            return Ok(());
+        }
         page::write("contacts.md", include_str!("page.md"), &table)
     }
+}
 
-    /// The rows of all kinds under a setting, then one of all of them but the longest.
-    fn rows(
-        &self,
-        reader: &mut Reader<'_>,
-        setting: Setting,
-        presses: &[Press],
-    ) -> Result<Vec<Row>> {
-        let mut rows = Vec::new();
-        let mut all = Row::new("all but cylinders of 12 mm".into(), setting.name());
-        for kind in KINDS {
-            let mut row = Row::new(kind.name(), setting.name());
-            for press in presses.iter().filter(|press| press.kind == kind) {
-                let Some(shape) = setting.shape(press) else {
-                    continue;
-                };
-                row.begin_press();
-                for _ in 0..self.frames {
-                    let (force, status) = reader.read(press, shape)?;
-                    row.add(&force, status, press)?;
-                }
-            }
-            if !row.is_empty() {
-                if kind != Kind::Cylinder(12.0) {
-                    all.extend(&row);
-                }
-                rows.push(row);
+/// The rows of all kinds under a setting, then one of all of them but the longest. `answers` are
+/// the presses with the measurements of their frames; none if the setting is none for a press.
+fn rows_of<'a>(
+    setting: Setting,
+    answers: impl Iterator<Item = (&'a Press, &'a [Measurement])> + Clone,
+) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    let mut all = Row::new("all but cylinders of 12 mm".into(), setting.name());
+    for kind in KINDS {
+        let mut row = Row::new(kind.name(), setting.name());
+        for (press, answers) in answers.clone() {
+            if press.kind == kind && !answers.is_empty() {
+                row.add(press, answers)?;
             }
         }
-        rows.push(all);
-        Ok(rows)
+        if !row.is_empty() {
+            if kind != Kind::Cylinder(12.0) {
+                all.extend(&row);
+            }
+            rows.push(row);
+        }
     }
+    rows.push(all);
+    Ok(rows)
 }
 
 /// What the sensor is told of what presses.

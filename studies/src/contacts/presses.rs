@@ -1,7 +1,7 @@
 //! Solves what objects do to the film, with the truth that belongs to it.
 
 use anyhow::{Context, Result};
-use hivtac_shell::{Film, markers};
+use hivtac_shell::{Equilibrium, Film, markers};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_twin::Camera;
 use rayon::prelude::*;
@@ -28,6 +28,9 @@ pub struct Press {
     /// Its shape, if the sensor can be told.
     #[serde(skip)]
     pub shape: Option<ContactShape>,
+    /// The film under it.
+    #[serde(skip)]
+    pub state: Equilibrium,
     /// The motion of the markers' images since rest, px of the camera, in the order of the markers.
     /// In focal lengths: divided by [`Camera::focal_px`].
     pub moved_px: [[f64; 2]; 4],
@@ -97,6 +100,7 @@ impl Press {
             name,
             kind,
             shape,
+            state,
             moved_px: std::array::from_fn(moved),
             force_n,
             centre_mm,

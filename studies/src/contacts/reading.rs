@@ -1,74 +1,91 @@
-//! The sensing's answer to presses of the full film, without frames.
+//! The sensor's answers to frames of presses of the full film.
 
-use anyhow::{Result, anyhow};
-use hivtac_calibration::data::dataset::Observation;
-use hivtac_calibration::evaluation::answer::Chip;
+use anyhow::Result;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::Force;
-use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::pipeline::Measurement;
+use hivtac_shell::{Film, pressed};
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_terms::marker::Marker;
-use hivtac_terms::status::Status;
-use hivtac_terms::units::Px;
-use rand_chacha::ChaCha8Rng;
+use hivtac_twin::{Frame, Load, MARKERS, Options};
 
 use super::presses::Press;
-use crate::press::normal;
+use crate::press::{Tared, TestedUnit};
 
-/// Noise of each coordinate of a centroid, px: what the simulated camera's frames have at 320×240.
-const NOISE_PX: f64 = 0.011;
+/// Numbers of noise that a press has for itself.
+const NUMBERS: u64 = 10_000;
+/// Radius of the tip of the scene's own film, mm: it only presses the truths of the frames.
+const TIP_RADIUS_MM: f64 = 0.5;
 
-/// The sensor without its camera: it is given centroids with noise in place of frames.
+/// A simulated sensor that sees the full film.
 pub struct Reader<'m> {
-    chip: Chip<'m>,
-    weights: &'m Weights,
-    random: ChaCha8Rng,
+    model: &'m Model<'m>,
+    film: &'m Film,
+    unit: TestedUnit,
+    rest: Rest,
+    frames: u32,
+    plane: bool,
 }
 
 impl<'m> Reader<'m> {
-    /// Returns a reader with a model and the weights from which it was exported.
+    /// Returns a sensor with a model, tared on a film at rest. It takes this many frames of each
+    /// press. With `plane`, each dot's image is that of a plane disc.
     ///
     /// # Errors
-    /// If the rest position does not fit the chip's numbers.
-    pub fn new(model: Model<'m>, weights: &'m Weights, random: ChaCha8Rng) -> Result<Reader<'m>> {
+    /// If the film at rest gives no rest position.
+    pub fn new(
+        (model, weights): (&'m Model<'m>, &Weights),
+        film: &'m Film,
+        (frames, seed, plane): (u32, u64, bool),
+    ) -> Result<Reader<'m>> {
+        let preset = weights.conditions.preset.parse()?;
+        let options = Options::of(preset);
+        let unit = TestedUnit::new(&model.conditions, options, TIP_RADIUS_MM, seed)?;
         Ok(Reader {
-            chip: Chip::new(model, &weights.rest)?,
-            weights,
-            random,
+            rest: unit.rest(model)?,
+            model,
+            film,
+            unit,
+            frames,
+            plane,
         })
     }
 
-    /// Returns the force of a press, with its status, in one draw of noise and with this setting of
-    /// what presses.
+    /// Returns the sensor's measurements of the frames of the press with this number, with each of
+    /// these settings of what presses. All settings see the same frames.
     ///
     /// # Errors
-    /// If the centroids do not fit the chip's numbers.
-    pub fn read(&mut self, press: &Press, shape: ContactShape) -> Result<(Force, Status)> {
-        let seen = self.observation(&press.moved_px)?;
-        self.chip.set_contact_shape(shape);
-        self.chip.force(&seen)
+    /// If the model does not fit the frames.
+    pub fn read<const N: usize>(
+        &self,
+        (number, press): (usize, &Press),
+        shapes: [Option<ContactShape>; N],
+    ) -> Result<[Vec<Measurement>; N]> {
+        let first = number as u64 * NUMBERS;
+        let frames = (0..self.frames)
+            .map(|frame| self.frame(press, first + u64::from(frame)))
+            .collect::<Result<Vec<_>>>()?;
+        let mut tared = Tared::new(self.model, self.rest)?;
+        let mut measure = |shape: Option<ContactShape>| {
+            let Some(shape) = shape else {
+                return Vec::new();
+            };
+            tared.begin(self.rest);
+            tared.sensor.set_contact_shape(shape);
+            let frames = frames.iter();
+            frames.map(|frame| tared.measure_closely(frame)).collect()
+        };
+        Ok(shapes.map(&mut measure))
     }
 
-    /// Returns what a frame shows if the markers' images move like this, px.
-    fn observation(&mut self, moved_px: &[[f64; 2]; 4]) -> Result<Observation> {
-        let rest = &self.weights.rest;
-        let film = self.weights.film.as_ref();
-        let film = film.ok_or_else(|| anyhow!("the model has no film"))?;
-        let rest_px = rest.features_px();
-        let mut marker = |k: usize| {
-            let [x, y] = [0, 1].map(|i| {
-                let still = rest_px[2 * k + i] - film.rest_px[k][i];
-                let px = still + moved_px[k][i] + NOISE_PX * normal(&mut self.random);
-                Px((f64::from(Px::ONE.0) * px).round() as i32)
-            });
-            let area = rest.areas_px[k];
-            Marker { x, y, area }
-        };
-        let markers: [Marker; 4] = std::array::from_fn(&mut marker);
-        Ok(Observation {
-            features_q16: Features::of_markers(&markers).to_array(),
-            areas_px: rest.areas_px,
-        })
+    /// Returns a frame of a press; `number` selects its noise.
+    fn frame(&self, press: &Press, number: u64) -> Result<Frame> {
+        let scene = &self.unit.scene;
+        if self.plane {
+            let film = pressed(self.film, &press.state, MARKERS.into_iter())?;
+            return Ok(scene.render_pressed(film, &Load::REST, number));
+        }
+        let moved = |rest_mm| self.film.displacement(&press.state, rest_mm);
+        Ok(scene.render_film(moved, &Load::REST, number))
     }
 }

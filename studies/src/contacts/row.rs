@@ -1,10 +1,14 @@
 //! Sums the errors of one kind of presses under one setting.
 
+use std::collections::BTreeMap;
+
 use anyhow::{Context, Result};
+use hivtac_calibration::data::dataset::reasons;
 use hivtac_calibration::data::loads::norm;
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::Force;
+use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
@@ -19,6 +23,10 @@ pub struct Row {
     frames: u32,
     /// Frames with a force that one contact explains loosely.
     loosely: u32,
+    /// Frames with a force of three markers, because the fourth one looks faulty.
+    of_three: u32,
+    /// Frames without a force, by the reasons.
+    refused: BTreeMap<String, u32>,
     /// Errors in frames with a force: of the direction, degrees; of |F|, in parts of the true size;
     /// of the place, mm.
     errors: [Vec<f64>; 3],
@@ -43,20 +51,24 @@ impl Row {
         self.presses == 0
     }
 
-    /// Counts a press.
-    pub fn begin_press(&mut self) {
-        self.presses += 1;
-    }
-
-    /// Adds a frame of a press.
+    /// Adds the frames of a press.
     ///
     /// # Errors
-    /// If the force has no place.
-    pub fn add(&mut self, force: &Force, status: Status, press: &Press) -> Result<()> {
-        self.frames += 1;
-        if status.intersects(Status::NO_FORCE) {
-            return Ok(());
+    /// If a force has no place.
+    pub fn add(&mut self, press: &Press, answers: &[Measurement]) -> Result<()> {
+        self.presses += 1;
+        for answer in answers {
+            self.frames += 1;
+            match &answer.force {
+                Some(force) => self.add_force(force, answer.status, press)?,
+                None => *self.refused.entry(reasons(answer.status)).or_default() += 1,
+            }
         }
+        Ok(())
+    }
+
+    fn add_force(&mut self, force: &Force, status: Status, press: &Press) -> Result<()> {
+        self.of_three += u32::from(status.contains(Status::MARKER_LOST));
         self.loosely += u32::from(status.contains(Status::LOOSELY_EXPLAINED));
         let place = force.place.context("the model tells no places")?;
         let [x, y] = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
@@ -86,6 +98,10 @@ impl Row {
         self.presses += other.presses;
         self.frames += other.frames;
         self.loosely += other.loosely;
+        self.of_three += other.of_three;
+        for (reason, count) in &other.refused {
+            *self.refused.entry(reason.clone()).or_default() += count;
+        }
         self.stronger += other.stronger;
         for k in 0..3 {
             self.errors[k].extend(&other.errors[k]);
@@ -93,14 +109,28 @@ impl Row {
         }
     }
 
+    /// The reasons of refusals, with the part of all frames.
+    fn reasons(&self) -> String {
+        if self.refused.is_empty() {
+            return "–".into();
+        }
+        let parts = self.refused.iter().map(|(reason, count)| {
+            let part = 100.0 * f64::from(*count) / f64::from(self.frames);
+            format!("{part:.1} % `{reason}`")
+        });
+        parts.collect::<Vec<_>>().join(", ")
+    }
+
     fn line(&self) -> String {
         let Row { kind, setting, .. } = self;
         let told = self.errors[0].len() as f64;
-        let [kept, loosely] =
-            [told, f64::from(self.loosely)].map(|count| 100.0 * count / f64::from(self.frames));
+        let part = |count: f64| 100.0 * count / f64::from(self.frames);
+        let [loosely, of_three] = [self.loosely, self.of_three].map(|count| part(count.into()));
         let before = format!(
-            "| {kind} | {setting} | {} | {kept:.0} % | {loosely:.0} % |",
-            self.presses
+            "| {kind} | {setting} | {} | {:.0} % | {loosely:.0} % | {of_three:.0} % | {} |",
+            self.presses,
+            part(told),
+            self.reasons()
         );
         if told == 0.0 {
             return format!("{before} – | – | – | – |\n");
@@ -125,9 +155,9 @@ impl Row {
 /// Returns the table of all kinds.
 pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
-        "| what presses | `contact` | presses | forces | of these loosely | direction, median \
-         [95 %] | \\|F\\|, median [95 %], mean | place, median [95 %] | within the stated 95 %: \
-         direction, \\|F\\|, place |\n|---|---|--:|--:|--:|--:|--:|--:|--:|\n",
+        "| what presses | `contact` | presses | forces | loosely | of three markers | refused \
+         | direction, median [95 %] | \\|F\\|, median [95 %], mean | place, median [95 %] | within the stated 95 %: \
+         direction, \\|F\\|, place |\n|---|---|--:|--:|--:|--:|---|--:|--:|--:|--:|\n",
     );
     text.extend(rows.iter().map(Row::line));
     text
@@ -142,9 +172,11 @@ mod tests {
         let row = Row {
             presses: 2,
             frames: 4,
+            refused: [("unexplained".into(), 3), ("markers_missing".into(), 1)].into(),
             ..Row::new("pad".into(), "needle")
         };
-        let line = "| pad | needle | 2 | 0 % | 0 % | – | – | – | – |\n";
+        let line = "| pad | needle | 2 | 0 % | 0 % | 0 % | 25.0 % `markers_missing`, 75.0 % \
+                    `unexplained` | – | – | – | – |\n";
         assert_eq!(row.line(), line);
         assert_eq!(table(&[row]).lines().count(), 3);
     }

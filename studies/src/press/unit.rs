@@ -4,6 +4,7 @@ use anyhow::{Result, anyhow};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
+use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
@@ -147,29 +148,56 @@ impl TestedUnit {
 
     /// A sensor with this model, tared on the unit at rest.
     pub fn tare<'m>(&self, model: &Model<'m>) -> Result<Tared<'m>> {
-        let mut sensor = Box::new(Sensor::new());
-        let settings = model.conditions.settings(ByteOrder::Native);
-        let configured = sensor.configure(settings, Some(*model));
-        configured.map_err(|error| anyhow!("{error}"))?;
-        let mut tared = Tared { sensor };
+        Tared::new(model, self.rest(model)?)
+    }
+
+    /// The rest position of this unit for a model.
+    pub fn rest(&self, model: &Model<'_>) -> Result<Rest> {
+        let mut untared = Tared::untared(model)?;
         let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
         // Every second frame may be bad.
         for number in 0..2 * TARE_FRAMES {
-            let seen = tared.measure(&self.frame(&Load::REST, 1_000_000 + u64::from(number))?);
-            if let Some(outcome) = tared.sensor.tare_with(&mut tare, &seen) {
-                let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
-                tared.sensor.set_tare(Some(rest), Drift::NONE);
-                return Ok(tared);
+            let seen = untared.measure(&self.frame(&Load::REST, 1_000_000 + u64::from(number))?);
+            if let Some(outcome) = untared.sensor.tare_with(&mut tare, &seen) {
+                return outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"));
             }
         }
         Err(anyhow!("no rest position: too few frames show the markers"))
     }
 }
 
+impl<'m> Tared<'m> {
+    /// A sensor with this model and this rest position.
+    pub fn new(model: &Model<'m>, rest: Rest) -> Result<Tared<'m>> {
+        let mut tared = Self::untared(model)?;
+        tared.begin(rest);
+        Ok(tared)
+    }
+
+    fn untared(model: &Model<'m>) -> Result<Tared<'m>> {
+        let mut sensor = Box::new(Sensor::new());
+        let settings = model.conditions.settings(ByteOrder::Native);
+        let configured = sensor.configure(settings, Some(*model));
+        configured.map_err(|error| anyhow!("{error}"))?;
+        Ok(Tared { sensor })
+    }
+}
+
 impl Tared<'_> {
+    /// Begins anew with this rest position, as if there had been no frames.
+    pub fn begin(&mut self, rest: Rest) {
+        self.sensor.set_tare(Some(rest), Drift::NONE);
+        self.sensor.forget_frame();
+    }
+
     /// The sensor's measurement of a frame of any format.
     pub fn measure(&mut self, frame: &Frame) -> Measurement {
         self.sensor.measure_frame(&frame.to_rgb565())
+    }
+
+    /// The same, with a second look if that may help, as the device takes it.
+    pub fn measure_closely(&mut self, frame: &Frame) -> Measurement {
+        self.sensor.measure_frame_closely(&frame.to_rgb565())
     }
 
     /// The mean places of the markers under a press, over some frames; `number` selects their
