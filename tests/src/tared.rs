@@ -12,6 +12,7 @@ use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::status::Status;
@@ -216,6 +217,11 @@ impl TaredSensor {
         let rest = tared.rest(&Scene::preset("rest", preset, width, height, 7)?)?;
         tared.sensor.set_tare(Some(rest), Drift::NONE);
         Ok(tared)
+    }
+
+    /// Tells the sensor what presses.
+    pub fn set_contact_shape(&mut self, shape: ContactShape) {
+        self.sensor.set_contact_shape(shape);
     }
 
     /// Returns the rest position of a scene's markers.

@@ -1,6 +1,7 @@
 //! Tests of the pictures: discs are at the true places, and the default threshold separates their
 //! colour from the film's.
 
+use hivtac_twin::film::Film;
 use hivtac_twin::{Format, Frame, Load, Options, Paint, Patch, Preset, Scene};
 
 const PRESETS: [Preset; 2] = [Preset::Paper, Preset::Ov7725];
@@ -283,4 +284,21 @@ fn every_format_has_its_rows_and_shows_the_same_picture() {
         let middle = channels(pixels[120 * 320 + 160]).map(|c| c as u8);
         assert!(near(middle[0], 150) && near(middle[2], 128), "{middle:?}");
     }
+}
+
+#[test]
+fn a_film_given_by_its_points_is_drawn_as_by_its_discs_and_may_curve_them() {
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 1).unwrap();
+    let load = Load::from_angles(0.2, 4.0, -3.0).unwrap();
+    let pressed = Film::default().press(&load);
+    let by_discs = scene.render_pressed(pressed, &load, 5);
+    let by_points = scene.render_film(|rest| pressed.displacement(rest), &load, 5);
+    assert_eq!(by_points.pixels, by_discs.pixels);
+    let curved = |[x, y]: [f64; 2]| {
+        let [dx, dy, dz] = pressed.displacement([x, y]);
+        [dx, dy, dz - 0.3 * (x * x + y * y - 27.0)]
+    };
+    let curved = scene.render_film(curved, &load, 5);
+    let area = |frame: &Frame| frame.truth.markers[0].unwrap().area_px2;
+    assert!((area(&curved) - area(&by_discs)).abs() > 1.0);
 }

@@ -47,7 +47,10 @@ pub struct Contacts {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Draw the image of each dot as that of a plane disc, moved and tilted as the film in the mean.
+    /// Press only beside dots, where they bend most.
+    #[arg(long)]
+    near_dots: bool,
+    /// Draw each dot as a plane disc that moves and tilts as the film does in the mean.
     #[arg(long)]
     plane: bool,
     /// Print the presses with their truth as one JSON object, and read none.
@@ -72,13 +75,27 @@ impl Contacts {
         let plan = Plan {
             of_each: self.presses,
             seed: self.seed,
+            near_dots: self.near_dots,
         };
         let presses = presses(&film, &camera, plan)?;
         if self.truth {
             return page::print_rows(&presses);
         }
-        let how = (self.frames, self.seed, self.plane);
-        let reader = Reader::new((&model, &weights), &film, how)?;
+        let rows = self.rows(&model, &film, &presses)?;
+        if self.json {
+            return page::print_rows(&rows);
+        }
+        let table = row::table(&rows);
+        print!("{table}");
+        if self.plane || self.near_dots {
+            return Ok(());
+        }
+        page::write("contacts.md", include_str!("page.md"), &table)
+    }
+
+    /// The rows of all settings.
+    fn rows(&self, model: &Model<'_>, film: &Film, presses: &[Press]) -> Result<Vec<Row>> {
+        let reader = Reader::new(model, film, (self.frames, self.seed, self.plane))?;
         let numbered = presses.par_iter().enumerate();
         let read = numbered.map(|(number, press)| {
             let shapes = Setting::ALL.map(|setting| setting.shape(press));
@@ -90,15 +107,7 @@ impl Contacts {
             let answers = answers.iter().map(|answers| answers[k].as_slice());
             rows.extend(rows_of(setting, presses.iter().zip(answers))?);
         }
-        if self.json {
-            return page::print_rows(&rows);
-        }
-        let table = row::table(&rows);
-        print!("{table}");
-        if self.plane {
-            return Ok(());
-        }
-        page::write("contacts.md", include_str!("page.md"), &table)
+        Ok(rows)
     }
 }
 

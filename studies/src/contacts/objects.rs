@@ -4,8 +4,8 @@ use anyhow::Result;
 use hivtac_shell::{Body, Ends, Patch, Shape};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::units::Micrometres;
-use hivtac_twin::Load;
 use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
+use hivtac_twin::{Load, MARKER_REST_MM};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
@@ -16,6 +16,8 @@ use crate::press::{ANGLE_DEG, REACH_MM, seeded};
 const FORCES_N: [f64; 2] = [0.02, 0.25];
 /// The largest tilt of a face, degrees.
 const TILT_DEG: f64 = 5.0;
+/// How far from a dot's centre presses beside a dot are at most along x and along y, mm.
+const BESIDE_MM: f64 = 1.5;
 /// Radii of flat faces, of cylinders and of balls, mm.
 const FACES_MM: [f64; 2] = [1.0, 3.0];
 const CYLINDER_MM: f64 = 0.8;
@@ -90,11 +92,12 @@ impl Kind {
         }
     }
 
-    /// Draws press `number` of this kind: the same for the same seed, however many are drawn.
+    /// Draws press `number` of this kind: the same for the same seed, however many are drawn. Its
+    /// place is anywhere within [`REACH_MM`], or [beside a dot](beside_a_dot).
     ///
     /// # Errors
     /// Never, as long as the ranges are those of a load and of objects.
-    pub fn draw(self, seed: u64, number: u32) -> Result<Drawn> {
+    pub fn draw(self, seed: u64, number: u32, near_dots: bool) -> Result<Drawn> {
         let mut random = seeded(seed);
         let index = KINDS
             .iter()
@@ -104,7 +107,11 @@ impl Kind {
         let mut between = |[from, to]: [f64; 2]| random.random_range(from..=to);
         let force_n = between(FORCES_N);
         let [alpha_deg, beta_deg] = [(); 2].map(|()| between([-ANGLE_DEG, ANGLE_DEG]));
-        let place_mm = [(); 2].map(|()| between([-REACH_MM, REACH_MM]));
+        let anywhere_mm = [(); 2].map(|()| between([-REACH_MM, REACH_MM]));
+        let place_mm = match near_dots {
+            true => beside_a_dot(anywhere_mm),
+            false => anywhere_mm,
+        };
         let load = Load::from_angles(force_n, alpha_deg, beta_deg)?;
         let (name, object, shape) = self.object(place_mm, &mut random)?;
         let [x, y] = place_mm;
@@ -178,6 +185,15 @@ impl Kind {
     }
 }
 
+/// Maps a place within [`REACH_MM`] to one that is at most [`BESIDE_MM`] from a dot's centre along x
+/// and along y, and within that reach: each quadrant to its own dot.
+fn beside_a_dot(place_mm: [f64; 2]) -> [f64; 2] {
+    place_mm.map(|part| {
+        let beside = BESIDE_MM * (2.0 * part.abs() / REACH_MM - 1.0);
+        (MARKER_REST_MM + beside).min(REACH_MM).copysign(part)
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,7 +201,7 @@ mod tests {
     #[test]
     fn draws_are_the_same_for_the_same_seed_and_differ_otherwise() {
         for kind in KINDS {
-            let draw = |seed, number| kind.draw(seed, number).unwrap();
+            let draw = |seed, number| kind.draw(seed, number, false).unwrap();
             assert_eq!(draw(1, 3).name, draw(1, 3).name);
             assert_ne!(draw(1, 3).force_n, draw(1, 4).force_n);
             assert_ne!(draw(1, 3).force_n, draw(2, 3).force_n);
@@ -193,5 +209,17 @@ mod tests {
             let size = (x * x + y * y + z * z).sqrt();
             assert!((FORCES_N[0]..=FORCES_N[1]).contains(&size) && z < 0.0);
         }
+    }
+
+    #[test]
+    fn presses_beside_dots_stay_within_reach() {
+        for [x, y] in [[0.0, 4.0], [-0.1, -3.9], [2.0, -2.0], [4.0, 0.5]] {
+            let found = beside_a_dot([x, y]);
+            for (part, before) in found.into_iter().zip([x, y]) {
+                assert!(part.abs() <= REACH_MM && part * before >= 0.0);
+                assert!((part.abs() - MARKER_REST_MM).abs() <= BESIDE_MM);
+            }
+        }
+        assert_eq!(beside_a_dot([2.0, -2.0]), [MARKER_REST_MM, -MARKER_REST_MM]);
     }
 }

@@ -16,6 +16,8 @@ pub struct Plan {
     pub of_each: u32,
     /// Seed of all draws.
     pub seed: u64,
+    /// Whether they are beside dots only.
+    pub near_dots: bool,
 }
 
 /// A press of an object.
@@ -57,7 +59,7 @@ pub fn presses(film: &Film, camera: &Camera, plan: Plan) -> Result<Vec<Press>> {
         .collect::<Vec<_>>()
         .into_par_iter()
         .map(|(kind, number)| {
-            let drawn = kind.draw(plan.seed, number)?;
+            let drawn = kind.draw(plan.seed, number, plan.near_dots)?;
             let name = drawn.name.clone();
             let solved = Press::solve(film, camera, (kind, drawn), &rest_px);
             Ok(solved
@@ -72,7 +74,11 @@ pub fn presses(film: &Film, camera: &Camera, plan: Plan) -> Result<Vec<Press>> {
 }
 
 impl Press {
-    fn solve(
+    /// Solves a press of an object, in a camera that sees the markers at rest at these places, px.
+    ///
+    /// # Errors
+    /// If the film finds no rest under it.
+    pub fn solve(
         film: &Film,
         camera: &Camera,
         (kind, drawn): (Kind, Drawn),
@@ -125,6 +131,7 @@ mod tests {
         let plan = Plan {
             of_each: 1,
             seed: 3,
+            near_dots: false,
         };
         let presses = presses(&film, &camera, plan).unwrap();
         let kinds: Vec<Kind> = presses.iter().map(|press| press.kind).collect();

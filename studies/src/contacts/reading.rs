@@ -1,7 +1,6 @@
 //! The sensor's answers to frames of presses of the full film.
 
 use anyhow::Result;
-use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::Measurement;
@@ -34,12 +33,11 @@ impl<'m> Reader<'m> {
     /// # Errors
     /// If the film at rest gives no rest position.
     pub fn new(
-        (model, weights): (&'m Model<'m>, &Weights),
+        model: &'m Model<'m>,
         film: &'m Film,
         (frames, seed, plane): (u32, u64, bool),
     ) -> Result<Reader<'m>> {
-        let preset = weights.conditions.preset.parse()?;
-        let options = Options::of(preset);
+        let options = Options::of(model.conditions.preset);
         let unit = TestedUnit::new(&model.conditions, options, TIP_RADIUS_MM, seed)?;
         Ok(Reader {
             rest: unit.rest(model)?,
@@ -87,5 +85,44 @@ impl<'m> Reader<'m> {
         }
         let moved = |rest_mm| self.film.displacement(&press.state, rest_mm);
         Ok(scene.render_film(moved, &Load::REST, number))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contacts::objects::Kind;
+    use anyhow::anyhow;
+    use hivtac_calibration::data::loads::norm;
+    use hivtac_calibration::quantize::export;
+    use hivtac_calibration::weights::Weights;
+    use hivtac_shell::Design;
+    use std::path::Path;
+
+    /// A needle that presses hard beside a dot bends it more than anything else.
+    #[test]
+    fn a_dot_that_a_needle_bends_is_still_a_marker() {
+        let path = Path::new("..").join(crate::anywhere::WEIGHTS);
+        let weights = Weights::load(&path).unwrap();
+        let bytes = export(&weights).unwrap();
+        let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"));
+        let model = model.unwrap();
+        let film = Film::new(&Design::default()).unwrap();
+        let camera = weights.conditions.camera().unwrap();
+        let drawn = Kind::Needle.draw(12, 71, true).unwrap();
+        let press = Press::solve(&film, &camera, (Kind::Needle, drawn), &[[0.0; 2]; 4]);
+        let press = press.unwrap();
+        let most = |plane| {
+            let reader = Reader::new(&model, &film, (5, 1, plane)).unwrap();
+            let [answers] = reader.read((0, &press), [press.shape]).unwrap();
+            for answer in answers {
+                let force = answer.force.ok_or(answer.status).unwrap();
+                assert!(answer.markers.is_some(), "{:?}", answer.status);
+                let off_n = f64::from(force.magnitude.0) * 1e-6 - norm(press.force_n);
+                assert!(off_n.abs() < 0.005, "{off_n} N");
+            }
+            reader.frame(&press, 0).unwrap()
+        };
+        assert!(most(true).pixels != most(false).pixels);
     }
 }

@@ -10,10 +10,16 @@
 //! frames of the same sizes and presets: |F| of 5 to 250 mN, tangential force up to 0.8 of the
 //! normal one, places to 4 mm along x and y.
 //!
+//! Those frames show each dot as a plane disc. Frames of the full film show how a needle bends the
+//! dot beside it (`hivtac-studies contacts --near-dots`, seeds 2, 11 and 12, 320×240).
+//!
 //! `FORCE` lists the limits of a tilted force. The tables of the others list only fields that
 //! differ from the reading on which they are based.
 
 use hivtac_terms::conditions::ContactReading;
+
+/// A taper beyond which a tip presses hard beside a dot and bends it.
+pub const STEEP_TAPER: f32 = 0.08;
 
 /// Limits of one kind of contact. A shift is relative to the half side at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +45,8 @@ pub struct Reading {
     pub skew_by_taper: f32,
     /// Lean per taper and square of the image's width.
     pub lean_by_taper: f32,
+    /// More lean per taper beyond [`STEEP_TAPER`] and square of the image's width.
+    pub lean_by_steep_taper: f32,
     /// Additional skew that is always allowed.
     pub skew_always: f32,
     /// Difference of aspects per shift.
@@ -75,6 +83,7 @@ const FORCE: Reading = Reading {
     strain_by_taper: 0.0,
     skew_by_taper: 1.0,
     lean_by_taper: 0.0,
+    lean_by_steep_taper: 0.0,
     skew_always: 0.0,
     aspect_by_shift: 1.0,
     aspect_always: 0.0,
@@ -131,7 +140,8 @@ const SLIP: Reading = Reading {
 /// | `holes` | 0.102 | 0.07 |
 /// | `hollow` | 0.85 px² more | 0.99 in all at 800×600, 0.37 at QVGA |
 /// | `skew_by_taper` | 3.5 | 3.2 |
-/// | `lean_by_taper` | 0.042 | 0.036 |
+/// | `lean_by_taper` | 0.042 | 0.036 of plane dots |
+/// | `lean_by_steep_taper` | 0.1 | 0.081: needles beside a dot, which bend it |
 /// | `skew_always` | 0.05 | |
 /// | `aspect_by_shift` | 1.348 | 1.2 |
 /// | `aspect_always` | 0.04 | |
@@ -148,6 +158,7 @@ const ANYWHERE: Reading = Reading {
     hollow: 0.85,
     skew_by_taper: 3.5,
     lean_by_taper: 0.042,
+    lean_by_steep_taper: 0.1,
     skew_always: 0.05,
     aspect_by_shift: 1.348,
     aspect_always: 0.04,

@@ -11,7 +11,7 @@
 use super::{
     Found, Image,
     pattern::{Pattern, distance, is_within, larger, length},
-    reading::Reading,
+    reading::{Reading, STEEP_TAPER},
     shape::RadialShape,
 };
 use crate::markers::dilate::MAX_DILATIONS;
@@ -225,7 +225,9 @@ impl Trust {
             + self.reading.skew_always;
         // The limit grows if the optics make the marker wider than at rest.
         let wider = larger(expected * self.by_rest_width, 1.0);
-        let bent = width * width * taper * self.reading.lean_by_taper;
+        let by_square = taper * self.reading.lean_by_taper
+            + larger(taper - STEEP_TAPER, 0.0) * self.reading.lean_by_steep_taper;
+        let bent = width * width * by_square;
         let lean = (LEAN * wider + bent) * (0.5 * (self.grid + 1.0));
         self.width_fits(*expected, radial, edge)
             && radial.skew.abs() <= skew
