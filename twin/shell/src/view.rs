@@ -31,7 +31,7 @@ pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4]
     })
 }
 
-/// Returns a film in a state in the form that a scene renders. It has the motion at these discs, one
+/// Returns a film in a state in the form that a scene renders. It has the motion at these discs,
 /// for each dot, relative to the flat mounted film.
 ///
 /// # Errors
