@@ -22,7 +22,7 @@ fn press(force_n: f64, alpha_deg: f64, beta_deg: f64) -> Load {
 fn centroids(scene: &Scene, load: Load) -> [[f64; 2]; 4] {
     let camera = *scene.camera();
     let truth = scene.clone().with_load(load).unwrap().truth(0.0);
-    truth.markers.four().map(|marker| {
+    truth.markers.array::<4>().map(|marker| {
         let [x, y] = marker.expect("in the frame").centroid_px;
         [
             x - f64::from(camera.width() - 1) / 2.0,

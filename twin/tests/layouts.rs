@@ -135,9 +135,9 @@ fn units_and_tips_differ_as_with_the_nominal_dots() {
                 scene(options).with_load(load).unwrap().truth(0.0).markers
             };
             let pairs = of(film)
-                .four()
+                .array::<4>()
                 .into_iter()
-                .zip(of(Mechanics::default()).four());
+                .zip(of(Mechanics::default()).array::<4>());
             pairs.map(|(changed, usual)| {
                 let [a, b] = [changed, usual].map(|marker| marker.unwrap().centroid_px);
                 [a[0] - b[0], a[1] - b[1]]

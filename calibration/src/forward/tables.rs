@@ -87,7 +87,7 @@ impl UnitSetup<'_> {
     /// When the unit is invalid, or its motion does not fit into tables.
     pub fn tables(&self) -> Result<(TablesSpec, f64)> {
         let film = Film::of(self.unit)?;
-        let dots = film.markers_mm().four().map(Dot::of_film);
+        let dots = film.markers_mm().array::<4>().map(Dot::of_film);
         tables(&dots, |pose, dot| self.moved(&film, pose, dot))
     }
 }

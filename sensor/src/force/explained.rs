@@ -38,6 +38,11 @@ const UNEXPLAINED_BLURRED: f32 = 5.0;
 /// Largest standard uncertainties of a force that is still of use: of the direction, m°; of |F|, in
 /// parts of it; and of the place, µm.
 const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
+/// A contact of unknown or wide shape this near to a marker, mm, moves it in ways that the tables
+/// of shapes do not have: by these factors the uncertainties of direction, |F| and place are too
+/// small. Chosen on presses beside markers (`hivtac-studies contacts --near-dots --seed 11`).
+const BESIDE_MM: f32 = 2.0;
+const BESIDE: [u32; 3] = [3, 4, 3];
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
 /// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
@@ -265,6 +270,14 @@ impl Resting {
             && force.place.is_some_and(|at| at.sigma.0 <= place)
     }
 
+    /// Whether a contact that need not be a needle is so near to a marker that it moves it in ways
+    /// that the tables of shapes do not have.
+    fn is_beside_a_marker(&self, forward: &Forward<'_>, estimate: &Estimate) -> bool {
+        let place_mm = estimate.pose.place_mm;
+        let mut distances = forward.rest_image.squared_distances_mm(place_mm);
+        self.shape != ContactShape::Needle && distances.any(|square| square < BESIDE_MM * BESIDE_MM)
+    }
+
     /// Returns the force of a load that was found in a frame of this noise, and its status. If the
     /// load explains the markers badly, its uncertainties are widened and the status is
     /// [`Status::LOOSELY_EXPLAINED`]. It is [`Status::UNEXPLAINED`] if that is not
@@ -276,7 +289,10 @@ impl Resting {
         noise: FrameNoise,
         estimate: &Estimate,
     ) -> (Force, Status) {
-        let (force, by_noise) = force(&forward.strength(self.is_own), estimate);
+        let (mut force, by_noise) = force(&forward.strength(self.is_own), estimate);
+        if self.is_beside_a_marker(forward, estimate) {
+            widen(&mut force, BESIDE);
+        }
         let mut status = trust(&force, by_noise, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
         if is_blurred || !estimate.is_explained() && !self.may_be_loose(&force) {
@@ -306,6 +322,18 @@ impl Resting {
         let noise = FrameNoise::AS_MODELLED;
         let estimate = self.estimate(forward, markers, noise, output);
         self.told(forward, range, noise, &estimate)
+    }
+}
+
+/// Multiplies the standard uncertainties of direction, |F| and place.
+fn widen(force: &mut Force, [direction, magnitude, place]: [u32; 3]) {
+    let sigma = &mut force.direction_sigma.0;
+    *sigma = sigma.saturating_mul(direction).min(NO_DIRECTION.0);
+    let sigma = &mut force.magnitude_sigma.0;
+    *sigma = sigma.saturating_mul(magnitude);
+    if let Some(at) = &mut force.place {
+        let sigma = at.sigma.0.saturating_mul(place);
+        at.sigma.0 = sigma.min(LARGEST_PLACE_UNCERTAINTY.0);
     }
 }
 

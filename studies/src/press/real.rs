@@ -105,7 +105,7 @@ fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
             break vector.map(|part| part / length);
         }
     };
-    let dots_mm = MARKER_CENTRES_MM.iter().zip(options.glued_mm.four());
+    let dots_mm = MARKER_CENTRES_MM.iter().zip(options.glued_mm.array::<4>());
     let dots_mm = dots_mm
         .map(|([x, y], [right, down])| [x + right, y + down])
         .collect();

@@ -56,7 +56,7 @@ impl Stretched {
             "shift_px": options.mounting.shift_px,
             "roll_deg": options.mounting.roll_deg,
             "pitch_um": options.lens.pitch_um,
-            "glued_mm": options.glued_mm.four(),
+            "glued_mm": options.glued_mm.array::<4>(),
             "states": states,
         });
         fs::create_dir_all(&self.into)?;
@@ -74,7 +74,7 @@ fn state(unit: &TestedUnit, load: &Load) -> Result<Value> {
     Ok(json!({
         "force_n": pressed.force_n,
         "touches_mm": pressed.touches_mm,
-        "centres_mm": pressed.centres_mm.four(),
-        "discs": pressed.discs.four().map(motion),
+        "centres_mm": pressed.centres_mm.array::<4>(),
+        "discs": pressed.discs.array::<4>().map(motion),
     }))
 }

@@ -111,7 +111,7 @@ fn errors(
         let ours = disc.centroid_px(|rest| pressed.displacement(rest), camera);
         (full[0] - ours[0]).hypot(full[1] - ours[1])
     };
-    let discs = reduced.markers_mm().four().map(Disc::marker);
+    let discs = reduced.markers_mm().array::<4>().map(Disc::marker);
     let tip_mm = (0..3).map(|c| (pressed.tip_mm[c] - state.tip_mm[c]).powi(2));
     Ok((tip_mm.sum::<f64>().sqrt(), discs.map(distance)))
 }

@@ -32,7 +32,7 @@ pub fn markers(film: &Film, state: &Equilibrium, camera: &Camera) -> [Marker; 4]
 }
 
 /// Returns a film in a state in the form that a scene renders. It has the motion at these discs,
-/// for each dot, relative to the flat mounted film.
+/// one for each dot, relative to the flat mounted film.
 ///
 /// # Errors
 /// Never, as long as the camera's preset exists.

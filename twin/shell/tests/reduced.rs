@@ -36,7 +36,7 @@ fn agree(unit: &Unit, loads: &[Load], most_px: f64) {
         }
         for (id, disc) in reduced
             .markers_mm()
-            .four()
+            .array::<4>()
             .map(Disc::marker)
             .into_iter()
             .enumerate()
@@ -92,7 +92,7 @@ type Images = [[f64; 2]; 4];
 fn images(down: [f64; 3], loads: &[Load]) -> Vec<[Images; 2]> {
     let weighed = Some(down).filter(|down| *down != [0.0; 3]);
     let reduced = ReducedFilm::default().with_down(weighed).unwrap();
-    let discs = reduced.markers_mm().four().map(Disc::marker);
+    let discs = reduced.markers_mm().array::<4>().map(Disc::marker);
     let design = Design {
         down,
         ..Design::default()

@@ -217,7 +217,7 @@ impl MarksSection {
     fn glued_mm(&self, count: usize) -> Result<Dots<[f64; 2]>, SceneError> {
         match &self.glued_mm {
             None => Ok(Dots::from_fn(count, |_| [0.0; 2])),
-            Some(places) if places.len() == count => Ok(Dots::of(places)),
+            Some(places) if places.len() == count => Ok(Dots::of(places.iter().copied())),
             Some(places) => Err(SceneError::Key {
                 key: "glued_mm",
                 why: format!("{} shifts: use one for each of {count} dots", places.len()),

@@ -76,7 +76,7 @@ impl Layout {
             }
         }
         Ok(Layout {
-            centres_mm: Dots::of(centres_mm),
+            centres_mm: Dots::of(centres_mm.iter().copied()),
             diameter_mm,
         })
     }

@@ -57,6 +57,15 @@ impl RestImage {
         sum.map(|part| part / all)
     }
 
+    /// The square of the distance of each marker, at rest on the film, from a place, mm².
+    pub fn squared_distances_mm(&self, [right, below]: [f32; 2]) -> impl Iterator<Item = f32> {
+        let markers = self.at.iter().zip(self.film_mm.iter());
+        markers.map(move |([x, y], [_, across_mm])| {
+            let (right, below) = (right - across_mm * x, below - across_mm * y);
+            right * right + below * below
+        })
+    }
+
     /// The covariance (xx, xy, yy) of a marker's image with these variances away from the axis and
     /// across that.
     #[inline]

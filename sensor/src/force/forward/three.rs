@@ -5,7 +5,7 @@
 //! the nearest of a few straight presses.
 
 use super::estimate::{Estimate, Observed};
-use super::mounting::{Mounting, RestImage};
+use super::mounting::Mounting;
 use super::pose::Pose;
 use super::predict::Markers;
 use super::solve::{Column, square};
@@ -36,13 +36,11 @@ impl Estimate {
 impl Forward<'_> {
     /// Returns whether three markers determine a contact: it is not near the marker `lost` (0–3).
     pub fn is_far_from(&self, lost: usize, estimate: &Estimate) -> bool {
-        let RestImage { at, film_mm } = &self.rest_image;
-        let dot = at.get(lost).zip(film_mm.get(lost));
-        dot.is_some_and(|([x, y], [_, across_mm])| {
-            let [right, below] = estimate.pose.place_mm;
-            let (right, below) = (right - across_mm * x, below - across_mm * y);
-            right * right + below * below >= NEAR_MM * NEAR_MM
-        })
+        let place_mm = estimate.pose.place_mm;
+        let mut distances = self.rest_image.squared_distances_mm(place_mm).skip(lost);
+        distances
+            .next()
+            .is_some_and(|square| square >= NEAR_MM * NEAR_MM)
     }
 
     /// Returns the load that explains the markers but `lost` (0–3) best, and where that one is

@@ -178,7 +178,7 @@ fn free_recording(seconds: u32) -> (Recording, Series) {
     let scene = Recipe::default().scene(0).unwrap();
     let markers_of = |load: &Load| {
         let truth = scene.truth_under(load).unwrap();
-        truth.markers.four().map(|marker| {
+        truth.markers.array::<4>().map(|marker| {
             let [x, y] = marker.unwrap().centroid_px;
             let px = |px: f64| Px((px * 65_536.0) as i32);
             Marker {
