@@ -185,8 +185,8 @@ impl Kind {
     }
 }
 
-/// Maps a place within [`REACH_MM`] to one that is at most [`BESIDE_MM`] from a dot's centre along x
-/// and along y, and within that reach: each quadrant to its own dot.
+/// Maps a place within [`REACH_MM`] to one that is at most [`BESIDE_MM`] from a dot's centre along
+/// x and along y, and within that reach: each quadrant to its own dot.
 fn beside_a_dot(place_mm: [f64; 2]) -> [f64; 2] {
     place_mm.map(|part| {
         let beside = BESIDE_MM * (2.0 * part.abs() / REACH_MM - 1.0);
