@@ -268,6 +268,7 @@ fn multiplier_and_shift(factor: f64, bits: u32) -> Result<(u32, u8)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_sensor::force::model::ModelError;
     use proptest::prelude::*;
 
     #[test]
@@ -282,6 +283,37 @@ mod tests {
             assert!(multiplier_and_shift(factor, 24).is_err(), "{factor}");
         }
         assert_eq!(multiplier_and_shift(1e-30, 24).unwrap(), (1, 62));
+    }
+
+    /// A device would compare five markers' motion with four rest positions.
+    #[test]
+    fn a_film_of_more_markers_than_rest_is_refused() {
+        let models = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("models");
+        let weights = Weights::load(&models.join("default.weights")).unwrap();
+        let mut spec = spec(&weights).unwrap();
+        let film = spec.forward.as_mut().unwrap();
+        (film.own, film.other, film.weight) = (None, None, None);
+        film.tables.dots.push(film.tables.dots[0].clone());
+        for places in [
+            &mut film.rest_image.at,
+            &mut film.rest_image.film_mm,
+            &mut film.noise.rest_px,
+        ] {
+            places.push(places[0]);
+        }
+        let alone = film.to_bytes();
+        assert!(hivtac_sensor::force::forward::Forward::parse(&alone).is_ok());
+        let refused = spec.encode().unwrap_err();
+        let is_it = |error: &ModelError| {
+            matches!(
+                error,
+                ModelError::Field {
+                    name: "markers",
+                    ..
+                }
+            )
+        };
+        assert!(is_it(&refused), "{refused}");
     }
 
     fn form(width: WeightWidth) -> Form {

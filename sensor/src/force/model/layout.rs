@@ -5,6 +5,7 @@ use super::{
     forward::forward, layers::layers, place::place, reader::Reader, uncertainty::uncertainty,
 };
 use crate::force::features::{FEATURES, Features};
+use crate::force::forward::Forward;
 use crate::force::rest::Rest;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
@@ -51,7 +52,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         range.place = place(&mut reader, &mut uncertainty)?;
     }
     let forward = match has_forward {
-        true => Some(forward(&mut reader)?),
+        true => Some(forward_of(&mut reader, rest.areas.len())?),
         false => None,
     };
     let layers = layers(&mut reader, layer_count, output.count())?;
@@ -120,6 +121,21 @@ fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, Mode
                       network)",
         }),
     }
+}
+
+/// Reads the film run forwards. It must be of as many markers as the rest position has.
+fn forward_of<'a>(reader: &mut Reader<'a>, markers: usize) -> Result<Forward<'a>, ModelError> {
+    // The number of markers follows those of steps and camera.
+    let offset = reader.offset + 2;
+    let forward = forward(reader)?;
+    if forward.tables.dots() == markers {
+        return Ok(forward);
+    }
+    Err(ModelError::Field {
+        name: "markers",
+        offset,
+        allowed: "4, as the rest position has",
+    })
 }
 
 /// Checks header and checksum. Returns everything before the checksum, the checksum and the
