@@ -92,8 +92,6 @@ fn the_sensing_runs_from_itcm() {
         "7forward5drift",
         "7forward6weight",
         "7forward6shapes",
-        "14CovarianceGrid6around",
-        "14CovarianceGrid2at",
         "8pipeline7hanging",
         "5force10of_outputs",
         "8Geometry9rest_area",

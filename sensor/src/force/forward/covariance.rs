@@ -198,16 +198,10 @@ impl<'a> CovarianceGrid<'a> {
         covariance.square();
     }
 
-    /// Calls `each` with the number and the weight of every knot around a load.
-    pub(super) fn around(&self, pose: &Pose, limits: &Limits, mut each: impl FnMut(usize, f32)) {
-        for (knot, part) in self.corners(pose, limits) {
-            each(knot, part);
-        }
-    }
-
-    /// Compiled once, because the near memory is scarce.
+    /// The number and the weight of every knot around a load. Compiled once, because the near
+    /// memory is scarce.
     #[inline(never)]
-    fn corners(&self, pose: &Pose, limits: &Limits) -> [(usize, f32); 8] {
+    pub(super) fn corners(&self, pose: &Pose, limits: &Limits) -> [(usize, f32); 8] {
         let mut corners = [(0, 0.0); 8];
         let mut free = corners.iter_mut();
         let [sizes, lines, places] = self.counts.map(usize::from);

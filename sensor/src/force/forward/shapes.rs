@@ -161,9 +161,9 @@ impl Pressing<'_> {
         let mirror = Mirror::of(pose.place_mm);
         let pose = &self.shapes.folded(pose);
         let mut sum = Column::defaults(COORDINATES);
-        self.shapes.covariance.around(pose, limits, |knot, part| {
+        for (knot, part) in self.shapes.covariance.corners(pose, limits) {
             let Some(knot) = self.shapes.shifts.get(knot) else {
-                return;
+                continue;
             };
             let part = part * step(knot);
             let motions = knot.as_chunks::<2>().0[2..].as_chunks::<COORDINATES>().0;
@@ -172,7 +172,7 @@ impl Pressing<'_> {
                     *sum += part * of_motion * f32::from(i16::from_le_bytes(*bytes));
                 }
             }
-        });
+        }
         mirror.column(&sum)
     }
 }
