@@ -60,7 +60,7 @@ static STEPS: [Step; 14] = [
         |_, tally| python::test_serve(tally),
         Some(python::no_serve),
     ),
-    ("benchmark", |_, _| bench::Bench::default().run(), None),
+    ("benchmark", |shared, _| shared.benchmark(), None),
     ("build: board benchmark", |_, _| bench::board::lint(), None),
     ("licences", |_, _| licences(), Some(no_cargo_deny)),
 ];
@@ -138,6 +138,11 @@ impl Shared {
     fn target_lints(&self) -> Result<()> {
         let _no_build = self.target.lock();
         target_lints()
+    }
+
+    fn benchmark(&self) -> Result<()> {
+        let _no_lints = self.target.lock();
+        bench::Bench::default().run()
     }
 
     fn build(&self) -> Result<()> {
