@@ -163,18 +163,28 @@ impl fmt::Display for Refusal {
 /// # Errors
 /// Why it is refused.
 pub fn check(file: &'static [u8]) -> Result<Model<'static>, Refusal> {
-    let model = Model::parse(file).map_err(Refusal::Unusable)?;
+    match Model::parse(file) {
+        Ok(model) => match misfit(&model) {
+            None => Ok(model),
+            Some(refusal) => Err(refusal),
+        },
+        Err(error) => Err(Refusal::Unusable(error)),
+    }
+}
+
+/// Why a sound model cannot be used here; `None` if it can.
+fn misfit(model: &Model<'static>) -> Option<Refusal> {
     let conditions = &model.conditions;
     let is_sent = Format::of(conditions.threshold.format()).is_some();
     if conditions.geometry != camera::GEOMETRY || !is_sent {
-        return Err(Refusal::Frames);
+        return Some(Refusal::Frames);
     }
     if matches!(conditions.origin, Origin::Unit(unit) if unit != embassy_stm32::uid::uid()) {
-        return Err(Refusal::Unit);
+        return Some(Refusal::Unit);
     }
-    match settings(Some(&model), None).check() {
-        Ok(()) => Ok(model),
-        Err(_) => Err(Refusal::Settings),
+    match settings(Some(model), None).check() {
+        Ok(()) => None,
+        Err(_) => Some(Refusal::Settings),
     }
 }
 

@@ -91,7 +91,7 @@ fn standing(flash: &OfFlash) -> u32 {
             flash.found == Found::AnotherVersion,
         ),
         (Problem::FlashFails, flash.failures > 0),
-        (Problem::StackLow, stack::used() > stack::bytes() / 4 * 3),
+        (Problem::StackLow, stack::used() > stack::bytes() / 5 * 4),
         (Problem::WatchdogReset, reset == ResetReason::Watchdog),
         (Problem::SoftwareReset, reset == ResetReason::Software),
     ])

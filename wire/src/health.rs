@@ -53,7 +53,7 @@ pub enum Problem {
     SettingsUnread = 3,
     /// An attempt to write to the flash has failed since the start.
     FlashFails = 4,
-    /// Less than a quarter of the stack was free at some moment.
+    /// Less than a fifth of the stack was free at some moment.
     StackLow = 5,
     /// The last start followed a reset by the watchdog.
     WatchdogReset = 6,

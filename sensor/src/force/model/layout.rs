@@ -51,10 +51,20 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
     if output.tells_place() {
         range.place = place(&mut reader, &mut uncertainty)?;
     }
+    // The number of markers follows those of steps and camera.
+    let markers_at = reader.offset + 2;
     let forward = match has_forward {
-        true => Some(forward_of(&mut reader, rest.areas.len())?),
+        true => Some(forward(&mut reader)?),
         false => None,
     };
+    let is_of_rest = |film: &Forward<'_>| film.tables.dots() == rest.areas.len();
+    if !forward.as_ref().is_none_or(is_of_rest) {
+        return Err(ModelError::Field {
+            name: "markers",
+            offset: markers_at,
+            allowed: "4, as the rest position has",
+        });
+    }
     let layers = layers(&mut reader, layer_count, output.count())?;
     if reader.offset != body.len() {
         let announced = (reader.offset + CRC_LENGTH) as u32;
@@ -121,21 +131,6 @@ fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, Mode
                       network)",
         }),
     }
-}
-
-/// Reads the film run forwards. It must be of as many markers as the rest position has.
-fn forward_of<'a>(reader: &mut Reader<'a>, markers: usize) -> Result<Forward<'a>, ModelError> {
-    // The number of markers follows those of steps and camera.
-    let offset = reader.offset + 2;
-    let forward = forward(reader)?;
-    if forward.tables.dots() == markers {
-        return Ok(forward);
-    }
-    Err(ModelError::Field {
-        name: "markers",
-        offset,
-        allowed: "4, as the rest position has",
-    })
 }
 
 /// Checks header and checksum. Returns everything before the checksum, the checksum and the
