@@ -6,7 +6,6 @@ use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::force::{self, Force, FrameNoise, Resting};
-use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 
@@ -40,13 +39,6 @@ impl<'m> Chip<'m> {
             tare,
             network: Network::new(),
         })
-    }
-
-    /// Sets the shape of what presses; initially the model's own tip.
-    pub fn set_contact_shape(&mut self, shape: ContactShape) {
-        if let Some(resting) = &mut self.resting {
-            resting.set_contact_shape(shape);
-        }
     }
 
     /// The markers' areas at rest, px.

@@ -81,7 +81,9 @@ pub fn even(largest: f64) -> CovarianceSpec {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_sensor::force::forward::{CovarianceGrid, Limits, Pose as ChipPose};
+    use hivtac_sensor::force::forward::{
+        Covariance as ChipCovariance, CovarianceGrid, Limits, Pose as ChipPose,
+    };
 
     /// The chip reads the covariances that were written, at knots and between them.
     #[test]
@@ -117,7 +119,8 @@ mod tests {
                 place_mm: place_mm.map(|part| part as f32),
                 ..ChipPose::default()
             };
-            let (found, truth) = (grid.at(&chip, &limits), truth(&pose));
+            let (mut found, truth) = (ChipCovariance::EMPTY, truth(&pose));
+            grid.put(&chip, &limits, &mut found);
             for i in 0..EQUATIONS {
                 for j in 0..=i {
                     let off = f64::from(found.entry(i, j)) - truth[i][j];

@@ -2,6 +2,9 @@
 
 use crate::units::Px;
 
+/// Most markers of a layout.
+pub const MOST_MARKERS: usize = 16;
+
 /// One of the four dots. Its index is its identity: 0 upper left, 1 upper right, 2 lower right, 3
 /// lower left, as seen in the image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -10,7 +10,7 @@ use crate::{Change, Contact, Equilibrium, Film, Response, ShellError};
 
 /// Sizes at which the film is solved, in parts of the largest: Chebyshev's, without 0, at which the
 /// film does not move.
-pub(crate) const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
+const SIZES: [f64; 4] = [0.146_446_609_406_726_24, 0.5, 0.853_553_390_593_273_8, 1.0];
 /// Rings of tilts: radius in parts of the largest, and the angle of the first of their four tilts,
 /// °.
 const TILTS: [(f64, f64); 2] = [(0.6, 65.0), (1.0, 20.0)];
@@ -46,14 +46,27 @@ pub fn solve_place(
     camera: &Camera,
     place_mm: [f64; 2],
 ) -> Result<Vec<Solved>, ShellError> {
+    let look = |film: &Film, pose, state: &_| look(film, camera, pose, state);
+    at_all_loads(film, place_mm, look)
+}
+
+/// Solves the film with the tip at one place, at rest and for all sizes and tilts, and returns what
+/// `look` makes of each solution.
+///
+/// # Errors
+/// If no equilibrium is found, or `look` fails.
+pub(crate) fn at_all_loads<T>(
+    film: &mut Film,
+    place_mm: [f64; 2],
+    look: impl Fn(&Film, Pose, &Equilibrium) -> Result<T, ShellError>,
+) -> Result<Vec<T>, ShellError> {
     let radius_mm = film.design().tip_radius_mm;
     film.move_tip(place_mm, radius_mm)?;
     let at_rest = Pose {
-        size: 0.0,
-        tilt: [0.0; 2],
         place_mm,
+        ..Pose::default()
     };
-    let mut solved = vec![look(film, camera, at_rest, &film.rest())?];
+    let mut solved = vec![look(film, at_rest, &film.rest())?];
     for tilt in tilts() {
         let mut path = Path::from_rest(film);
         for part in SIZES {
@@ -63,7 +76,7 @@ pub fn solve_place(
                 place_mm,
             };
             let state = path.go(film, Contact::Force(pose.force_n()), pose.size)?;
-            solved.push(look(film, camera, pose, &state)?);
+            solved.push(look(film, pose, &state)?);
         }
     }
     Ok(solved)

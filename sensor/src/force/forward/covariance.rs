@@ -178,17 +178,10 @@ impl<'a> CovarianceGrid<'a> {
         counts.into_iter().map(usize::from).product::<usize>() * knot_length(coordinates)
     }
 
-    /// Returns the covariance at a load; beyond the last size or place, the covariance there. Knot
-    /// k of n+1 is at (k/n)² of the largest size. Factors, not covariances, are interpolated: any
-    /// sum of factors is the factor of a covariance.
-    pub fn at(&self, pose: &Pose, limits: &Limits) -> Covariance {
-        let mut covariance = Covariance::EMPTY;
-        self.put(pose, limits, &mut covariance);
-        covariance
-    }
-
-    /// As [`CovarianceGrid::at`], in place.
-    pub(super) fn put(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
+    /// Puts the covariance at a load into `covariance`; beyond the last size or place, the
+    /// covariance there. Knot k of n+1 is at (k/n)² of the largest size. Factors, not covariances,
+    /// are interpolated: any sum of factors is the factor of a covariance.
+    pub fn put(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
         covariance.reset(self.coordinates);
         let length = knot_length(self.coordinates);
         for (knot, part) in self.corners(pose, limits) {
@@ -308,15 +301,6 @@ impl Whitening {
         factor: Covariance::EMPTY,
     };
 
-    /// Returns `None` if the covariance is singular, or an entry is not a finite number.
-    pub fn new(covariance: &Covariance) -> Option<Whitening> {
-        let mut whitening = Whitening {
-            factor: covariance.clone(),
-        };
-        whitening.factorize()?;
-        Some(whitening)
-    }
-
     /// Sets the covariance, which `put` leaves in its argument. Returns `None` if it is singular,
     /// or an entry is not a finite number.
     pub(super) fn set(&mut self, put: impl FnOnce(&mut Covariance)) -> Option<()> {
@@ -396,6 +380,18 @@ pub(super) mod tests {
         }
     }
 
+    fn at(grid: &CovarianceGrid<'_>, pose: &Pose) -> Covariance {
+        let mut covariance = Covariance::EMPTY;
+        grid.put(pose, &LIMITS, &mut covariance);
+        covariance
+    }
+
+    fn whitening(covariance: &Covariance) -> Option<Whitening> {
+        let mut whitening = Whitening::EMPTY;
+        whitening.set(|own| *own = covariance.clone())?;
+        Some(whitening)
+    }
+
     /// Bytes of knots whose entries `entry(knot, index)` gives, in steps of 10⁻⁵.
     pub fn knots(entry: impl Fn(usize, usize) -> i16) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -428,7 +424,7 @@ pub(super) mod tests {
             (0.8, [3.0, 3.0]),
             (1.1, [9.0, -7.0]),
         ] {
-            let found = grid.at(&pose(size, [x, y]), &LIMITS);
+            let found = at(&grid, &pose(size, [x, y]));
             let part = |at: f32| (at.clamp(-3.0, 3.0) + 3.0) / 6.0;
             let sizes = 2.0 * (size.min(0.8) / 0.8).sqrt();
             let expected = 1e-10 * sigma(sizes, part(y), 3.0 * part(x)).powi(2);
@@ -447,7 +443,7 @@ pub(super) mod tests {
         let entry = |_, k: usize| ((k * k) % 29) as i16 - 14;
         let bytes = knots(entry);
         let grid = CovarianceGrid::new(COORDINATES, COUNTS, 3.0, &bytes).unwrap();
-        let found = grid.at(&pose(0.8, [3.0, 3.0]), &LIMITS);
+        let found = at(&grid, &pose(0.8, [3.0, 3.0]));
         let factor = |i: usize, k: usize| match k <= i {
             true => 1e-5 * f32::from(entry(0, triangle(i) + k)),
             false => 0.0,
@@ -470,7 +466,7 @@ pub(super) mod tests {
             }
             row[i] += 0.5;
         }
-        let whitening = Whitening::new(&covariance).unwrap();
+        let whitening = whitening(&covariance).unwrap();
         // Columns of the whitening matrix.
         let inverse: [Column; 8] = core::array::from_fn(|k| {
             let mut unit = Column::defaults(8);
@@ -496,15 +492,15 @@ pub(super) mod tests {
 
     #[test]
     fn what_is_no_covariance_whitens_nothing() {
-        assert!(Whitening::new(&Covariance::zeros(8)).is_none());
+        assert!(whitening(&Covariance::zeros(8)).is_none());
         for wrong in [f32::NAN, f32::INFINITY, -1.0] {
             let mut covariance = Covariance::zeros(8);
             for row in covariance.rows_mut() {
                 *row.last_mut().unwrap() = 1.0;
             }
-            assert!(Whitening::new(&covariance).is_some());
+            assert!(whitening(&covariance).is_some());
             covariance.add(5, 5, wrong - 1.0);
-            assert!(Whitening::new(&covariance).is_none(), "{wrong}");
+            assert!(whitening(&covariance).is_none(), "{wrong}");
         }
     }
 
@@ -523,12 +519,12 @@ pub(super) mod tests {
             };
             let bytes = knots(entry);
             let grid = CovarianceGrid::new(COORDINATES, COUNTS, 4.0, &bytes).unwrap();
-            let mut covariance = grid.at(&pose(size, [x, 0.5]), &LIMITS);
+            let mut covariance = at(&grid, &pose(size, [x, 0.5]));
             for k in 0..COORDINATES {
                 covariance.add(k, k, noise * noise);
             }
             let no_number = size.is_nan() || x.is_nan();
-            prop_assert!(no_number || Whitening::new(&covariance).is_some(), "{covariance:?}");
+            prop_assert!(no_number || whitening(&covariance).is_some(), "{covariance:?}");
         }
     }
 

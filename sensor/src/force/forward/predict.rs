@@ -27,9 +27,13 @@ pub struct Tables<'a> {
     /// Coefficients by function and term, f32 each: functions of even powers of the tilt's second
     /// part, then those of odd powers.
     functions: [&'a [[u8; 4]]; 2],
+    /// Number of functions.
+    count: usize,
     /// The bytes of all markers' tables, one after the other.
     bytes: &'a [u8],
     dots: List<Dot, MOST_DOTS>,
+    /// The first and the last place that all tables cover along both axes, mm.
+    ends_mm: [f32; 2],
 }
 
 /// Where the table of a marker lies, and what was found when it was taken.
@@ -77,12 +81,20 @@ impl<'a> Tables<'a> {
             && parts
                 .map(|part| f32::from_le_bytes(*part))
                 .all(|part| part.abs() <= 1.0);
-        sound.then_some(Tables {
+        let mut tables = Tables {
             terms,
             functions,
+            count,
             bytes,
             dots,
-        })
+            ends_mm: [f32::MIN, f32::MAX],
+        };
+        let axes = tables.tables().flat_map(|table| *table.axes());
+        tables.ends_mm = axes.fold(tables.ends_mm, |[from, to], axis| {
+            let [first, last] = axis.ends_mm();
+            [from.max(first), to.min(last)]
+        });
+        sound.then_some(tables)
     }
 
     /// Number of markers.
@@ -92,28 +104,15 @@ impl<'a> Tables<'a> {
 
     /// The tables of all markers.
     fn tables(&self) -> impl Iterator<Item = Table<'a>> {
-        let functions = self.functions();
-        self.dots.iter().map_while(move |dot| {
+        self.dots.iter().map_while(|dot| {
             let bytes = self.bytes.get(dot.at as usize..)?;
-            Table::taken(bytes, dot.slope_units, functions)
+            Table::taken(bytes, dot.slope_units, self.count)
         })
-    }
-
-    /// Number of functions.
-    fn functions(&self) -> usize {
-        let counts = self.functions.iter().zip(self.terms.counts());
-        counts
-            .map(|(parts, terms)| parts.len() / terms.max(1))
-            .sum()
     }
 
     /// The first and the last place that all tables cover along both axes, mm.
     pub fn ends_mm(&self) -> [f32; 2] {
-        let axes = self.tables().flat_map(|table| *table.axes());
-        axes.fold([f32::MIN, f32::MAX], |[from, to], axis| {
-            let [first, last] = axis.ends_mm();
-            [from.max(first), to.min(last)]
-        })
+        self.ends_mm
     }
 
     /// Predicts the motion of markers that are glued `beside_mm` from their nominal places. That

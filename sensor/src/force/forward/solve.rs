@@ -6,11 +6,12 @@
 
 use crate::force::kernels::sqrt;
 use hivtac_terms::list::List;
+use hivtac_terms::marker::MOST_MARKERS;
 
 /// Unknowns: size, tilt along x and y, place along x and y.
 pub const UNKNOWNS: usize = 5;
 /// Most markers.
-pub const MOST_DOTS: usize = 16;
+pub const MOST_DOTS: usize = MOST_MARKERS;
 /// Most equations of the markers: x and y of each.
 pub const MOST_EQUATIONS: usize = 2 * MOST_DOTS;
 /// Equations of the prior that may follow those of the markers.

@@ -1,10 +1,9 @@
 //! Full solutions sampled on a grid of places around the tip, with their derivatives.
 
-use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_twin::film::reduced::Pose;
 
-use crate::path::Path;
-use crate::sweep::{SIZES, tilts};
-use crate::{Change, Contact, Design, Equilibrium, Film, Response, ShellError};
+use crate::sweep::at_all_loads;
+use crate::{Change, Design, Equilibrium, Film, Response, ShellError};
 
 /// Distances from the tip, along x and along y, at which a solution is sampled: these, their
 /// negatives and all pairs, mm.
@@ -64,26 +63,7 @@ pub fn both_sides(half: &[f64]) -> Vec<f64> {
 /// # Errors
 /// If no equilibrium is found.
 pub fn sample_place(film: &mut Film, place_mm: [f64; 2]) -> Result<Vec<Sampled>, ShellError> {
-    let radius_mm = film.design().tip_radius_mm;
-    film.move_tip(place_mm, radius_mm)?;
-    let at_rest = Pose {
-        place_mm,
-        ..Pose::default()
-    };
-    let mut sampled = vec![sample(film, at_rest, &film.rest())?];
-    for tilt in tilts() {
-        let mut path = Path::from_rest(film);
-        for part in SIZES {
-            let pose = Pose {
-                size: part * LARGEST_SIZE,
-                tilt,
-                place_mm,
-            };
-            let state = path.go(film, Contact::Force(pose.force_n()), pose.size)?;
-            sampled.push(sample(film, pose, &state)?);
-        }
-    }
-    Ok(sampled)
+    at_all_loads(film, place_mm, sample)
 }
 
 fn sample(film: &Film, pose: Pose, state: &Equilibrium) -> Result<Sampled, ShellError> {
