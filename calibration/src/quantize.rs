@@ -73,7 +73,7 @@ pub fn spec(weights: &Weights) -> Result<ModelSpec> {
 fn rest(rest: &Rest) -> Result<rest::Rest> {
     Ok(rest::Rest {
         features: features_from_q16(&rest.features_q16)?,
-        areas: rest.areas_px,
+        areas: rest.areas_px.into(),
     })
 }
 

@@ -370,7 +370,10 @@ impl PipelineTask {
             time_us,
             status,
             force: followed.force,
-            markers: measurement.markers.filter(|_| session::wants_markers()),
+            // A sample has room for four.
+            markers: (measurement.markers)
+                .and_then(|markers| markers.exactly())
+                .filter(|_| session::wants_markers()),
         }
     }
 

@@ -4,7 +4,6 @@
 use crate::dtcm_table::Sensor;
 use core::cell::Cell;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
-use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::CameraMotion;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::markers::settings::Settings;
@@ -184,7 +183,7 @@ pub fn position(rest: &Rest, down: Option<Direction>, settings: &Settings) -> Re
         format: settings.threshold.format(),
         dilations: settings.dilations,
         centroid: settings.centroid,
-        markers: rest.markers(),
+        markers: rest.markers().array(),
         rect_center: rest.features.rect_center,
         rect_area: rest.features.rect_area,
         down,
@@ -225,7 +224,7 @@ pub fn drift(one: &RestPosition, other: &RestPosition) -> Option<Px> {
 }
 
 /// Returns the largest distance between corresponding markers.
-fn farthest(one: &[Marker; 4], other: &[Marker; 4]) -> Px {
+fn farthest(one: &[Marker], other: &[Marker]) -> Px {
     let distance = |(one, other): (&Marker, &Marker)| {
         let [x, y] = [one.x.0.abs_diff(other.x.0), one.y.0.abs_diff(other.y.0)];
         // Inside a picture, both are below 2²⁶.
@@ -244,14 +243,9 @@ pub fn rest(position: &RestPosition, settings: &Settings) -> Result<Rest, Outcom
     let seen_so = position.format == settings.threshold.format()
         && position.dilations == settings.dilations
         && position.centroid == settings.centroid;
-    let rest = Rest {
-        features: Features {
-            centroids: position.markers.map(|marker| (marker.x, marker.y)),
-            rect_center: position.rect_center,
-            rect_area: position.rect_area,
-        },
-        areas: position.markers.map(|marker| marker.area),
-    };
+    let mut rest = Rest::of_markers(&position.markers);
+    rest.features.rect_center = position.rect_center;
+    rest.features.rect_area = position.rect_area;
     if !seen_so || !rest.is_sound() || !position.down.is_none_or(Direction::is_sound) {
         Err(Outcome::InvalidArgument)
     } else if !rest.fits(&settings.geometry) {

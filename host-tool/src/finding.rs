@@ -49,8 +49,8 @@ pub struct MarkerJson {
 }
 
 impl MarkerJson {
-    /// The four markers of a sample.
-    pub fn all(markers: &[Marker; 4]) -> Vec<MarkerJson> {
+    /// The markers of a sample.
+    pub fn all(markers: &[Marker]) -> Vec<MarkerJson> {
         let markers = markers.iter().enumerate();
         markers
             .map(|(id, marker)| MarkerJson {
@@ -94,7 +94,7 @@ impl<'a> Finding<'a> {
         blobs: &[Blob],
         measurement: Measurement,
     ) -> Finding<'a> {
-        let markers = measurement.markers.as_ref().map(MarkerJson::all);
+        let markers = measurement.markers.as_deref().map(MarkerJson::all);
         let features = measurement
             .features
             .map(|features| features.to_array().map(|number| number.to_f64()).to_vec());

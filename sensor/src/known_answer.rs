@@ -6,7 +6,7 @@ use crate::force::features::Features;
 use crate::force::model::Model;
 use crate::force::network::Network;
 use crate::force::{self, Resting};
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::units::Px;
 
 /// The numbers of a force: α, β (m°), |F|, the vector (µN), two uncertainties (m°, µN), the place
@@ -49,7 +49,7 @@ pub fn of(model: &Model<'_>, network: &mut Network) -> Answer {
     ]
 }
 
-fn moved(model: &Model<'_>) -> [Marker; 4] {
+fn moved(model: &Model<'_>) -> MarkerList {
     let (Px(center_x), Px(center_y)) = model.rest.features.rect_center;
     let outward = |Px(at), center: i32| Px(at.saturating_add(at.saturating_sub(center) / OUTWARD));
     model.rest.markers().map(|marker| Marker {

@@ -9,7 +9,8 @@
 //! with c = (y − middle) / L. For markers 54 rows off the middle of 278 lines, the upper ones have
 //! 1.21 times the noise, the lower ones 0.83 times.
 
-use hivtac_terms::marker::Marker;
+use crate::markers::lost::Lost;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::units::Px;
 
 /// The previous frame's markers, from which those of the current frame have moved.
@@ -25,9 +26,9 @@ pub struct Motion {
 /// The markers of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Seen {
-    markers: [Marker; 4],
-    /// The identity of one that was not seen.
-    lost: Option<u8>,
+    markers: MarkerList,
+    /// Those that were not seen.
+    lost: Lost,
 }
 
 impl Motion {
@@ -57,54 +58,26 @@ impl Motion {
         self.before = self.now.take();
     }
 
-    /// Call at the end of each frame, with its markers if it showed any.
-    pub fn ended(&mut self, seen: Option<&[Marker; 4]>) {
-        self.now = seen.map(|markers| Seen {
+    /// Call at the end of each frame, with its markers and those that are lost, whose places are not
+    /// used; `None` if it showed no markers.
+    pub fn ended(&mut self, seen: Option<(&MarkerList, Lost)>) {
+        self.now = seen.map(|(markers, lost)| Seen {
             markers: *markers,
-            lost: None,
-        });
-    }
-
-    /// Call instead at the end of a frame without marker `lost` (0–3), whose place is not used.
-    pub fn ended_without(&mut self, markers: &[Marker; 4], lost: usize) {
-        self.now = Some(Seen {
-            markers: *markers,
-            lost: Some(lost as u8),
+            lost,
         });
     }
 
     /// Returns the markers as they were while the middle row of a frame of `rows` rows was exposed.
-    /// Returns `None` with a global shutter, or if the previous frame's markers are unknown.
-    pub fn at_the_middle(&self, seen: &[Marker; 4], rows: u16) -> Option<[Marker; 4]> {
+    /// Those that are `lost` stay where they are. Returns `None` with a global shutter, or if the
+    /// previous frame does not show each of the others.
+    pub fn at_the_middle(&self, seen: &MarkerList, lost: Lost, rows: u16) -> Option<MarkerList> {
         let (lines, before) = (self.lines?, self.before.as_ref()?);
-        if before.lost.is_some() {
+        if !before.lost.is_within(lost) {
             return None;
         }
         let mut moved = *seen;
-        for (marker, before) in moved.iter_mut().zip(&before.markers) {
-            move_to_the_middle(marker, before, rows, lines);
-        }
-        Some(moved)
-    }
-
-    /// As [`at_the_middle`](Self::at_the_middle), in a frame without marker `lost` (0–3). That one
-    /// stays where it is, and need not be known of the previous frame.
-    pub fn three_at_the_middle(
-        &self,
-        seen: &[Marker; 4],
-        lost: usize,
-        rows: u16,
-    ) -> Option<[Marker; 4]> {
-        let (lines, before) = (self.lines?, self.before.as_ref()?);
-        if before
-            .lost
-            .is_some_and(|before| usize::from(before) != lost)
-        {
-            return None;
-        }
-        let mut moved = *seen;
-        let pairs = moved.iter_mut().zip(&before.markers).enumerate();
-        for (_, (marker, before)) in pairs.filter(|(identity, _)| *identity != lost) {
+        let pairs = moved.iter_mut().zip(before.markers.iter()).enumerate();
+        for (_, (marker, before)) in pairs.filter(|(identity, _)| !lost.contains(*identity)) {
             move_to_the_middle(marker, before, rows, lines);
         }
         Some(moved)
@@ -157,11 +130,11 @@ mod tests {
     #[test]
     fn markers_that_move_steadily_are_where_they_were_at_the_middle() {
         for velocity in [[0.0, 0.0], [1.5, 0.0], [0.0, 3.0], [-2.0, 5.0], [8.0, -8.0]] {
-            let frame = |at| PLACES.map(|place| seen(place, velocity, at));
+            let frame = |at| MarkerList::from(PLACES.map(|place| seen(place, velocity, at)));
             let mut motion = Motion::rolling(LINES);
-            motion.ended(Some(&frame(-1.0)));
+            motion.ended(Some((&frame(-1.0), Lost::NONE)));
             motion.begin_frame();
-            let moved = motion.at_the_middle(&frame(0.0), ROWS).unwrap();
+            let moved = motion.at_the_middle(&frame(0.0), Lost::NONE, ROWS).unwrap();
             for (moved, place) in moved.iter().zip(PLACES) {
                 let there = marker(place[0], place[1]);
                 let off = [moved.x.0 - there.x.0, moved.y.0 - there.y.0];
@@ -175,49 +148,51 @@ mod tests {
 
     #[test]
     fn without_a_frame_before_or_with_a_global_shutter_nothing_moves() {
-        let [before, now] = [0.0, 4.0].map(|x| PLACES.map(|[x0, y]| marker(x0 + x, y)));
+        let [before, now] =
+            [0.0, 4.0].map(|x| MarkerList::from(PLACES.map(|[x0, y]| marker(x0 + x, y))));
         let mut motion = Motion::rolling(LINES);
-        assert_eq!(motion.at_the_middle(&now, ROWS), None);
-        motion.ended(Some(&before));
-        assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
+        motion.ended(Some((&before, Lost::NONE)));
+        assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
         motion.begin_frame();
         assert!(
             motion
-                .at_the_middle(&now, ROWS)
+                .at_the_middle(&now, Lost::NONE, ROWS)
                 .is_some_and(|moved| moved != now)
         );
         motion.forget();
-        assert_eq!(motion.at_the_middle(&now, ROWS), None);
-        motion.ended(Some(&before));
+        assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
+        motion.ended(Some((&before, Lost::NONE)));
         motion.ended(None);
         motion.begin_frame();
-        assert_eq!(motion.at_the_middle(&now, ROWS), None);
+        assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
         let mut global = Motion::GLOBAL;
-        global.ended(Some(&before));
+        global.ended(Some((&before, Lost::NONE)));
         global.begin_frame();
-        assert_eq!(global.at_the_middle(&now, ROWS), None);
+        assert_eq!(global.at_the_middle(&now, Lost::NONE, ROWS), None);
     }
 
     /// The lost marker says nothing, in its own frame and in the next one.
     #[test]
     fn three_markers_move_as_four_do_and_the_lost_one_stays() {
-        let [before, now] = [0.0, 4.0].map(|x| PLACES.map(|[x0, y]| marker(x0 + x, y)));
+        let [before, now] =
+            [0.0, 4.0].map(|x| MarkerList::from(PLACES.map(|[x0, y]| marker(x0 + x, y))));
         let mut whole = Motion::rolling(LINES);
-        whole.ended(Some(&before));
+        whole.ended(Some((&before, Lost::NONE)));
         whole.begin_frame();
-        let moved = whole.at_the_middle(&now, ROWS).unwrap();
+        let moved = whole.at_the_middle(&now, Lost::NONE, ROWS).unwrap();
         for lost in 0..4 {
             let mut expected = moved;
             expected[lost] = now[lost];
-            let three = |motion: &Motion| motion.three_at_the_middle(&now, lost, ROWS);
+            let three = |motion: &Motion| motion.at_the_middle(&now, Lost::only(lost), ROWS);
             assert_eq!(three(&whole), Some(expected));
             let mut motion = Motion::rolling(LINES);
-            motion.ended_without(&before, lost);
+            motion.ended(Some((&before, Lost::only(lost))));
             motion.begin_frame();
             assert_eq!(three(&motion), Some(expected));
-            assert_eq!(motion.at_the_middle(&now, ROWS), None);
+            assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
             let other = (lost + 1) % 4;
-            assert_eq!(motion.three_at_the_middle(&now, other, ROWS), None);
+            assert_eq!(motion.at_the_middle(&now, Lost::only(other), ROWS), None);
         }
     }
 
@@ -225,14 +200,14 @@ mod tests {
     fn coordinates_at_their_limits_do_not_overflow() {
         let corners = [[0.0, 0.0], [799.0, 0.0], [799.0, 599.0], [0.0, 599.0]];
         let [first, turned] = [0, 2].map(|by| {
-            std::array::from_fn(|id| {
+            MarkerList::from_fn(4, |id| {
                 let [x, y] = corners[(id + by) % 4];
                 marker(x, y)
             })
         });
         let mut motion = Motion::rolling(600);
-        motion.ended(Some(&first));
+        motion.ended(Some((&first, Lost::NONE)));
         motion.begin_frame();
-        assert!(motion.at_the_middle(&turned, 600).is_some());
+        assert!(motion.at_the_middle(&turned, Lost::NONE, 600).is_some());
     }
 }

@@ -159,7 +159,7 @@ impl Pattern {
     }
 
     /// The largest distance of a found marker from its drawn place, px.
-    pub fn error(&self, markers: &[Marker; 4]) -> f64 {
+    pub fn error(&self, markers: &[Marker]) -> f64 {
         let errors = markers.iter().enumerate().map(|(identity, marker)| {
             let (x, y) = self.center_of(identity);
             (marker.x.to_f64() - x).hypot(marker.y.to_f64() - y)

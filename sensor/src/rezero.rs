@@ -21,9 +21,14 @@ use crate::force::features::Features;
 use crate::force::forward::{Drift, Gravity, Markers};
 use crate::force::rest::Rest;
 use hivtac_terms::fixed::Q;
+use hivtac_terms::list::List;
+use hivtac_terms::marker::MOST_MARKERS;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::Rezero;
 use hivtac_terms::units::{MilliPx, Px};
+
+/// x and y of each marker.
+type Coordinates<T> = List<T, { 2 * MOST_MARKERS }>;
 
 /// Time over which frames are averaged, µs.
 const MEAN_US: u64 = 1_000_000;
@@ -55,8 +60,8 @@ pub(crate) struct Tare {
     down: Option<Gravity>,
     /// The taken position converted to today's gravity.
     hung: Rest,
-    /// How far re-zeroing moved it from there: x and y of markers 0–3.
-    moved: [Px; 8],
+    /// How far re-zeroing moved it from there: x and y of each marker.
+    moved: Coordinates<Px>,
     /// The result: the rest position in use.
     rest: Rest,
     /// How far the film may rest from that.
@@ -79,21 +84,22 @@ struct Quiet {
 struct Mean {
     begun_us: u64,
     frames: u32,
-    /// x and y of markers 0–3, px.
-    sums: [Q<16, i64>; 8],
+    /// x and y of each marker, px.
+    sums: Coordinates<Q<16, i64>>,
 }
 
 impl Mean {
-    fn new(begun_us: u64) -> Mean {
+    /// A mean of no frames, of as many coordinates.
+    fn new(begun_us: u64, coordinates: usize) -> Mean {
         Mean {
             begun_us,
             frames: 0,
-            sums: [Q::default(); 8],
+            sums: List::defaults(coordinates),
         }
     }
 
     /// The mean's difference from a rest position, px.
-    fn beside(&self, rest: &Rest) -> [Q<16, i64>; 8] {
+    fn beside(&self, rest: &Rest) -> Coordinates<Q<16, i64>> {
         let frames = i64::from(self.frames);
         let mut beside = self.sums;
         for (part, rest) in beside.iter_mut().zip(coordinates(rest)) {
@@ -111,7 +117,7 @@ impl Tare {
             taken,
             down,
             hung: taken,
-            moved: [Px(0); 8],
+            moved: List::defaults(2 * taken.areas.len()),
             rest: taken,
             drift,
             is_seen: false,
@@ -200,7 +206,7 @@ impl Tare {
         let mut quiet = self.quiet.filter(follows).unwrap_or(Quiet {
             since_us: time_us,
             newest_us: time_us,
-            mean: Mean::new(time_us),
+            mean: Mean::new(time_us, self.moved.len()),
         });
         quiet.newest_us = time_us;
         take(&mut quiet.mean, features);
@@ -208,7 +214,7 @@ impl Tare {
         let averaged_us = time_us.saturating_sub(mean.begun_us);
         let is_due = averaged_us >= MEAN_US || mean.frames >= MOST_FRAMES;
         if is_due {
-            quiet.mean = Mean::new(time_us);
+            quiet.mean = Mean::new(time_us, self.moved.len());
         }
         self.quiet = Some(quiet);
         if !is_due {
@@ -224,7 +230,7 @@ impl Tare {
         // A seen drift replaces the uncertainty of an unseen one.
         (self.drift, self.is_seen) = (Drift::NONE, true);
         let mut seen_px = Markers::defaults(self.moved.len() / 2);
-        let pairs = there.iter().zip(&self.moved);
+        let pairs = there.iter().zip(self.moved.iter());
         for (seen, (there, moved)) in seen_px.as_flattened_mut().iter_mut().zip(pairs) {
             *seen = Px::saturated(*there - Q::from(*moved)).to_f32();
         }
@@ -236,7 +242,7 @@ impl Tare {
         Told::Moved
     }
 
-    fn move_towards(&mut self, limits: &Rezero, there: &[Q<16, i64>; 8]) {
+    fn move_towards(&mut self, limits: &Rezero, there: &[Q<16, i64>]) {
         let (rate, total) = (steps(limits.rate), steps(limits.total));
         for (moved, there) in self.moved.iter_mut().zip(there) {
             let farther = (*there - Q::from(*moved)).clamp(-rate, rate);

@@ -12,17 +12,20 @@
 //!
 //! [Insisting](TareBuilder::insisting) skips 2 and 3.
 
-use crate::force::features::{FEATURES, Features};
+use crate::force::features::Features;
 use crate::force::rest::Rest;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::Geometry;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::list::List;
+use hivtac_terms::marker::{MOST_MARKERS, Marker};
 use hivtac_terms::root::rounded_root;
 use hivtac_terms::units::{MicroNewtons, Px};
 
 /// Most frames of a mean: the sums then stay far inside their types.
 pub const MAX_FRAMES: u16 = 256;
 
+/// x and y of each marker.
+type Coordinates<T> = List<T, { 2 * MOST_MARKERS }>;
 /// Coordinates and distances whose squares are summed, px.
 type Coarse = Q<8, i64>;
 
@@ -55,13 +58,15 @@ pub struct TareBuilder {
     touched: u16,
     /// The force of the last touched frame.
     touch: MicroNewtons,
-    features: [Q<16, i64>; FEATURES],
-    areas: [u64; 4],
+    /// Sums of the coordinates, and of centre and area of their bounding rectangle.
+    coordinates: Coordinates<Q<16, i64>>,
+    rect: [Q<16, i64>; 3],
+    areas: List<u64, MOST_MARKERS>,
     /// Coordinates of the first frame; sums of the differences of the others from it, and of their
     /// squares, px².
-    first: [Coarse; 8],
-    differences: [Coarse; 8],
-    squares: [Q<16, i64>; 8],
+    first: Coordinates<Coarse>,
+    differences: Coordinates<Coarse>,
+    squares: Coordinates<Q<16, i64>>,
 }
 
 impl TareBuilder {
@@ -75,11 +80,12 @@ impl TareBuilder {
             implausible: 0,
             touched: 0,
             touch: MicroNewtons(0),
-            features: [Q::default(); FEATURES],
-            areas: [0; 4],
-            first: [Q::default(); 8],
-            differences: [Q::default(); 8],
-            squares: [Q::default(); 8],
+            coordinates: List::defaults(0),
+            rect: [Q::default(); 3],
+            areas: List::defaults(0),
+            first: List::defaults(0),
+            differences: List::defaults(0),
+            squares: List::defaults(0),
         };
         (1..=MAX_FRAMES).contains(&frames).then_some(empty)
     }
@@ -98,7 +104,7 @@ impl TareBuilder {
     /// otherwise `None`.
     pub fn add(
         &mut self,
-        markers: &[Marker; 4],
+        markers: &[Marker],
         features: &Features,
         geometry: &Geometry,
     ) -> Option<Result<Rest, Refusal>> {
@@ -152,20 +158,29 @@ impl TareBuilder {
         self.implausible > 0
     }
 
-    fn take(&mut self, markers: &[Marker; 4], features: &Features) {
-        let numbers = features.to_array();
-        for (sum, feature) in self.features.iter_mut().zip(numbers) {
-            *sum += feature;
+    fn take(&mut self, markers: &[Marker], features: &Features) {
+        let at = features.centroids.iter().flat_map(|(x, y)| [*x, *y]);
+        if self.taken == 0 {
+            self.coordinates = List::defaults(2 * markers.len());
+            self.squares = self.coordinates;
+            self.differences = List::defaults(2 * markers.len());
+            self.first = List::of(at.clone().map(|px| Q::<16, i64>::from(px).floor_to()));
+            self.areas = List::defaults(markers.len());
+        }
+        let (x, y) = features.rect_center;
+        let rect = [x.into(), y.into(), features.rect_area];
+        for (sum, part) in self.rect.iter_mut().zip(rect) {
+            *sum += part;
         }
         for (sum, marker) in self.areas.iter_mut().zip(markers) {
             *sum += u64::from(marker.area);
         }
-        let sums = self.differences.iter_mut().zip(&mut self.squares);
-        for ((first, feature), (sum, square)) in self.first.iter_mut().zip(numbers).zip(sums) {
-            let coordinate = feature.floor_to();
-            if self.taken == 0 {
-                *first = coordinate;
-            }
+        for (sum, coordinate) in self.coordinates.iter_mut().zip(at.clone()) {
+            *sum += Q::from(coordinate);
+        }
+        let sums = self.differences.iter_mut().zip(self.squares.iter_mut());
+        for ((first, coordinate), (sum, square)) in self.first.iter().zip(at).zip(sums) {
+            let coordinate: Coarse = Q::<16, i64>::from(coordinate).floor_to();
             let difference = (coordinate - *first).clamp(-FAR, FAR);
             *sum += difference;
             *square += squared(difference);
@@ -193,7 +208,7 @@ impl TareBuilder {
     /// n² times each coordinate's variance, ΣΔ²/n − (ΣΔ/n)², px². All terms are below 2⁴² steps.
     fn variances(&self) -> impl Iterator<Item = Q<16, i64>> {
         let frames = i64::from(self.taken.max(1));
-        let sums = self.differences.iter().zip(&self.squares);
+        let sums = self.differences.iter().zip(self.squares.iter());
         sums.map(move |(sum, square)| *square * frames - squared(*sum))
     }
 
@@ -205,10 +220,16 @@ impl TareBuilder {
                 .checked_div_euclid(2 * frames)
                 .unwrap_or(0)
         };
-        let features = self.features.map(|sum| Q::from_bits(mean(sum.bits())));
+        let px = |sum: Q<16, i64>| Px(mean(sum.bits()) as i32);
+        let [x, y, area] = self.rect;
+        let pairs = self.coordinates.as_chunks().0.iter();
         Rest {
-            features: Features::from_array(features),
-            areas: self.areas.map(|sum| mean(sum as i64) as u32),
+            features: Features {
+                centroids: List::of(pairs.map(|[x, y]| (px(*x), px(*y)))),
+                rect_center: (px(x), px(y)),
+                rect_area: Q::from_bits(mean(area.bits())),
+            },
+            areas: List::of(self.areas.iter().map(|sum| mean(*sum as i64) as u32)),
         }
     }
 }
@@ -221,6 +242,7 @@ fn squared(distance: Coarse) -> Q<16, i64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force::features::FEATURES;
     use hivtac_terms::geometry::Preset;
 
     const GEOMETRY: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
@@ -288,7 +310,7 @@ mod tests {
             .add(&markers, &features, &GEOMETRY)
             .unwrap()
             .unwrap();
-        assert_eq!((rest.features, rest.areas), (features, [7; 4]));
+        assert_eq!((rest.features, rest.areas), (features, [7; 4].into()));
     }
 
     #[test]
@@ -375,7 +397,7 @@ mod tests {
     #[test]
     fn the_largest_sums_fit() {
         let largest = Features {
-            centroids: [(Px(i32::MAX), Px(i32::MAX)); 4],
+            centroids: [(Px(i32::MAX), Px(i32::MAX)); 4].into(),
             rect_center: (Px(i32::MAX), Px(i32::MAX)),
             rect_area: Q::from_int(800 * 800),
         };
@@ -387,7 +409,7 @@ mod tests {
         let mut builder = TareBuilder::new(MAX_FRAMES).unwrap();
         (0..MAX_FRAMES).for_each(|_| builder.take(&markers, &largest));
         let rest = builder.mean();
-        assert_eq!((rest.features, rest.areas), (largest, [u32::MAX; 4]));
+        assert_eq!((rest.features, rest.areas), (largest, [u32::MAX; 4].into()));
         let mut builder = TareBuilder::new(MAX_FRAMES).unwrap();
         let least = Features::from_array([Q::from_bits(i64::from(i32::MIN)); FEATURES]);
         builder.take(&markers, &least);

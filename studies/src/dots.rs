@@ -6,6 +6,7 @@ use clap::Args;
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::forward::{UnitSetup, of_layout};
 use hivtac_sensor::force::forward::{Column, Estimate, Forward, Markers, Mounting, Observed, Pose};
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_terms::list::List;
 use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Unit};
 use hivtac_twin::film::{Film, Layout};
@@ -31,8 +32,6 @@ const NOISE_PX: f64 = 0.011;
 const STEPS: u8 = 2;
 /// Where steps begin, as a part of the largest size.
 const FIRST_SIZE: f32 = 0.5;
-/// Variance of the coordinates of a dot that is not seen, focal lengths squared.
-const LOST: f32 = 1e6;
 /// 95 of 100 normal errors are within this many standard uncertainties.
 const WITHIN_95: f64 = 1.96;
 
@@ -180,13 +179,15 @@ impl Bench<'_> {
             *moved = seen.map(|part| (part + noise * normal(&mut random)) as f32);
         }
         let variance = (self.mounting.scale() * NOISE_PX as f32).powi(2);
-        let mut noise = List::from_fn(dots, |_| [variance, 0.0, variance]);
+        let noise = List::from_fn(dots, |_| [variance, 0.0, variance]);
+        let mut unseen = Lost::NONE;
         for _ in 0..lost {
-            noise[random.random_range(0..dots)] = [LOST, 0.0, LOST];
+            unseen = unseen.and(random.random_range(0..dots));
         }
         let observed = Observed {
             moved,
             noise,
+            lost: unseen,
             drift: None,
             hanging: None,
             pressing: None,

@@ -9,6 +9,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::forward::{Estimate, Forward, Markers, Mounting, Observed, Pose};
 use hivtac_sensor::force::model::Model;
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_terms::list::List;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -129,6 +130,7 @@ impl<'m> Film<'m> {
         let observed = Observed {
             hanging: None,
             pressing: None,
+            lost: Lost::NONE,
             drift: None,
             moved: shown.moved,
             noise: List::from_fn(tables.dots(), |k| forward.rest_image.noise(k, variances)),

@@ -122,7 +122,7 @@ fn qvga() -> Geometry {
 fn qvga_rest() -> Rest {
     Rest {
         features: rest(),
-        areas: [REST_AREA; 4],
+        areas: [REST_AREA; 4].into(),
     }
 }
 

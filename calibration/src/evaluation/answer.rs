@@ -30,10 +30,10 @@ impl<'m> Chip<'m> {
         let tare = features_from_q16(&rest.features_q16)?;
         let rest = Rest {
             features: tare,
-            areas: rest.areas_px,
+            areas: rest.areas_px.into(),
         };
         Ok(Self {
-            areas_px: rest.areas,
+            areas_px: rest.areas.array(),
             resting: Resting::of_model(&model, &rest),
             model,
             tare,

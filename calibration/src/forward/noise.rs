@@ -9,7 +9,7 @@ use super::UnitSetup;
 use crate::data::dataset::{Dataset, Sample};
 
 /// Mean absolute value of a normal distribution over its standard deviation: √(2/π).
-const MEAN_SIZE: f64 = 0.797_884_560_802_865_4;
+pub(super) const MEAN_SIZE: f64 = 0.797_884_560_802_865_4;
 /// The fewest rows that determine the noise.
 const FEWEST: usize = 200;
 
@@ -75,7 +75,7 @@ impl Noise {
 
 /// The line nearest to points.
 #[derive(Default)]
-struct Line {
+pub(super) struct Line {
     count: f64,
     x: f64,
     y: f64,
@@ -84,14 +84,14 @@ struct Line {
 }
 
 impl Line {
-    fn add(&mut self, x: f64, y: f64) {
+    pub fn add(&mut self, x: f64, y: f64) {
         self.count += 1.0;
         (self.x, self.y) = (self.x + x, self.y + y);
         (self.xx, self.xy) = (self.xx + x * x, self.xy + x * y);
     }
 
     /// Its value at 0, and its slope.
-    fn through(&self) -> (f64, f64) {
+    pub fn through(&self) -> (f64, f64) {
         let slope =
             (self.count * self.xy - self.x * self.y) / (self.count * self.xx - self.x * self.x);
         ((self.y - slope * self.x) / self.count, slope)

@@ -8,6 +8,7 @@ use hivtac_sensor::force::forward::{Pose as ChipPose, RELATIVE};
 use hivtac_sensor::force::model::{CovarianceSpec, OthersSpec};
 use hivtac_sensor::force::rest::Rest;
 use hivtac_shell::{Design, Equilibrium, Film, Law, Material};
+use hivtac_terms::list::List;
 use hivtac_terms::units::Px;
 use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
@@ -349,10 +350,10 @@ fn rest(seen_px: &Markers) -> Rest {
     let px = |part: f32| Px((part * 65_536.0) as i32);
     Rest {
         features: Features {
-            centroids: std::array::from_fn(|k| (px(seen_px[k][0]), px(seen_px[k][1]))),
+            centroids: List::from_fn(4, |k| (px(seen_px[k][0]), px(seen_px[k][1]))),
             ..Features::default()
         },
-        areas: [1; 4],
+        areas: [1; 4].into(),
     }
 }
 

@@ -155,7 +155,8 @@ fn sensed(
     }
     let measurement = sensor.measure_frame(&frame.pixels());
     let spot = |marker: terms::Marker| Spot::new(marker.x, marker.y, marker.area);
-    let markers = measurement.markers.map(|four| four.map(spot));
+    let markers = measurement.markers.and_then(|markers| markers.exactly());
+    let markers = markers.map(|four| four.map(spot));
     markers.ok_or_else(|| NotSeen {
         blobs: sensor.blobs().len(),
         status: measurement.status.names().collect(),

@@ -8,6 +8,7 @@ use crate::force::forward::{
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
 use crate::force::rest::Rest;
+use crate::markers::lost::Lost;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
@@ -45,6 +46,8 @@ const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
+/// Where the search for any load begins, as a fraction of the largest size.
+const HALF_SIZE: f32 = 0.5;
 /// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
 /// axis, mm. `BUILT`: any shift and turn of the camera; focal length and distance from the film as
 /// a fraction of the pattern's radius.
@@ -59,7 +62,7 @@ const AREAS: [f32; 2] = [0.5, 6.0];
 impl Resting {
     /// Takes a model that takes steps, and the rest position of the markers. The film's weight
     /// needs no correction: gravity is as it was when the rest position was taken. Returns `None`
-    /// if the model takes no steps.
+    /// if the model takes no steps, or has another number of markers.
     pub fn of_model(model: &Model<'_>, rest: &Rest) -> Option<Resting> {
         Resting::of_turned(model, rest, None)
     }
@@ -68,6 +71,9 @@ impl Resting {
     /// gravity.
     pub fn of_turned(model: &Model<'_>, rest: &Rest, turned: Option<Turned>) -> Option<Resting> {
         let forward = model.forward.as_ref().filter(|forward| forward.steps > 0)?;
+        if forward.tables.dots() != rest.areas.len() {
+            return None;
+        }
         let flat = turned.map_or(*rest, |turned| forward.as_made(rest, turned));
         let mut resting = Resting::new(forward, rest, &flat, &model.rest, !model.is_simulated());
         resting.hanging = turned.and_then(|turned| forward.hanging(turned, resting.is_own));
@@ -216,6 +222,7 @@ impl Resting {
         Observed {
             moved,
             noise,
+            lost: Lost::NONE,
             drift,
             hanging,
             pressing: (forward.shapes).and_then(|shapes| shapes.pressing(self.shape)),
@@ -257,6 +264,38 @@ impl Resting {
         let [x, y] = self.mounting.px(moved);
         let [rest_x, rest_y] = self.px.get(lost).copied().unwrap_or_default();
         (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
+    }
+
+    /// Returns the load that explains the markers but the `lost` ones best. The steps begin where
+    /// the markers moved most.
+    pub fn estimate_without_guess(
+        &self,
+        forward: &Forward<'_>,
+        markers: &[Marker],
+        lost: Lost,
+        noise: FrameNoise,
+    ) -> Estimate {
+        let mut observed = self.observed(forward, markers, noise);
+        observed.lost = lost;
+        for dot in lost.identities() {
+            observed
+                .moved
+                .iter_mut()
+                .skip(2 * dot)
+                .take(2)
+                .for_each(|part| *part = 0.0);
+        }
+        let guess = Pose {
+            size: HALF_SIZE * forward.limits.size,
+            place_mm: forward.rest_image.where_most(&observed.moved),
+            ..Pose::default()
+        };
+        forward.estimate(
+            &observed,
+            &self.mounting,
+            forward.unknown(self.is_own),
+            guess,
+        )
     }
 
     /// Returns whether a force that one contact explains badly may be given. The contact must not

@@ -1,19 +1,23 @@
-//! Computes the paper's eleven features (Section 5) of four markers.
+//! Computes the paper's features (Section 5): eleven numbers of four markers.
 
 use hivtac_terms::fixed::Q;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::list::List;
+use hivtac_terms::marker::{MOST_MARKERS, Marker};
 use hivtac_terms::units::Px;
 
-/// Number of features.
+/// Number of features of four markers.
 pub const FEATURES: usize = 11;
 /// Number of coordinates, which come first; the last feature is an area.
 pub const COORDINATES: usize = 10;
 
-/// x = [x0, y0, x1, y1, x2, y2, x3, y3, x_rect, y_rect, Area_rect].
+/// Centroids of markers, (x, y).
+pub type Centroids = List<(Px, Px), MOST_MARKERS>;
+
+/// Of four markers: x = [x0, y0, x1, y1, x2, y2, x3, y3, x_rect, y_rect, Area_rect].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Features {
-    /// Centroids of markers 0–3, (x, y).
-    pub centroids: [(Px, Px); 4],
+    /// Centroids of the markers.
+    pub centroids: Centroids,
     /// Centre of the bounding rectangle of the real-valued centroids, (x, y).
     pub rect_center: (Px, Px),
     /// Area of that rectangle, px² (it overflows 32 bits from VGA up).
@@ -21,29 +25,29 @@ pub struct Features {
 }
 
 impl Features {
-    /// Returns the features of four markers. The centre is rounded half up to 1/65,536 px, the area
+    /// Returns the features of markers. The centre is rounded half up to 1/65,536 px, the area
     /// to 1/65,536 px².
-    pub fn of_markers(markers: &[Marker; 4]) -> Features {
-        let centroids = markers.map(|marker| (marker.x, marker.y));
-        let (left, right) = extent(centroids.map(|c| c.0));
-        let (top, bottom) = extent(centroids.map(|c| c.1));
+    pub fn of_markers(markers: &[Marker]) -> Features {
+        let centroids = markers.iter().map(|marker| (marker.x, marker.y));
+        let (left, right) = extent(markers.iter().map(|marker| marker.x));
+        let (top, bottom) = extent(markers.iter().map(|marker| marker.y));
         let span = |low: Px, high: Px| i64::from(high.0) - i64::from(low.0);
         let area: Q<32, i64> = Q::from_bits(span(left, right) * span(top, bottom));
         Features {
-            centroids,
+            centroids: List::of(centroids),
             rect_center: (middle(left, right), middle(top, bottom)),
             rect_area: area.rounded_to(),
         }
     }
 
-    /// All but the area, in the paper's order.
+    /// All of the first four markers but the area, in the paper's order.
     pub fn coordinates(&self) -> [Px; COORDINATES] {
-        let [(x0, y0), (x1, y1), (x2, y2), (x3, y3)] = self.centroids;
+        let [(x0, y0), (x1, y1), (x2, y2), (x3, y3)] = self.centroids.array();
         let (x, y) = self.rect_center;
         [x0, y0, x1, y1, x2, y2, x3, y3, x, y]
     }
 
-    /// The eleven numbers in the paper's order: px, the last one px².
+    /// The eleven numbers of the first four markers in the paper's order: px, the last one px².
     pub fn to_array(&self) -> [Q<16, i64>; FEATURES] {
         let mut numbers = [self.rect_area; FEATURES];
         for (number, coordinate) in numbers.iter_mut().zip(self.coordinates()) {
@@ -56,7 +60,7 @@ impl Features {
     pub fn from_array(numbers: [Q<16, i64>; FEATURES]) -> Features {
         let px = |i: usize| Px(numbers[i].narrowed().bits());
         Features {
-            centroids: core::array::from_fn(|marker| (px(2 * marker), px(2 * marker + 1))),
+            centroids: List::from_fn(4, |marker| (px(2 * marker), px(2 * marker + 1))),
             rect_center: (px(8), px(9)),
             rect_area: numbers[10],
         }
@@ -64,10 +68,9 @@ impl Features {
 }
 
 /// The smallest and the largest value.
-fn extent(values: [Px; 4]) -> (Px, Px) {
-    let low = values.iter().min().copied();
-    let high = values.iter().max().copied();
-    (low.unwrap_or_default(), high.unwrap_or_default())
+fn extent(values: impl Iterator<Item = Px> + Clone) -> (Px, Px) {
+    let low = values.clone().min();
+    (low.unwrap_or_default(), values.max().unwrap_or_default())
 }
 
 /// Half the sum, rounded half up. The sum of two `i32` halved fits `i32`.

@@ -211,10 +211,10 @@ mod tests {
                 .wrapping_add(1);
             Px((state >> 39) as i32)
         };
-        let mut features = Features::default();
-        for (x, y) in &mut features.centroids {
-            (*x, *y) = (next(), next());
-        }
+        let mut features = Features {
+            centroids: [(); 4].map(|()| (next(), next())).into(),
+            ..Features::default()
+        };
         features.rect_center = (next(), next());
         features.rect_area = Q::from(next()) * 400;
         features
@@ -298,7 +298,7 @@ mod tests {
             for sign in [-1, 1] {
                 let far = 800 << 16;
                 let extreme = Features {
-                    centroids: [(Px(sign * far), Px(sign * far)); 4],
+                    centroids: [(Px(sign * far), Px(sign * far)); 4].into(),
                     rect_area: Q::from_int(i64::from(sign) * 640_000),
                     ..Features::default()
                 };
@@ -315,7 +315,7 @@ mod tests {
         spec.layers[0].shifts = vec![1; 3];
         spec.input.shifts = [1; FEATURES];
         let extreme = |value: i32, area: i64| Features {
-            centroids: [(Px(value), Px(value)); 4],
+            centroids: [(Px(value), Px(value)); 4].into(),
             rect_center: (Px(value), Px(value)),
             rect_area: Q::from_bits(area),
         };

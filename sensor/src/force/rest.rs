@@ -1,9 +1,10 @@
 //! Holds the rest position: where the markers are while nothing touches the film.
 
 use crate::force::features::Features;
-use crate::markers::rules::pattern::{Pattern, distance};
+use crate::markers::rules::pattern::distance;
 use hivtac_terms::geometry::Geometry;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::list::List;
+use hivtac_terms::marker::{MOST_MARKERS, Marker, MarkerList};
 use hivtac_terms::units::Px;
 
 /// The longest side of a picture, px.
@@ -19,35 +20,40 @@ pub const NEAR: Px = Px(Px::ONE.0 / 2);
 pub struct Rest {
     /// Features of the untouched film.
     pub features: Features,
-    /// Areas of its markers 0–3 in the mask, px.
-    pub areas: [u32; 4],
+    /// Areas of its markers in the mask, px.
+    pub areas: List<u32, MOST_MARKERS>,
 }
 
 impl Rest {
     /// The rest position of these markers.
-    pub fn of_markers(markers: &[Marker; 4]) -> Rest {
+    pub fn of_markers(markers: &[Marker]) -> Rest {
         Rest {
             features: Features::of_markers(markers),
-            areas: markers.map(|marker| marker.area),
+            areas: List::of(markers.iter().map(|marker| marker.area)),
         }
     }
 
     /// Returns whether all coordinates of these markers are within [`NEAR`] of the rest position.
     pub fn is_near(&self, features: &Features) -> bool {
         let near = |a: Px, b: Px| a.0.abs_diff(b.0) <= NEAR.0.unsigned_abs();
-        let pairs = self.features.centroids.iter().zip(&features.centroids);
+        let pairs = self
+            .features
+            .centroids
+            .iter()
+            .zip(features.centroids.iter());
         pairs
             .into_iter()
             .all(|(a, b)| near(a.0, b.0) && near(a.1, b.1))
     }
 
-    /// Its markers 0–3.
-    pub fn markers(&self) -> [Marker; 4] {
-        core::array::from_fn(|identity| {
-            let (x, y) = self.features.centroids[identity];
-            let area = self.areas[identity];
-            Marker { x, y, area }
-        })
+    /// Its markers.
+    pub fn markers(&self) -> MarkerList {
+        let pairs = self.features.centroids.iter().zip(self.areas.iter());
+        List::of(pairs.map(|((x, y), area)| Marker {
+            x: *x,
+            y: *y,
+            area: *area,
+        }))
     }
 
     /// Returns the rest position with each marker moved by `px`. The bounding rectangle of a mean
@@ -92,9 +98,15 @@ impl Rest {
     /// 15 %. That allows a film 1.5 mm nearer or farther, and markers 0.7 mm off their places. It
     /// refuses a film that is pressed: every force against such a rest position would be wrong.
     pub fn fits(&self, geometry: &Geometry) -> bool {
-        let center = Pattern::of_centroids(self.features.centroids).center;
-        let [a, b, c, d] = self.features.centroids.map(|point| distance(point, center));
-        let expected = 4.0 * geometry.rest_distance().to_f32();
-        (a + b + c + d - expected).abs() <= 0.15 * expected
+        let centroids = &self.features.centroids;
+        let count = centroids.len() as i64;
+        let mean = |part: fn(&(Px, Px)) -> Px| {
+            let sum: i64 = centroids.iter().map(|at| i64::from(part(at).0)).sum();
+            Px(sum.checked_div_euclid(count).unwrap_or(0) as i32)
+        };
+        let center = (mean(|at| at.0), mean(|at| at.1));
+        let sum: f32 = centroids.iter().map(|at| distance(*at, center)).sum();
+        let expected = count as f32 * geometry.rest_distance().to_f32();
+        (sum - expected).abs() <= 0.15 * expected
     }
 }

@@ -10,6 +10,7 @@
 //! | `mask`, `dilate`, `history`, `runs` | rows of bits, and runs of them |
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
 //! | `scanner` | from rows to blobs, as rows arrive |
+//! | `lost` | markers that a frame does not show |
 //! | `majority` | removes specks and holes from rows of bits |
 //! | `rules` | which four blobs are the markers, and whether to trust them |
 //! | `settings` | what must be set before the first frame |
@@ -17,6 +18,7 @@
 
 pub mod blob;
 pub mod formats;
+pub mod lost;
 pub mod rules;
 pub mod scanner;
 pub mod screen;

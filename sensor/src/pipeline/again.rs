@@ -3,7 +3,7 @@
 //! If all rows of the frame are available once more, they are scanned with a mask that follows the
 //! light and has its specks removed
 //! ([`ScanSettings::cleaned`](crate::markers::scanner::ScanSettings)). The same rules judge the
-//! result, and the contact must explain all eight coordinates of the markers, which are less
+//! result, and the contact must explain all coordinates of the markers, which are less
 //! certain. So there is a second look only with a film run forwards. If the second look fails, the
 //! frame stays refused for its first reason.
 //!
@@ -99,17 +99,25 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     pub(super) fn wants_again(&self, measurement: &Measurement) -> bool {
         let status = measurement.status;
         let resting = self.prepared.as_ref().map(|prepared| &prepared.resting);
-        status.intersects(AGAIN) && !status.intersects(NEVER) && matches!(resting, Some(Some(_)))
+        // The force goes on without a marker as long as others check it.
+        let goes_on = self.has_other_layout() && measurement.force.is_some();
+        status.intersects(AGAIN)
+            && !status.intersects(NEVER)
+            && matches!(resting, Some(Some(_)))
+            && !goes_on
     }
 
     /// Ends a second look. Returns its measurement if that has a force, otherwise the first one.
     #[inline(never)]
     pub fn finish_again(&mut self, again: Again) -> Measurement {
-        let found = self.end_scan().and_then(|()| self.find_markers());
-        let mut second = self.measurement(found);
+        let mut second = match self.end_scan() {
+            Ok(()) => self.measure_blobs(),
+            Err(reason) => self.measurement(Err(reason)),
+        };
         // The markers' positions show their motion to the next frame, even without a force.
         if second.markers.is_some() {
-            self.motion.ended(second.markers.as_ref());
+            let seen = second.markers.as_ref();
+            self.motion.ended(seen.map(|seen| (seen, second.lost)));
         }
         if second.force.is_none() || !self.is_disturbed(&again) {
             return again.measurement;

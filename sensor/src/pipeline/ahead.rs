@@ -1,17 +1,15 @@
 //! Computes the force ahead, while the camera still sends the rows below the markers.
 //!
-//! Once at least four blobs are complete and no blob is open, their measurement is computed. If no
+//! Once as many blobs as markers are complete and no blob is open, their measurement is computed. If no
 //! other blob follows until the frame ends, it is the frame's measurement, and only that check is
 //! left after the last row. Otherwise it is computed anew. The measurement depends on the blobs
 //! alone.
 
-use super::{Measurement, Sensor};
+use super::{Measurement, Prepared, Sensor};
 use crate::markers::tables::Table;
 
-/// The fewest blobs that can be markers.
-const FEWEST_BLOBS: usize = 4;
-/// With more blobs, nothing is computed ahead; that bounds how often it is done in vain.
-const MOST_BLOBS: usize = 8;
+/// With more blobs beside the markers, nothing is computed ahead; that bounds how often it is done in vain.
+const MOST_BESIDE: usize = 4;
 
 /// The result of computing ahead.
 #[derive(Clone, Copy, Debug)]
@@ -36,15 +34,15 @@ impl Ahead {
         }
     }
 
-    /// Whether `count` complete blobs are worth computing.
+    /// Whether `count` complete blobs are worth computing, of a film with this many markers.
     #[inline(always)]
-    fn wants(&self, count: usize) -> bool {
+    fn wants(&self, count: usize, markers: usize) -> bool {
         let in_vain = match self {
             Ahead::Off => true,
             Ahead::Nothing => false,
             Ahead::Worked { blobs, .. } => *blobs == count,
         };
-        (FEWEST_BLOBS..=MOST_BLOBS).contains(&count) && !in_vain
+        (markers..=markers + MOST_BESIDE).contains(&count) && !in_vain
     }
 }
 
@@ -52,7 +50,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Call after each row or band.
     #[inline(always)]
     pub(super) fn look_ahead(&mut self) {
-        if self.scanner.is_settled() && self.ahead.wants(self.scanner.blobs().len()) {
+        let markers = self.prepared.as_ref().map_or(0, Prepared::markers);
+        if self.scanner.is_settled() && self.ahead.wants(self.scanner.blobs().len(), markers) {
             self.work_ahead();
         }
     }
@@ -60,8 +59,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     #[inline(never)]
     fn work_ahead(&mut self) {
         let blobs = self.scanner.blobs().len();
-        let found = self.find_markers();
-        let measurement = self.measurement(found);
+        let measurement = self.measure_blobs();
         self.ahead = Ahead::Worked { blobs, measurement };
     }
 }

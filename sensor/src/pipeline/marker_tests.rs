@@ -1,7 +1,7 @@
 use crate::picture::{GREY, Pattern, Picture, RED, sensor, tared};
 use crate::pipeline::{Measurement, Sensor};
 use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::MarkerList;
 use hivtac_terms::status::Status;
 use proptest::prelude::*;
 use std::boxed::Box;
@@ -9,7 +9,7 @@ use std::boxed::Box;
 const QVGA: Geometry = Geometry::preset(Preset::Ov7725, 320, 240);
 
 /// The markers, if only the missing model forbids a force.
-fn trusted(seen: &Measurement) -> Option<[Marker; 4]> {
+fn trusted(seen: &Measurement) -> Option<MarkerList> {
     let forbidden = seen.status.0 & Status::NO_FORCE.0;
     (forbidden == Status::MODEL_MISSING.0).then(|| seen.markers.unwrap())
 }

@@ -6,6 +6,7 @@ mod following;
 mod hanging;
 #[cfg(test)]
 mod marker_tests;
+mod placed;
 mod taring;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,7 @@ use crate::force::{self, Force, NoiseLevel, Resting};
 use crate::known_answer::{self, Answer};
 use crate::markers::blob::Blob;
 use crate::markers::formats::Formats;
+use crate::markers::lost::Lost;
 use crate::markers::rules::{Finder, Found, Reading, Trust};
 use crate::markers::scanner::Scanner;
 use crate::markers::settings::{Settings, SettingsError};
@@ -34,7 +36,7 @@ use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
 use hivtac_terms::units::Px;
@@ -44,10 +46,13 @@ use hivtac_terms::units::Px;
 pub struct Measurement {
     /// Why there is no force, or how far it can be trusted.
     pub status: Status,
-    /// The four markers where the frame shows them; `None` if they were not all found.
-    pub markers: Option<[Marker; 4]>,
+    /// The markers where the frame shows them; `None` if they were not all found.
+    pub markers: Option<MarkerList>,
+    /// Those of the markers that the frame does not show: `markers` has their rest places. Never one
+    /// of four dots.
+    pub lost: Lost,
     /// Their features at one common time ([`Sensor::set_motion`]); present exactly if there are
-    /// markers.
+    /// markers and none is lost.
     pub features: Option<Features>,
     /// The force; `None` exactly if `status` has a bit of [`Status::NO_FORCE`].
     pub force: Option<Force>,
@@ -161,7 +166,12 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     ) -> Result<(), SettingsError> {
         let seen = |by: &Settings| (by.threshold.format(), by.dilations, by.centroid);
         let is_alike = seen(&settings) == seen(&self.settings);
-        let holds = |tare: &Tare| is_alike && tare.rest().fits(&settings.geometry);
+        let markers = model.as_ref().map(|model| model.rest.areas.len());
+        let holds = |tare: &Tare| {
+            is_alike
+                && tare.rest().fits(&settings.geometry)
+                && markers.is_none_or(|markers| markers == tare.rest().areas.len())
+        };
         let tare = self.tare.filter(holds);
         self.configure(settings, model)?;
         self.tare = tare;
@@ -330,7 +340,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Ends the frame and returns its measurement.
     pub fn finish_frame(&mut self) -> Measurement {
         let mut measurement = self.measure_scanned();
-        self.motion.ended(measurement.markers.as_ref());
+        let seen = measurement.markers.as_ref();
+        self.motion.ended(seen.map(|seen| (seen, measurement.lost)));
         self.complete(&mut measurement);
         if self.wants_again(&measurement) {
             self.look = Look::Wanted(measurement);
@@ -345,6 +356,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         if let Some(measurement) = self.ahead.measurement(self.scanner.blobs().len()) {
             return measurement;
         }
+        self.measure_blobs()
+    }
+
+    /// Returns the measurement of the blobs of the last finished frame.
+    fn measure_blobs(&mut self) -> Measurement {
+        if self.has_other_layout() {
+            return self.measure_placed();
+        }
         let found = self.find_markers();
         self.measurement(found)
     }
@@ -357,8 +376,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         };
         let rows = self.settings.geometry.height;
         let moved = seen.and_then(|seen| {
-            let markers = self.motion.at_the_middle(&seen.markers, rows)?;
-            Some(seen.moved_to(markers))
+            let seen_list = MarkerList::from(seen.markers);
+            let moved = self.motion.at_the_middle(&seen_list, Lost::NONE, rows)?;
+            Some(seen.moved_to(moved.array()))
         });
         let still = moved.as_ref().or(seen);
         match (&self.prepared, still) {
@@ -369,7 +389,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 status |= prepared.standing | trust.map_or(Status::OK, |trust| trust.judge(found));
             }
         }
-        let markers = still.map(|still| &still.markers);
+        let markers = still.map(|still| &still.markers[..]);
         let features = markers.map(Features::of_markers);
         let force = features
             .as_ref()
@@ -377,7 +397,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             .and_then(|(features, markers)| self.measure(features, markers, &mut status));
         Measurement {
             status,
-            markers: seen.map(|seen| seen.markers),
+            markers: seen.map(|seen| MarkerList::from(seen.markers)),
+            lost: Lost::NONE,
             features,
             force,
         }
@@ -416,7 +437,10 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             resting: fitting
                 .zip(rest)
                 .and_then(|(model, rest)| Resting::of_turned(model, &rest, self.turned())),
-            trust: rest.map(|rest| Trust::new(settings, &rest.markers(), own_rest, reading)),
+            trust: rest.map(|rest| {
+                let markers = rest.markers().array();
+                Trust::new(settings, &markers, own_rest, reading)
+            }),
             standing: self.standing_status(),
             rest,
         });
@@ -438,7 +462,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if model.is_simulated() {
                     status |= Status::NOT_CALIBRATED;
                 }
-                if !model.conditions.are_of(&self.settings) {
+                let markers = self.tare.as_ref().map(|tare| tare.rest().areas.len());
+                let is_of_layout = markers.is_none_or(|count| count == model.rest.areas.len());
+                if !model.conditions.are_of(&self.settings) || !is_of_layout {
                     status |= Status::MODEL_MISMATCH;
                 }
             }
@@ -479,7 +505,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     fn measure(
         &mut self,
         features: &Features,
-        markers: &[Marker; 4],
+        markers: &[Marker],
         status: &mut Status,
     ) -> Option<Force> {
         if status.intersects(Status::NO_FORCE) {

@@ -31,7 +31,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
         let markers = measurement.markers.as_ref()?;
         let features = measurement.features.as_ref()?;
-        let found = self.find_markers().ok()?;
+        let may_rest = self.may_rest()?;
         let geometry = &self.settings.geometry;
         // Relative to the model's rest position every unit looks touched.
         let is_touched = self.tare.is_some() && measurement.status.contains(Status::CONTACT);
@@ -41,8 +41,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
         // The images of a pressed film differ from those of a flat one; the press is the reason to
         // report.
-        let is_pressed = !Rest::of_markers(&found.markers).fits(geometry);
-        if !is_pressed && !found.may_rest(&self.settings) {
+        let is_pressed = !Rest::of_markers(markers).fits(geometry);
+        if !is_pressed && !may_rest {
             return tare.add_implausible().map(Err);
         }
         let outcome = tare.add(markers, features, geometry)?;
@@ -51,6 +51,16 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             None => Ok(rest),
             Some(touch) => Err(Refusal::Touched(touch)),
         }))
+    }
+
+    /// Returns whether the last finished frame shows whole markers of a film at rest; `None` if it
+    /// shows no markers.
+    fn may_rest(&self) -> Option<bool> {
+        let prepared = self.prepared.as_ref()?;
+        match prepared.other_layout() {
+            Some(rest) => Some(self.place_markers().ok()?.may_rest(&rest.markers())),
+            None => Some(self.find_markers().ok()?.may_rest(&self.settings)),
+        }
     }
 
     /// Returns the press that explains how the markers moved since the previous rest position, or

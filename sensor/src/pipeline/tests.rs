@@ -475,8 +475,8 @@ proptest! {
         let mut picture = Picture::new(&geometry);
         discs.iter().for_each(|(x, y, d)| picture.disc(RED, (*x, *y), *d));
         let mut sensor = sensor(geometry, None);
-        let mut rest = Rest { areas, ..spec(&[11, 3]).rest };
-        rest.features.centroids = corners.map(|(x, y)| (Px(x), Px(y)));
+        let mut rest = Rest { areas: areas.into(), ..spec(&[11, 3]).rest };
+        rest.features.centroids = corners.map(|(x, y)| (Px(x), Px(y))).into();
         sensor.set_tare(Some(rest), Drift::NONE);
         let seen = picture.feed(&mut sensor);
         prop_assert!(seen.status.contains(Status::MODEL_MISSING));

@@ -11,7 +11,9 @@
 //! a contact near the lost marker: the others hardly see it.
 
 use super::{Measurement, Sensor};
+use crate::markers::lost::Lost;
 use crate::markers::tables::Table;
+use hivtac_terms::marker::MarkerList;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
 
@@ -22,6 +24,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Replaces the measurement of the last finished frame if three of its markers give a force.
     pub(super) fn complete(&mut self, measurement: &mut Measurement) {
         if measurement.status.intersects(REASONS)
+            && !self.has_other_layout()
             && let Some(completed) = self.measure_three(measurement.status)
         {
             *measurement = completed;
@@ -37,7 +40,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         if status.intersects(Status::NO_FORCE) {
             return None;
         }
-        let rest = self.tare.as_ref()?.rest().markers();
+        let rest = self.tare.as_ref()?.rest().markers().array();
         let model = self.model.as_ref()?;
         let forward = model.forward.as_ref()?;
         let prepared = self.prepared.as_ref()?;
@@ -47,13 +50,14 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             .find_three(self.scanner.blobs(), &rest, trust)?;
         let (seen, lost) = (&three.markers, three.lost);
         let rows = self.settings.geometry.height;
-        let moved = self.motion.three_at_the_middle(seen, lost, rows);
-        let mut markers = moved.unwrap_or(*seen);
+        let (seen, lost_one) = (MarkerList::from(*seen), Lost::only(lost));
+        let moved = self.motion.at_the_middle(&seen, lost_one, rows);
+        let mut markers = moved.unwrap_or(seen);
         let noise = self.noise.of_frame(Px(0));
         let (estimate, at) = resting.estimate_of_three(forward, &markers, lost, noise);
         let marker = markers.get_mut(lost)?;
         (marker.x, marker.y) = at;
-        status |= prepared.finder.judge_three(&three, trust, &markers);
+        status |= prepared.finder.judge_three(&three, trust, &markers.array());
         let (force, told) = resting.told(forward, &model.range, noise, &estimate);
         status |= told | Status::MARKER_LOST;
         let is_touched = told.contains(Status::CONTACT);
@@ -62,10 +66,11 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         if !is_explained || status.intersects(Status::NO_FORCE) {
             return None;
         }
-        self.motion.ended_without(seen, lost);
+        self.motion.ended(Some((&seen, lost_one)));
         Some(Measurement {
             status,
             markers: None,
+            lost: Lost::NONE,
             features: None,
             force: Some(force),
         })
@@ -98,7 +103,7 @@ mod tests {
         let mut sensor = tared(GEOMETRY);
         let seen = picture.feed(&mut sensor);
         assert!(seen.status.intersects(REASONS), "{:?}", seen.status);
-        let rest = sensor.tare.as_ref().unwrap().rest().markers();
+        let rest = sensor.tare.as_ref().unwrap().rest().markers().array();
         let prepared = sensor.prepared.as_ref().unwrap();
         let trust = prepared.trust.as_ref().unwrap();
         let blobs = sensor.scanner.blobs();

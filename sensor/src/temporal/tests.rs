@@ -39,6 +39,7 @@ pub fn pressed(magnitude: i32, sigma: u32) -> Force {
 use super::{Moment, Temporal};
 use crate::force::features::Features;
 use crate::force::rest::Rest;
+use crate::markers::lost::Lost;
 use crate::pipeline::Measurement;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -51,6 +52,7 @@ pub fn frame(force: Option<Force>, right: Px) -> Measurement {
     Measurement {
         status: Status::NOT_CALIBRATED | Status::SLIP,
         markers: Some(markers),
+        lost: Lost::NONE,
         features: Some(Features::of_markers(&markers)),
         force,
     }

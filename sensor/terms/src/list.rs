@@ -78,6 +78,12 @@ impl<T: Copy + Default, const MOST: usize> List<T, MOST> {
         core::array::from_fn(|index| self.at(index))
     }
 
+    /// All items, if there are exactly `N`.
+    #[inline]
+    pub fn exactly<const N: usize>(&self) -> Option<[T; N]> {
+        (self.count == N).then(|| self.array())
+    }
+
     /// A list of what `change` makes of each item.
     #[inline]
     pub fn map<U: Copy + Default>(&self, mut change: impl FnMut(T) -> U) -> List<U, MOST> {
@@ -189,6 +195,10 @@ mod tests {
         assert_ne!(list, Short::from([1, 2, 3, 0]));
         assert_eq!((list.len(), list.at(2), list.at(3)), (3, 3, 0));
         assert_eq!(list.array(), [1, 2, 3, 0]);
+        assert_eq!(
+            (list.exactly(), list.exactly::<4>()),
+            (Some([1, 2, 3]), None)
+        );
         assert_eq!(list.map(|item| 2 * item).into_iter().sum::<i32>(), 12);
         assert_eq!(format!("{list:?}"), "[1, 2, 3]");
     }

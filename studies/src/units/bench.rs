@@ -72,7 +72,7 @@ impl Bench {
         let rest = tared.sensor.tare().context("no rest position")?;
         let rest = Rest {
             features_q16: Features::to_array(&rest.features),
-            areas_px: rest.areas,
+            areas_px: rest.areas.array(),
         };
         let known = Known {
             gauge_n: GAUGE_N,

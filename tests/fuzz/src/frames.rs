@@ -4,6 +4,7 @@
 use arbitrary::{Result, Unstructured};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{AlignedFile, Model};
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
@@ -181,11 +182,13 @@ fn is_sound(sensor: &Sensor<'_>, measurement: &Measurement) {
     let Measurement {
         status,
         markers,
+        lost,
         features,
         force,
     } = measurement;
     assert_eq!(force.is_none(), status.intersects(Status::NO_FORCE));
-    assert_eq!(markers.is_some(), features.is_some());
+    let is_whole = markers.is_some() && *lost == Lost::NONE;
+    assert_eq!(is_whole, features.is_some());
     let least = sensor.settings().min_area;
     assert!(sensor.blobs().iter().all(|blob| blob.area >= least));
 }

@@ -29,7 +29,7 @@ pub fn anywhere(input: &mut Unstructured<'_>) -> Result<[Marker; 4]> {
 
 /// Returns four markers near those of a rest position.
 pub fn near(rest: &Rest, input: &mut Unstructured<'_>) -> Result<[Marker; 4]> {
-    let mut markers = rest.markers();
+    let mut markers = rest.markers().array();
     for marker in &mut markers {
         for Px(coordinate) in [&mut marker.x, &mut marker.y] {
             // The shift is up to eight pixels.

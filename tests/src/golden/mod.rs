@@ -25,6 +25,7 @@ use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_terms::units::{MicroNewtons, MilliDegrees, Px};
@@ -234,9 +235,9 @@ impl<'b> Runner<'b> {
         }
         let mut rest = Rest {
             features: features(source)?,
-            areas: [0; 4],
+            areas: List::defaults(4),
         };
-        for area in &mut rest.areas {
+        for area in rest.areas.iter_mut() {
             *area = u32::from_le_bytes(bytes(source)?);
         }
         let model = model(&self.buffers.model.0[self.model_place.clone()])?;

@@ -3,6 +3,7 @@
 
 use crate::common::{Run, Setup, command, firmware};
 use hivtac_rig::script::Action;
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::temporal::{Moment, Temporal};
 use hivtac_terms::status::Status;
@@ -34,6 +35,7 @@ fn measured(sample: &Sample) -> Measurement {
     Measurement {
         status: sample.status,
         markers: None,
+        lost: Lost::NONE,
         features: None,
         force: sample.force,
     }

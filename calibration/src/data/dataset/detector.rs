@@ -74,7 +74,7 @@ impl MarkerDetector for Sensing<'_> {
         Ok(match (measurement.markers, measurement.features) {
             (Some(markers), Some(features)) if refused.is_empty() => Ok(Observation {
                 features_q16: Features::to_array(&features),
-                areas_px: markers.map(|m| m.area),
+                areas_px: markers.map(|m| m.area).array(),
             }),
             _ => Err(refused),
         })

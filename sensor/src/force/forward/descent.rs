@@ -186,7 +186,7 @@ impl<'a> Descent<'a> {
 
     /// Returns whether the load explains the markers and the steps came to an end.
     pub fn is_done(&self) -> bool {
-        let stuck = residual::stuck(self.here.left.len());
+        let stuck = residual::stuck(self.markers.observed.coordinates());
         let is_explained = self.white.is_some_and(|white| white.unexplained <= stuck);
         is_explained && (self.has_ended || self.has_converged())
     }
@@ -210,6 +210,7 @@ impl<'a> Descent<'a> {
             unexplained: white.map_or(f32::INFINITY, |white| white.unexplained),
             left: self.here.by_noise(self.markers.observed, self.whitening),
             solved: white.and_then(|white| white.solved),
+            coordinates: self.markers.observed.coordinates(),
             looks: self.looks,
         }
     }

@@ -11,11 +11,16 @@ use super::shapes::Pressing;
 use super::solve::{Column, MOST_DOTS, Solved};
 use super::weight::Hanging;
 use super::{Forward, Strength};
+use crate::markers::lost::Lost;
 use hivtac_terms::list::List;
 
 /// Most steps of a frame. It exceeds what the model asks for: more steps follow while the load does
 /// not explain the markers. Little-known units begin far from the result.
 pub const STEPS_AT_MOST: u8 = 8;
+
+/// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
+/// nothing.
+const LOST: f32 = 1e6;
 
 /// How the markers' images moved since the rest position, and how well that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,6 +29,8 @@ pub struct Observed<'a> {
     pub moved: Column,
     /// The noise of each marker: covariances xx, xy, yy, focal lengths squared; xx and yy > 0.
     pub noise: List<[f32; 3], MOST_DOTS>,
+    /// Markers that are not seen: they count for nothing.
+    pub lost: Lost,
     /// How far the film may rest from the rest position, px; `None` if that is 0.
     pub drift: Option<(&'a Drift, &'a Markers)>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
@@ -33,6 +40,11 @@ pub struct Observed<'a> {
 }
 
 impl Observed<'_> {
+    /// Number of coordinates that are seen.
+    pub(super) fn coordinates(&self) -> usize {
+        self.moved.len().saturating_sub(2 * self.lost.count())
+    }
+
     /// Puts the noise of all markers, which is independent between markers, into `covariance`.
     pub(super) fn put_noise(&self, covariance: &mut Covariance) {
         covariance.reset(self.moved.len());
@@ -50,9 +62,13 @@ impl Observed<'_> {
     fn add_noise(&self, covariance: &mut Covariance) {
         for (dot, [xx, xy, yy]) in self.noise.iter().enumerate() {
             let (x, y) = (2 * dot, 2 * dot + 1);
-            covariance.add(x, x, *xx);
-            covariance.add(y, x, *xy);
-            covariance.add(y, y, *yy);
+            let [xx, xy, yy] = match self.lost.contains(dot) {
+                true => [LOST, 0.0, LOST],
+                false => [*xx, *xy, *yy],
+            };
+            covariance.add(x, x, xx);
+            covariance.add(y, x, xy);
+            covariance.add(y, y, yy);
         }
     }
 }
@@ -71,6 +87,8 @@ pub struct Estimate {
     /// The solution of the markers' equations at this load; `None` if they do not determine all
     /// unknowns.
     pub solved: Option<Solved>,
+    /// Number of coordinates that were seen.
+    pub coordinates: usize,
     /// How often the film was run forwards: once at the start, and once for each step.
     pub looks: u8,
 }
@@ -144,12 +162,12 @@ pub struct Sigma {
 impl Estimate {
     /// Returns whether the load explains the markers; false if the residual is NaN.
     pub fn is_explained(&self) -> bool {
-        (0.0..=residual::unexplained(self.left.len())).contains(&self.unexplained)
+        (0.0..=residual::unexplained(self.coordinates)).contains(&self.unexplained)
     }
 
     /// The factor by which the residual exceeds the markers' stated noise, at least 1.
     fn noisier(&self) -> f32 {
-        let usual = residual::usual(self.left.len());
+        let usual = residual::usual(self.coordinates);
         libm::sqrtf(1.0 + (self.unexplained - usual).max(0.0) / usual)
     }
 
@@ -231,6 +249,7 @@ mod tests {
             },
             unexplained,
             left: Column::defaults(8),
+            coordinates: 8,
             solved: Some(Solved {
                 unknowns: [0.0; 5],
                 left_over: unexplained,

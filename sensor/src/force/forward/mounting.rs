@@ -262,10 +262,10 @@ mod tests {
         };
         Rest {
             features: Features {
-                centroids: core::array::from_fn(seen),
+                centroids: List::from_fn(4, seen),
                 ..Features::default()
             },
-            areas: [200; 4],
+            areas: [200; 4].into(),
         }
     }
 

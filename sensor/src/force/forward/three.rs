@@ -10,13 +10,11 @@ use super::pose::Pose;
 use super::predict::Markers;
 use super::solve::{Column, square};
 use super::{Forward, Unknown};
+use crate::markers::lost::Lost;
 
 /// Largest residual, relative to its variance, of a contact that explains three markers. χ² of one
 /// degree of freedom exceeds it in 1 of 2,000 honest frames.
 const UNEXPLAINED: f32 = 12.1;
-/// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
-/// nothing.
-const LOST: f32 = 1e6;
 /// A contact this near to the lost marker moves the other three so little that several loads
 /// explain them, mm.
 const NEAR_MM: f32 = 2.2;
@@ -53,9 +51,7 @@ impl Forward<'_> {
         mounting: &Mounting,
         unknown: Unknown<'_>,
     ) -> (Estimate, [f32; 2]) {
-        if let Some(noise) = observed.noise.get_mut(lost) {
-            *noise = [LOST, 0.0, LOST];
-        }
+        observed.lost = Lost::only(lost);
         leave_out(&mut observed.moved, lost);
         let guess = self.nearest_press(&observed.moved, lost, &mounting.beside_mm);
         let estimate = self.estimate(&observed, mounting, unknown, guess);

@@ -13,9 +13,10 @@ use crate::force::packing::{LOADED_AHEAD, WeightWidth, pack};
 use crate::force::rest::Rest;
 use alloc::vec::Vec;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
+use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_terms::threshold::PixelFormat;
 
-/// Offset of the film run forwards in models that have one: after the places.
+/// Offset of the film run forwards in models with a network: after the places.
 pub const FORWARD_OFFSET: usize = 456;
 
 /// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
@@ -27,7 +28,7 @@ pub struct ModelSpec {
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// Its layers, first to last: 1 to 8.
+    /// Its layers, first to last: 1 to 8, or none for a film run forwards without a network.
     pub layers: Vec<LayerSpec>,
     /// The film run forwards.
     pub forward: Option<ForwardSpec>,
@@ -98,12 +99,14 @@ impl ModelSpec {
                 Some(_) => FORWARD_BESIDE,
             },
         ]);
-        push_conditions(&mut bytes, &self.conditions);
+        push_conditions(&mut bytes, &self.conditions, self.rest.areas.len());
         push_features(&mut bytes, &self.rest.features);
-        for area in self.rest.areas {
+        for area in &self.rest.areas {
             bytes.extend(area.to_le_bytes());
         }
-        push_input(&mut bytes, &self.input);
+        if !self.layers.is_empty() {
+            push_input(&mut bytes, &self.input);
+        }
         let range = &self.range;
         for value in [range.magnitude.0, range.alpha.0, range.beta.0] {
             bytes.extend(value.to_le_bytes());
@@ -122,10 +125,14 @@ impl ModelSpec {
     }
 }
 
-/// Returns the model file with another number of steps; `None` if the model takes no steps, or the
-/// file is not a model.
+/// Returns the model file with another number of steps; `None` if the model has no network or takes
+/// no steps, or the file is not a model.
 pub fn with_steps(file: &[u8], steps: u8) -> Option<Vec<u8>> {
-    Model::parse(file).ok()?.forward?;
+    let model = Model::parse(file).ok()?;
+    model
+        .forward
+        .as_ref()
+        .filter(|_| !model.layers().is_empty())?;
     let mut bytes = file[..file.len() - 4].to_vec();
     bytes[FORWARD_OFFSET] = steps;
     let crc = CRC.checksum(&bytes);
@@ -174,7 +181,7 @@ impl LayerSpec {
     }
 }
 
-fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
+fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions, markers: usize) {
     let geometry = &conditions.geometry;
     bytes.extend(padded_name(conditions.preset));
     bytes.extend(geometry.width.to_le_bytes());
@@ -199,15 +206,18 @@ fn push_conditions(bytes: &mut Vec<u8>, conditions: &Conditions) {
         ContactReading::Stick => 1,
         ContactReading::Slip => 2,
     });
-    push_origin(bytes, conditions.origin);
+    push_origin(bytes, conditions.origin, markers);
 }
 
-fn push_origin(bytes: &mut Vec<u8>, origin: Origin) {
+fn push_origin(bytes: &mut Vec<u8>, origin: Origin, markers: usize) {
     let (number, unit) = match origin {
         Origin::Simulated => (0, [0; 12]),
         Origin::Unit(unit) => (1, unit),
     };
-    bytes.extend([number, 0]);
+    // More markers than a model may have are more than the reader accepts.
+    let more = markers.checked_sub(LEAST_MARKERS);
+    let more = more.and_then(|more| u8::try_from(more).ok());
+    bytes.extend([number, more.unwrap_or(u8::MAX)]);
     bytes.extend(unit);
 }
 

@@ -7,6 +7,7 @@ use crate::force::forward::{
     Table, Tables, Terms, Weight, weight,
 };
 use hivtac_terms::list::List;
+use hivtac_terms::marker::LEAST_MARKERS;
 #[cfg(any(test, feature = "encode"))]
 use {
     crate::force::forward::{EVEN, MOST_TILTS, ODD, OUTPUTS, SHIFTS},
@@ -22,9 +23,6 @@ impl<'a> Forward<'a> {
         forward(&mut Reader { bytes, offset: 0 })
     }
 }
-
-/// Fewest markers: a contact has five unknowns.
-const LEAST_DOTS: usize = 4;
 
 /// Optional parts of a file: the covariance of its own unit, the knowledge of other units, and the
 /// effect of the film's weight.
@@ -114,7 +112,7 @@ fn weight<'a>(reader: &mut Reader<'a>, dots: usize) -> Result<Weight<'a>, ModelE
 fn dots(reader: &mut Reader<'_>) -> Result<usize, ModelError> {
     let offset = reader.offset;
     match usize::from(reader.u8()?) {
-        dots @ LEAST_DOTS..=MOST_DOTS => Ok(dots),
+        dots @ LEAST_MARKERS..=MOST_DOTS => Ok(dots),
         _ => Err(ModelError::Field {
             name: "markers",
             offset,

@@ -4,13 +4,16 @@ use super::{
     CalibratedRange, Conditions, InputScaling, MAX_LAYERS, Model, ModelError, Origin, OutputKind,
     forward::forward, layers::layers, place::place, reader::Reader, uncertainty::uncertainty,
 };
-use crate::force::features::{FEATURES, Features};
+use crate::force::features::{Centroids, FEATURES, Features};
 use crate::force::forward::Forward;
+use crate::force::layer::Layer;
 use crate::force::rest::Rest;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::list::List;
+use hivtac_terms::marker::{LEAST_MARKERS, MOST_MARKERS};
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
 
@@ -40,12 +43,17 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         bytes: body,
         offset: HEADER_LENGTH,
     };
-    let layer_count = reader.u16_in("layer count", 1, MAX_LAYERS as u16, "1 to 8")? as usize;
+    let layer_count = reader.u16_in("layer count", 0, MAX_LAYERS as u16, "0 to 8")? as usize;
     let output = output_kind(&mut reader, version)?;
     let has_forward = has_forward(&mut reader, output)?;
-    let conditions = conditions(&mut reader)?;
-    let rest = rest(&mut reader)?;
-    let input = input_scaling(&mut reader)?;
+    let (conditions, more_markers) = conditions(&mut reader)?;
+    let markers = LEAST_MARKERS + more_markers;
+    check_layers(layer_count, has_forward, markers)?;
+    let rest = rest(&mut reader, markers)?;
+    let input = match layer_count {
+        0 => InputScaling::default(),
+        _ => input_scaling(&mut reader)?,
+    };
     let mut range = range(&mut reader)?;
     let mut uncertainty = uncertainty(&mut reader)?;
     if output.tells_place() {
@@ -62,10 +70,13 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         return Err(ModelError::Field {
             name: "markers",
             offset: markers_at,
-            allowed: "4, as the rest position has",
+            allowed: "as many as the rest position has",
         });
     }
-    let layers = layers(&mut reader, layer_count, output.count())?;
+    let layers = match layer_count {
+        0 => [Layer::default(); MAX_LAYERS],
+        _ => layers(&mut reader, layer_count, output.count())?,
+    };
     if reader.offset != body.len() {
         let announced = (reader.offset + CRC_LENGTH) as u32;
         return Err(ModelError::Length {
@@ -84,6 +95,21 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
         crc,
         layers,
         layer_count,
+    })
+}
+
+/// Whether there may be this many layers: a network has the eleven features of four markers as its
+/// inputs, and without one the film must be run forwards.
+fn check_layers(layers: usize, has_forward: bool, markers: usize) -> Result<(), ModelError> {
+    let allowed = match (layers, has_forward, markers) {
+        (0, true, _) | (1.., _, LEAST_MARKERS) => return Ok(()),
+        (0, false, _) => "1 to 8 without the film run forwards",
+        (1.., ..) => "0 with other than four markers",
+    };
+    Err(ModelError::Field {
+        name: "layer count",
+        offset: HEADER_LENGTH,
+        allowed,
     })
 }
 
@@ -175,13 +201,14 @@ fn frame(bytes: &[u8]) -> Result<(&[u8], u32, u16), ModelError> {
     Ok((body, stored, version))
 }
 
-fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
+/// Reads the conditions, and the number of markers beyond four.
+fn conditions(reader: &mut Reader<'_>) -> Result<(Conditions, usize), ModelError> {
     let (preset, geometry) = (preset(reader)?, geometry(reader)?);
     let threshold_at = reader.offset;
     let limits = reader.array()?;
     let dilations = reader.u8_in("dilations", 3, "0 to 3")?;
     let format = reader.choice("pixel format", &PixelFormat::ALL, "0, 1 or 2")?;
-    Ok(Conditions {
+    let conditions = Conditions {
         preset,
         geometry,
         threshold: threshold(format, limits, threshold_at)?,
@@ -203,8 +230,16 @@ fn conditions(reader: &mut Reader<'_>) -> Result<Conditions, ModelError> {
             ],
             "0, 1 or 2",
         )?,
-        origin: origin(reader)?,
-    })
+        origin: Origin::Simulated,
+    };
+    let (origin, more_markers) = origin(reader)?;
+    Ok((
+        Conditions {
+            origin,
+            ..conditions
+        },
+        more_markers,
+    ))
 }
 
 fn geometry(reader: &mut Reader<'_>) -> Result<Geometry, ModelError> {
@@ -268,14 +303,16 @@ fn threshold(format: PixelFormat, limits: [u8; 6], offset: usize) -> Result<Thre
     Threshold::of_limits(format, limits).map_err(|_| wrong)
 }
 
-fn origin(reader: &mut Reader<'_>) -> Result<Origin, ModelError> {
+/// Reads the origin, and the number of markers beyond four.
+fn origin(reader: &mut Reader<'_>) -> Result<(Origin, usize), ModelError> {
     let is_unit = reader.choice("origin", &[false, true], "0 or 1")?;
-    reader.zero("reserved byte")?;
+    let most = (MOST_MARKERS - LEAST_MARKERS) as u8;
+    let more_markers = usize::from(reader.u8_in("markers beyond four", most, "0 to 12")?);
     let offset = reader.offset;
     let unit: [u8; 12] = reader.array()?;
     match (is_unit, unit) {
-        (true, unit) => Ok(Origin::Unit(unit)),
-        (false, [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]) => Ok(Origin::Simulated),
+        (true, unit) => Ok((Origin::Unit(unit), more_markers)),
+        (false, [0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]) => Ok((Origin::Simulated, more_markers)),
         _ => Err(ModelError::Field {
             name: "unit id",
             offset,
@@ -284,11 +321,11 @@ fn origin(reader: &mut Reader<'_>) -> Result<Origin, ModelError> {
     }
 }
 
-fn rest(reader: &mut Reader<'_>) -> Result<Rest, ModelError> {
+fn rest(reader: &mut Reader<'_>, markers: usize) -> Result<Rest, ModelError> {
     let offset = reader.offset;
-    let features = features(reader)?;
-    let mut areas = [0; 4];
-    for area in &mut areas {
+    let features = features(reader, markers)?;
+    let mut areas = List::defaults(markers);
+    for area in areas.iter_mut() {
         *area = reader.u32()?;
     }
     let rest = Rest { features, areas };
@@ -305,11 +342,12 @@ fn rest(reader: &mut Reader<'_>) -> Result<Rest, ModelError> {
     }
 }
 
-fn features(reader: &mut Reader<'_>) -> Result<Features, ModelError> {
-    let mut pairs = [(Px(0), Px(0)); 5];
-    for pair in &mut pairs {
-        *pair = (Px(reader.u32()? as i32), Px(reader.u32()? as i32));
+fn features(reader: &mut Reader<'_>, markers: usize) -> Result<Features, ModelError> {
+    let mut centroids = Centroids::defaults(markers);
+    for at in centroids.iter_mut() {
+        *at = point(reader)?;
     }
+    let rect_center = point(reader)?;
     let offset = reader.offset;
     let rect_area = Q::from_bits(i64::from_le_bytes(reader.array()?));
     if !(Q::from_bits(0)..=LARGEST_RECT).contains(&rect_area) {
@@ -320,16 +358,19 @@ fn features(reader: &mut Reader<'_>) -> Result<Features, ModelError> {
             allowed,
         });
     }
-    let [a, b, c, d, rect_center] = pairs;
     Ok(Features {
-        centroids: [a, b, c, d],
+        centroids,
         rect_center,
         rect_area,
     })
 }
 
+fn point(reader: &mut Reader<'_>) -> Result<(Px, Px), ModelError> {
+    Ok((Px(reader.u32()? as i32), Px(reader.u32()? as i32)))
+}
+
 fn input_scaling(reader: &mut Reader<'_>) -> Result<InputScaling, ModelError> {
-    let mean = features(reader)?;
+    let mean = features(reader, LEAST_MARKERS)?;
     let mut multipliers = [0; FEATURES];
     for multiplier in &mut multipliers {
         let offset = reader.offset;

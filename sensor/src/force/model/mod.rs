@@ -82,6 +82,17 @@ pub struct InputScaling {
     pub shifts: [u8; FEATURES],
 }
 
+impl Default for InputScaling {
+    /// For a model without layers.
+    fn default() -> InputScaling {
+        InputScaling {
+            mean: Features::default(),
+            multipliers: [1; FEATURES],
+            shifts: [1; FEATURES],
+        }
+    }
+}
+
 /// The meaning of the last layer's outputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum OutputKind {
@@ -138,7 +149,7 @@ impl<'a> Model<'a> {
         self.crc
     }
 
-    /// Its layers, first to last: at least one.
+    /// Its layers, first to last; none if its steps begin without a network.
     pub fn layers(&self) -> &[Layer<'a>] {
         self.layers.get(..self.layer_count).unwrap_or_default()
     }
@@ -155,11 +166,15 @@ impl<'a> Model<'a> {
         self.conditions.origin == Origin::Simulated
     }
 
-    /// Layer widths and preset, such as `11-64-64-5 ov7725`; cut after 32 bytes.
+    /// Layer widths and preset, such as `11-64-64-5 ov7725`, or without a network the number of
+    /// markers, such as `8 markers ov7725`; cut after 32 bytes.
     pub fn name(&self) -> heapless::String<32> {
         let mut name = heapless::String::new();
         // A full string keeps what it has: the end of a very long name is cut.
-        let _ = write!(name, "{FEATURES}");
+        let _ = match self.layers() {
+            [] => write!(name, "{} markers", self.rest.areas.len()),
+            _ => write!(name, "{FEATURES}"),
+        };
         for layer in self.layers() {
             let _ = write!(name, "-{}", layer.outputs());
         }

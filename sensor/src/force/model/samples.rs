@@ -19,7 +19,8 @@ pub fn spec(widths: &[u16]) -> ModelSpec {
             (Px(3), Px(4)),
             (Px(5), Px(6)),
             (Px(7), Px(8)),
-        ],
+        ]
+        .into(),
         rect_center: (Px(9), Px(10)),
         rect_area: Q::from_bits(11),
     };
@@ -35,7 +36,7 @@ pub fn spec(widths: &[u16]) -> ModelSpec {
         },
         rest: Rest {
             features,
-            areas: [131, 132, 133, 134],
+            areas: [131, 132, 133, 134].into(),
         },
         input: InputScaling {
             mean: features,
@@ -173,7 +174,7 @@ pub(super) fn scramble(mut spec: ModelSpec, numbers: &[u32], unit: Option<[u8; 1
         (*x, *y) = (Px((next() >> 7) as i32), Px((next() >> 7) as i32));
     }
     spec.input.mean.rect_area = Q::from_bits(i64::from(next()));
-    spec.rest.areas = [0; 4].map(|_: u32| 1 + next() % 640_000);
+    spec.rest.areas = [0; 4].map(|_: u32| 1 + next() % 640_000).into();
     spec.input.multipliers = [0; 11].map(|_: u32| 1 + (next() >> 9));
     spec.input.shifts = [0; 11].map(|_: u8| 1 + (next() % 62) as u8);
     if !spec.output.tells_place() {

@@ -108,6 +108,7 @@ fn every_field_is_checked() {
     let good = spec(&[11, 5, 3]).encode().unwrap();
     for (offset, value, name) in [
         (7, 1, "reserved byte"),
+        (63, 1, "layer count"),
         (12, 0, "layer count"),
         (12, 9, "layer count"),
         (14, 2, "output kind"),
@@ -131,7 +132,7 @@ fn every_field_is_checked() {
         (60, 2, "centroid estimator"),
         (61, 3, "contact reading"),
         (62, 2, "origin"),
-        (63, 1, "reserved byte"),
+        (63, 13, "markers beyond four"),
         (64, 1, "unit id"),
         (123, 0x80, "rectangle area"),
         (121, 1, "rectangle area"),

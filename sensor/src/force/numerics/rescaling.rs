@@ -133,7 +133,7 @@ fn the_widest_int8_sum_is_exact() {
         let bytes = spec.encode().unwrap();
         let model = Model::parse(&bytes).unwrap();
         let far = Features {
-            centroids: [(Px(800 << 16), Px(800 << 16)); 4],
+            centroids: [(Px(800 << 16), Px(800 << 16)); 4].into(),
             ..Features::default()
         };
         let output = Network::new().run(&model, &far, &Features::default());

@@ -21,7 +21,7 @@
 //! rest is flat.
 //!
 //! With a film run forwards, three markers may do (`three`): a fourth one stands where the film has
-//! it.
+//! it. Markers of other layouts than the square of four are found by where they rest (`placed`).
 //!
 //! Exactly one set of four must pass rules 1 to 3; two such sets are ambiguous, however different.
 //!
@@ -48,11 +48,13 @@
 mod central;
 mod lean;
 pub mod pattern;
+mod placed;
 mod reading;
 mod shape;
 mod three;
 mod trust;
 
+pub use placed::Placed;
 pub use reading::Reading;
 pub use three::Three;
 pub use trust::Trust;
@@ -153,6 +155,9 @@ pub struct Finder {
     edge: f32,
     areas: (u32, u32),
     centroid: CentroidEstimator,
+    dilations: u8,
+    /// Factor of the pixel format on limits that come from the pixel grid.
+    grid: f32,
 }
 
 impl Finder {
@@ -170,6 +175,8 @@ impl Finder {
             edge: edge.to_f32(),
             areas: (smallest.max(1), largest),
             centroid: settings.centroid,
+            dilations: settings.dilations,
+            grid: trust::grid(settings.threshold.format()).0,
         }
     }
 
@@ -237,11 +244,7 @@ impl Finder {
         };
         let [a, b, c, d] = shapes;
         Ok(Found {
-            markers: shapes.map(|shape| Marker {
-                x: shape.x,
-                y: shape.y,
-                area: shape.area,
-            }),
+            markers: shapes.map(Shape::marker),
             images: [image(a)?, image(b)?, image(c)?, image(d)?],
             pattern,
         })

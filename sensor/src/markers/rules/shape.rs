@@ -9,6 +9,7 @@ use super::{
 use crate::markers::blob::Blob;
 use crate::markers::kernels::sqrt;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
 /// A blob's centroid, and the distribution of its pixels around it.
@@ -99,6 +100,15 @@ impl Shape {
             density: blob.weight as f32 * by_area,
             central,
         })
+    }
+
+    /// The marker of which this is the image.
+    pub fn marker(&self) -> Marker {
+        Marker {
+            x: self.x,
+            y: self.y,
+            area: self.area,
+        }
     }
 
     /// Returns the shape about a centre; `None` about its own centroid.

@@ -12,7 +12,8 @@
 //! What shifts an image and keeps its shape has one redundant coordinate against it instead of
 //! three.
 
-use super::pattern::{Pattern, distance};
+use super::pattern::Pattern;
+use super::placed::nearest;
 use super::shape::{RadialShape, Shape};
 use super::{Finder, Found, Image, Trust};
 use crate::markers::blob::Blob;
@@ -40,13 +41,13 @@ impl Finder {
             let Some(shape) = self.candidate(blob) else {
                 continue;
             };
-            let identity = nearest(&shape, rest);
+            let identity = nearest((shape.x, shape.y), rest);
             let place = shapes.get_mut(identity).zip(markers.get_mut(identity));
             let (place, marker) = place?;
             if place.replace(shape).is_some() {
                 return None;
             }
-            *marker = of_shape(&shape);
+            *marker = shape.marker();
         }
         let is_missing = |identity: &usize| matches!(shapes.get(*identity), Some(None));
         let mut missing = (0..4).filter(is_missing);
@@ -146,25 +147,5 @@ impl Image {
             lopsided: 0.0,
             ..*self
         }
-    }
-}
-
-/// The identity whose rest place is nearest.
-fn nearest(shape: &Shape, rest: &[Marker; 4]) -> usize {
-    let (mut nearest, mut least) = (0, f32::INFINITY);
-    for (identity, marker) in rest.iter().enumerate() {
-        let far = distance((shape.x, shape.y), (marker.x, marker.y));
-        if far < least {
-            (nearest, least) = (identity, far);
-        }
-    }
-    nearest
-}
-
-fn of_shape(shape: &Shape) -> Marker {
-    Marker {
-        x: shape.x,
-        y: shape.y,
-        area: shape.area,
     }
 }

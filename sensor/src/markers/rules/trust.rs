@@ -51,7 +51,7 @@ const ASPECT_TAPER: f32 = 6.0;
 const SKEW_PIXELS: f32 = 1.0;
 /// Hollowness, px², with none to three dilations, which make a disc slightly square (largest seen:
 /// 0.20, 0.20, 0.28 and 0.44). Detects a dented, notched or grown marker.
-const HOLLOW: [f32; 1 + MAX_DILATIONS as usize] = [0.22, 0.22, 0.31, 0.49];
+pub(super) const HOLLOW: [f32; 1 + MAX_DILATIONS as usize] = [0.22, 0.22, 0.31, 0.49];
 /// Smallest number of pixels that passed the threshold themselves, before dilation: that of an
 /// ellipse with smaller diameters than the mask's. They are smaller by the part that dilation adds,
 /// 8/π px each time, and by 0.328 px (largest seen: 0.27). A dilation adds 2 px to width and
@@ -73,8 +73,8 @@ const DENSITY_AREA: f32 = 12.0;
 const EDGES_APART: f32 = 1.0;
 /// Centroid against bounding box: 0.6 px and 0.0313 of its width. Detects a marker cut or grown on
 /// one side.
-const LOPSIDED_PIXELS: f32 = 0.6;
-const LOPSIDED: f32 = 0.0313;
+pub(super) const LOPSIDED_PIXELS: f32 = 0.6;
+pub(super) const LOPSIDED: f32 = 0.0313;
 
 /// The rest position that four markers are compared with, and all numbers that follow from it.
 #[derive(Clone, Debug)]
@@ -107,10 +107,7 @@ impl Trust {
         let geometry = &settings.geometry;
         let centroids = rest.map(|marker| (marker.x, marker.y));
         let at_rest = Pattern::of_centroids(centroids);
-        let (grid, grid_of_means) = match settings.threshold.format() {
-            PixelFormat::Yuv422 => (2.0, 1.125),
-            PixelFormat::Rgb565 | PixelFormat::Mono => (1.0, 1.0),
-        };
+        let (grid, grid_of_means) = grid(settings.threshold.format());
         let displacement = match settings.centroid {
             CentroidEstimator::RednessWeighted => grid_of_means * reading.displacement,
             CentroidEstimator::BinaryMask => grid * STRAIN_BINARY,
@@ -257,6 +254,15 @@ impl Trust {
             are_alike(densities, over_square(area))
         };
         are_alike(densities, more) && self.reading.inner_density_area.is_none_or(inner)
+    }
+}
+
+/// The factors of a pixel format on limits of second moments, and of means, that come from the pixel
+/// grid.
+pub(super) fn grid(format: PixelFormat) -> (f32, f32) {
+    match format {
+        PixelFormat::Yuv422 => (2.0, 1.125),
+        PixelFormat::Rgb565 | PixelFormat::Mono => (1.0, 1.0),
     }
 }
 

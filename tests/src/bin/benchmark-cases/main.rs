@@ -297,7 +297,7 @@ fn position(
     let (features, markers) = seen(geometry, format, centroid, pixels)?;
     Ok(Rest {
         features,
-        areas: markers.map(|marker| marker.area),
+        areas: markers.map(|marker| marker.area).into(),
     })
 }
 
@@ -316,7 +316,8 @@ fn seen(
     };
     sensor.configure(settings, None)?;
     let measurement = sensor.measure_frame(pixels);
-    let found = measurement.features.zip(measurement.markers);
+    let markers = measurement.markers.and_then(|markers| markers.exactly());
+    let found = measurement.features.zip(markers);
     found.context("a frame that shows where the markers are has none")
 }
 

@@ -1,0 +1,234 @@
+//! Tests frames of a film with eight dots through the sensor's own code: identities by the rest
+//! position, a force with an honest uncertainty, also without a dot, and clear refusals.
+
+use std::sync::LazyLock;
+
+use hivtac_calibration::evaluation::errors::angle_deg;
+use hivtac_calibration::forward::{layout_model, layout_scene};
+use hivtac_sensor::force::Force;
+use hivtac_sensor::force::forward::Drift;
+use hivtac_sensor::force::model::{AlignedFile, Model};
+use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::markers::lost::Lost;
+use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::tare::{Refusal, TareBuilder};
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::ByteOrder;
+use hivtac_twin::film::{Dots, Layout};
+use hivtac_twin::{Load, Options, Paint, Patch, Scene};
+
+static FILE: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let layout = "8v".parse().unwrap();
+    layout_model(layout, 4.6, 2).unwrap().encode().unwrap()
+});
+
+fn model() -> Model<'static> {
+    Model::parse(&FILE).unwrap()
+}
+
+fn layout() -> Layout {
+    "8v".parse().unwrap()
+}
+
+fn scene(change: impl FnOnce(&mut Options)) -> Scene {
+    let scene = layout_scene(layout()).unwrap();
+    let mut options = scene.options().clone();
+    change(&mut options);
+    scene.with_options(options).unwrap()
+}
+
+fn nominal() -> Scene {
+    scene(|_| {})
+}
+
+fn untared() -> Box<Sensor<'static>> {
+    let mut sensor: Box<Sensor<'static>> = Box::new(Sensor::new());
+    let settings = model().conditions.settings(ByteOrder::Native);
+    sensor.configure(settings, Some(model())).unwrap();
+    sensor
+}
+
+fn seen(sensor: &mut Sensor<'_>, scene: &Scene, load: &Load, number: u64) -> Measurement {
+    sensor.forget_frame();
+    sensor.measure_frame(&scene.render_load(load, number).unwrap().to_rgb565())
+}
+
+/// The result of a tare on these frames; `None` if they show too few markers.
+fn tare(sensor: &mut Sensor<'_>, scene: &Scene, load: &Load) -> Option<Result<Rest, Refusal>> {
+    let mut tare = TareBuilder::new(16).unwrap();
+    (0..32).find_map(|number| {
+        let measurement = seen(sensor, scene, load, 1_000 + number);
+        sensor.tare_with(&mut tare, &measurement)
+    })
+}
+
+/// A sensor that was tared on this scene.
+fn tared(scene: &Scene) -> Box<Sensor<'static>> {
+    let mut sensor = untared();
+    let rest = tare(&mut sensor, scene, &Load::REST).unwrap().unwrap();
+    sensor.set_tare(Some(rest), Drift::NONE);
+    sensor
+}
+
+/// Presses within ±4 mm, of 50 to 200 mN.
+fn loads() -> impl Iterator<Item = (u64, Load)> {
+    (0..40_u64).map(|number| {
+        let part = |times: f64| 2.0 * (number as f64 * times).fract() - 1.0;
+        let force_n = 0.125 + 0.075 * part(0.618);
+        let load = Load::from_angles(force_n, 8.0 * part(0.755), 8.0 * part(0.57)).unwrap();
+        let place_mm = [4.0 * part(0.414), 4.0 * part(0.303)];
+        (number, load.with_offset_mm(place_mm).unwrap())
+    })
+}
+
+/// Errors of direction, |F| and place over what 95 of 100 are within.
+fn errors(force: &Force, load: &Load) -> [f64; 3] {
+    let newtons = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    let length = newtons.iter().map(|part| part * part).sum::<f64>().sqrt();
+    let off_deg = angle_deg(
+        newtons.map(|part| part / length),
+        load.vector_n().map(|part| part / load.magnitude_n()),
+    );
+    let place = force.place.unwrap();
+    let [x, y] = load.offset_mm();
+    let off_mm = (f64::from(place.x.0) * 1e-3 - x).hypot(f64::from(place.y.0) * 1e-3 - y);
+    [
+        off_deg.unwrap() / (1.731e-3 * f64::from(force.direction_sigma.0)),
+        (length - load.magnitude_n()).abs() / (1.96e-6 * f64::from(force.magnitude_sigma.0)),
+        off_mm / (2.448e-3 * f64::from(place.sigma.0)),
+    ]
+}
+
+/// Number of presses with a force, and with all three errors within the stated 95 %; the lost
+/// markers of each force.
+fn judged(sensor: &mut Sensor<'_>, scene: &Scene) -> (u32, [u32; 3], Vec<Lost>) {
+    let (mut shown, mut within, mut lost) = (0, [0; 3], Vec::new());
+    for (number, load) in loads() {
+        let measurement = seen(sensor, scene, &load, number);
+        let Some(force) = measurement.force else {
+            println!(
+                "{number}: {:?} {load:?} {:?}",
+                measurement.status, measurement.lost
+            );
+            continue;
+        };
+        let is_lost = measurement.lost != Lost::NONE;
+        assert!(!is_lost || measurement.status.contains(Status::MARKER_LOST));
+        shown += 1;
+        lost.push(measurement.lost);
+        let errors = errors(&force, &load);
+        println!("{number}: {errors:.2?} {:?}", measurement.status);
+        for (within, error) in within.iter_mut().zip(errors) {
+            *within += u32::from(error <= 1.0);
+        }
+    }
+    (shown, within, lost)
+}
+
+#[test]
+fn eight_dots_give_a_force_with_an_honest_uncertainty() {
+    let scene = nominal();
+    let (shown, within, _) = judged(&mut tared(&scene), &scene);
+    assert!(shown >= 38, "{shown} of 40");
+    assert!(
+        within.iter().all(|part| *part >= 33),
+        "{within:?} of {shown}"
+    );
+}
+
+/// Any of the eight, as if it had peeled off.
+#[test]
+fn a_dot_that_is_lost_costs_no_force() {
+    for lost in [0, 5] {
+        let mut sensor = tared(&nominal());
+        let scene = scene(|options| options.missing = Dots::from_fn(8, |dot| dot == lost));
+        let (shown, within, without) = judged(&mut sensor, &scene);
+        assert!(shown >= 37, "{shown} of 40");
+        assert!(
+            within.iter().all(|part| *part >= 32),
+            "{within:?} of {shown}"
+        );
+        assert!(without.iter().all(|without| without.contains(lost)));
+    }
+}
+
+/// A dot that moved on the film by 0.03 mm, half a pixel, since the tare.
+#[test]
+fn a_dot_that_lies_is_left_out() {
+    for liar in [2, 4] {
+        let mut sensor = tared(&nominal());
+        let scene = scene(|options| {
+            options.glued_mm = Dots::defaults(8);
+            options.glued_mm[liar] = [0.03, 0.0];
+        });
+        let (shown, within, _) = judged(&mut sensor, &scene);
+        assert!(shown >= 36, "{shown} of 40");
+        assert!(
+            within.iter().all(|part| *part >= 30),
+            "{within:?} of {shown}"
+        );
+    }
+}
+
+#[test]
+fn glare_on_a_rim_refuses_no_force() {
+    let mut sensor = tared(&nominal());
+    let [x, y] = layout().centres_mm()[1];
+    let scene = scene(|options| {
+        options.patches.push(Patch {
+            centre_mm: [x - 0.5, y],
+            radius_mm: 0.1,
+            paint: Paint::Glare,
+        });
+    });
+    let (shown, within, _) = judged(&mut sensor, &scene);
+    assert!(shown >= 38, "{shown} of 40");
+    assert!(
+        within.iter().all(|part| *part >= 32),
+        "{within:?} of {shown}"
+    );
+}
+
+/// A camera that is shifted by 1 mm of film and rolled, before the first tare.
+#[test]
+fn a_first_tare_finds_the_dots_of_a_shifted_camera() {
+    let scene = scene(|options| options.mounting.roll_deg = 4.0);
+    let sensor = tared(&scene);
+    let rest = sensor.tare().unwrap().markers();
+    let truth = scene.truth_under(&Load::REST).unwrap();
+    for (marker, truth) in rest.iter().zip(truth.markers.iter()) {
+        let [x, y] = truth.unwrap().centroid_px;
+        assert!((marker.x.to_f64() - x).hypot(marker.y.to_f64() - y) < 0.5);
+    }
+}
+
+#[test]
+fn a_tare_is_refused_while_a_dot_is_missing_or_something_presses() {
+    let mut sensor = untared();
+    let missing = scene(|options| options.missing = Dots::from_fn(8, |dot| dot == 3));
+    assert_eq!(tare(&mut sensor, &missing, &Load::REST), None);
+    let press = Load::from_angles(0.02, 0.0, 0.0).unwrap();
+    let refused = tare(&mut sensor, &nominal(), &press).unwrap();
+    assert!(matches!(refused, Err(Refusal::Touched(_))), "{refused:?}");
+}
+
+/// Another layout than the model's is on the film.
+#[test]
+fn another_film_than_the_models_gives_no_force() {
+    let four = layout_scene(Layout::default()).unwrap();
+    let measurement = seen(&mut untared(), &four, &Load::REST, 1);
+    assert!(measurement.force.is_none());
+    let mut sensor = untared();
+    let mut four_dots: Rest = model().rest;
+    four_dots = Rest::of_markers(&four_dots.markers()[..4]);
+    sensor.set_tare(Some(four_dots), Drift::NONE);
+    let measurement = seen(&mut sensor, &four, &Load::REST, 1);
+    assert!(measurement.status.contains(Status::MODEL_MISMATCH));
+    // A model of the four dots' layout: the tare of eight is not kept.
+    let file: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!("../models/default.hvtm"));
+    let of_four = Model::parse(&file.0).unwrap();
+    let mut sensor = tared(&nominal());
+    let settings = of_four.conditions.settings(ByteOrder::Native);
+    sensor.reconfigure(settings, Some(of_four)).unwrap();
+    assert_eq!(sensor.tare(), None);
+}

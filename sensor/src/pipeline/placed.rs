@@ -1,0 +1,148 @@
+//! Measures a film with another layout than the square of four dots.
+//!
+//! The rest position tells which marker is which, and the film run forwards explains them all.
+//! Five markers and more are more than a contact needs. So one or two may be lost: without an image
+//! of their own, or left out because no contact explains them with the others. The force goes on
+//! from the others ([`Status::MARKER_LOST`]), with its own uncertainty.
+
+use super::again::BLUR;
+use super::{Look, Measurement, Prepared, Sensor};
+use crate::force::features::Features;
+use crate::force::forward::{Column, Estimate, Forward};
+use crate::force::rest::Rest;
+use crate::force::{FrameNoise, Resting};
+use crate::markers::lost::Lost;
+use crate::markers::rules::Placed;
+use crate::markers::tables::Table;
+use hivtac_terms::status::Status;
+use hivtac_terms::units::Px;
+
+/// The number of markers whose layout has rules of its own ([`crate::markers::rules`]).
+const SQUARE: usize = 4;
+/// Number of markers that are left out in turn, those that a contact explains least first.
+const SUSPECTS: usize = 3;
+
+impl Prepared {
+    /// The rest position of a film with another layout than the square of four dots.
+    pub(super) fn other_layout(&self) -> Option<&Rest> {
+        self.rest.as_ref().filter(|rest| rest.areas.len() != SQUARE)
+    }
+
+    /// The number of markers.
+    pub(super) fn markers(&self) -> usize {
+        self.rest.as_ref().map_or(SQUARE, |rest| rest.areas.len())
+    }
+}
+
+impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
+    /// Whether the film has another layout than the square of four dots.
+    pub(super) fn has_other_layout(&self) -> bool {
+        let prepared = self.prepared.as_ref();
+        prepared.is_some_and(|prepared| prepared.other_layout().is_some())
+    }
+
+    /// Returns the markers of the last scanned frame by their rest places.
+    ///
+    /// # Errors
+    /// Why they are not known.
+    pub(super) fn place_markers(&self) -> Result<Placed, Status> {
+        let prepared = self.prepared.as_ref().ok_or(Status::IMAGE_DARK)?;
+        let rest = prepared.rest.as_ref().ok_or(Status::MARKERS_MISSING)?;
+        let blobs = self.scanner.blobs();
+        let may_be_shifted = self.tare.is_none();
+        prepared
+            .finder
+            .place(blobs, &rest.markers(), may_be_shifted)
+    }
+
+    /// Returns the measurement of the last scanned frame. Not inlined, so that it stays out of the
+    /// near memory.
+    #[inline(never)]
+    pub(super) fn measure_placed(&mut self) -> Measurement {
+        let placed = match self.place_markers() {
+            Ok(placed) => placed,
+            Err(reason) => return self.measurement(Err(reason)),
+        };
+        let mut status = self.standing_status();
+        let rows = self.settings.geometry.height;
+        let moved = self
+            .motion
+            .at_the_middle(&placed.markers, placed.lost, rows);
+        let still = Placed {
+            markers: moved.unwrap_or(placed.markers),
+            ..placed
+        };
+        let force = self.explain(&still, &mut status);
+        let is_whole = placed.lost == Lost::NONE;
+        Measurement {
+            status,
+            markers: Some(placed.markers),
+            lost: placed.lost,
+            features: is_whole.then(|| Features::of_markers(&still.markers)),
+            force,
+        }
+    }
+
+    /// Returns the force of markers at one common time; `None` if `status` forbids one.
+    fn explain(&mut self, placed: &Placed, status: &mut Status) -> Option<crate::force::Force> {
+        if status.intersects(Status::NO_FORCE) {
+            return None;
+        }
+        let model = self.model.as_ref()?;
+        let prepared = self.prepared.as_ref()?;
+        let parts = model.forward.as_ref().zip(prepared.resting.as_ref());
+        let Some((forward, resting)) = parts else {
+            *status |= Status::MODEL_MISMATCH;
+            return None;
+        };
+        let is_again = matches!(self.look, Look::Again);
+        let noise = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
+        let (estimate, lost) = explained(forward, resting, placed, noise);
+        if !is_again && lost == Lost::NONE {
+            self.noise.saw(noise, &estimate.left);
+        }
+        let (force, told) = resting.told(forward, &model.range, noise, &estimate);
+        *status |= told;
+        if lost != Lost::NONE {
+            *status |= Status::MARKER_LOST;
+        }
+        (!status.intersects(Status::NO_FORCE)).then_some(force)
+    }
+}
+
+/// Returns the load that explains the markers best, and those that it does without. A marker is
+/// left out if a contact explains only the others.
+fn explained(
+    forward: &Forward<'_>,
+    resting: &Resting,
+    placed: &Placed,
+    noise: FrameNoise,
+) -> (Estimate, Lost) {
+    let of = |lost: Lost| resting.estimate_without_guess(forward, &placed.markers, lost, noise);
+    let all = of(placed.lost);
+    if all.is_explained() || !placed.may_lose(1) {
+        return (all, placed.lost);
+    }
+    let mut suspects = Lost::NONE;
+    for _ in 0..SUSPECTS {
+        let suspect = least_explained(&all.left, placed.lost, suspects);
+        suspects = suspects.and(suspect);
+        let others = of(placed.lost.and(suspect));
+        if others.is_explained() {
+            return (others, placed.lost.and(suspect));
+        }
+    }
+    (all, placed.lost)
+}
+
+/// The marker, neither lost nor among `others`, of which a load leaves most over.
+fn least_explained(left: &Column, lost: Lost, others: Lost) -> usize {
+    let (mut suspect, mut most) = (0, -1.0);
+    for (identity, [x, y]) in left.as_chunks().0.iter().enumerate() {
+        let square = x * x + y * y;
+        if square > most && !lost.contains(identity) && !others.contains(identity) {
+            (suspect, most) = (identity, square);
+        }
+    }
+    suspect
+}
