@@ -15,8 +15,11 @@ use embassy_stm32::pac::{DMA1, DMAMUX1};
 use embassy_stm32::{Peri, peripherals};
 
 const STREAM: usize = 0;
+
 /// Words of a band: DCMI packs four bytes into one.
-const WORDS: u16 = (BAND_LENGTH / 2) as u16 / seeded_bugs::BAND_DIVISOR;
+fn words() -> u16 {
+    (BAND_LENGTH / 2) as u16 / seeded_bugs::band_divisor()
+}
 
 /// The stream.
 pub struct BandDma {
@@ -36,12 +39,12 @@ impl BandDma {
         self.halt();
         DMAMUX1
             .ccr(STREAM)
-            .write(|w| w.set_dmareq_id(seeded_bugs::DCMI_DMA_REQUEST));
+            .write(|w| w.set_dmareq_id(seeded_bugs::dcmi_dma_request()));
         let stream = registers();
         stream.par().write_value(source as u32);
         stream.m0ar().write_value(bands::address(first));
         stream.m1ar().write_value(bands::address(second));
-        stream.ndtr().write(|w| w.set_ndt(WORDS));
+        stream.ndtr().write(|w| w.set_ndt(words()));
         stream.fcr().write_value(regs::Fcr(0));
         // The core's writes to the ring at boot must not arrive after the DMA's words.
         cortex_m::asm::dmb();
@@ -106,13 +109,13 @@ impl BandDma {
     /// Returns whether a band was just finished, or none has begun.
     pub fn is_between_bands(&self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
-        finished || registers().ndtr().read().ndt() == WORDS
+        finished || registers().ndtr().read().ndt() == words()
     }
 
     /// Returns whether words have come since the last band that was [taken](Self::take_finished).
     pub fn has_begun_a_band(&self) -> bool {
         let finished = DMA1.isr(STREAM / 4).read().tcif(STREAM % 4);
-        finished || registers().ndtr().read().ndt() != WORDS
+        finished || registers().ndtr().read().ndt() != words()
     }
 }
 

@@ -36,7 +36,7 @@
 use crate::band_dma::BandDma;
 use crate::bands::SHAPE;
 use crate::camera::{self, Format, USUAL_FORMAT};
-use crate::seeded_bugs::INVERTED_POLARITIES;
+use crate::seeded_bugs;
 use crate::{stats, vsync};
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -234,10 +234,11 @@ fn reset() {
 
 /// Configures DCMI to match the camera's registers: 8 bits, hardware synchronization, continuous.
 fn configure() {
+    let inverts = seeded_bugs::inverts_polarities();
     DCMI.cr().write(|w| {
-        w.set_pckpol(camera::SAMPLE_ON_RISING_EDGE != INVERTED_POLARITIES);
-        w.set_vspol(camera::VSYNC_BLANKING_IS_HIGH != INVERTED_POLARITIES);
-        w.set_hspol(camera::HREF_BLANKING_IS_HIGH != INVERTED_POLARITIES);
+        w.set_pckpol(camera::SAMPLE_ON_RISING_EDGE != inverts);
+        w.set_vspol(camera::VSYNC_BLANKING_IS_HIGH != inverts);
+        w.set_hspol(camera::HREF_BLANKING_IS_HIGH != inverts);
     });
 }
 

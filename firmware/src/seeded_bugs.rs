@@ -1,31 +1,60 @@
-//! Contains deliberate bugs, each behind a cargo feature that is off by default.
+//! Contains deliberate bugs, behind the cargo feature `seeded-bugs`, which is off by default.
 //!
-//! They prove that the tests on the emulated microcontroller detect such mistakes. Without these
-//! features every constant here has its correct value, and the program is the same as without this
-//! file.
+//! They prove that the tests on the emulated microcontroller detect such mistakes. One program has
+//! all of them, and the last word of flash chooses one. Without the feature every function here
+//! returns its correct value as a constant, and the program is the same as without this file.
+
+/// A bug, by the number in the last word of flash; any other number chooses none.
+#[derive(Clone, Copy)]
+enum Bug {
+    DmamuxRequest = 1,
+    Polarities = 2,
+    CameraRegister = 3,
+    HalfBands = 4,
+    UsbClock = 5,
+}
+
+#[cfg(not(feature = "seeded-bugs"))]
+const fn is_chosen(_: Bug) -> bool {
+    false
+}
+
+#[cfg(feature = "seeded-bugs")]
+fn is_chosen(bug: Bug) -> bool {
+    /// In a sector of the second bank that nothing else uses.
+    const CHOICE: *const u32 = 0x081F_FFFC as *const u32;
+    // SAFETY: an aligned word of flash that no program writes.
+    unsafe { CHOICE.read_volatile() == bug as u32 }
+}
 
 /// DMAMUX1 request line of DCMI (RM0433, table "DMAMUX1: assignment of multiplexer inputs"), or its
 /// neighbour's.
-pub const DCMI_DMA_REQUEST: u8 = if cfg!(feature = "bug-dmamux-request") {
-    76
-} else {
-    75
-};
+pub fn dcmi_dma_request() -> u8 {
+    if is_chosen(Bug::DmamuxRequest) {
+        76
+    } else {
+        75
+    }
+}
 
 /// True if DCMI samples on the edge on which the camera changes its data, and takes blanking for
 /// data.
-pub const INVERTED_POLARITIES: bool = cfg!(feature = "bug-polarity");
+pub fn inverts_polarities() -> bool {
+    is_chosen(Bug::Polarities)
+}
 
 /// True if the camera's format register is wrong: an OV7725 left at YUV, an MT9V034 that does not
 /// bin.
-pub const CAMERA_REGISTER: bool = cfg!(feature = "bug-camera-register");
+pub fn camera_register() -> bool {
+    is_chosen(Bug::CameraRegister)
+}
 
 /// The DMA transfers one part in this many of a band.
-pub const BAND_DIVISOR: u16 = if cfg!(feature = "bug-half-buffer") {
-    2
-} else {
-    1
-};
+pub fn band_divisor() -> u16 {
+    if is_chosen(Bug::HalfBands) { 2 } else { 1 }
+}
 
 /// True if USB is clocked by an untrimmed oscillator.
-pub const USB_FROM_HSI48: bool = cfg!(feature = "bug-usb-clock");
+pub fn usb_from_hsi48() -> bool {
+    is_chosen(Bug::UsbClock)
+}

@@ -29,46 +29,40 @@ pub enum Board {
     OpenmvH7,
 }
 
-/// Features of the firmware, each with one seeded bug that the rig must detect.
-const SEEDED_BUGS: &str =
-    "bug-dmamux-request bug-polarity bug-camera-register bug-half-buffer bug-usb-clock";
+/// Feature of the firmware with all seeded bugs. The rig chooses one and must detect it.
+const SEEDED_BUGS: &str = "seeded-bugs";
 
 /// The programs that the tests of the rig and across rooms run.
 pub struct Programs {
     firmware: PathBuf,
-    /// The folder with one ELF for each seeded bug or feature, by its name. It also has those with
-    /// the model for YUV422 and those for the second board.
-    bugs: PathBuf,
+    /// The folder with the other ELFs, by their names: with seeded bugs, with the model for YUV422,
+    /// for the second board.
+    others: PathBuf,
 }
 
 impl Programs {
     /// Builds the programs.
     pub fn build() -> Result<Programs> {
-        let bugs = work_folder("bugs")?;
+        let others = work_folder("bugs")?;
         let keep = |mut command: Command, name: &str| {
             let elf = build(&mut command, "hivtac-firmware")?;
-            copy(&elf, &bugs.join(name).with_extension("elf"))
+            copy(&elf, &others.join(name).with_extension("elf"))
         };
-        for bug in SEEDED_BUGS.split(' ') {
-            keep(with_bug(Board::Weact, bug)?, bug)?;
-        }
+        keep(with_bugs(Board::Weact)?, SEEDED_BUGS)?;
+        keep(with_bugs(Board::OpenmvH7)?, "openmv-h7-seeded-bugs")?;
         let mut yuv422 = firmware_command(Board::Weact, "");
         yuv422.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
         keep(yuv422, "yuv422")?;
-        for bug in ["bug-polarity", "bug-camera-register"] {
-            let command = with_bug(Board::OpenmvH7, bug)?;
-            keep(command, &format!("openmv-h7-{bug}"))?;
-        }
         keep(firmware_command(Board::OpenmvH7, ""), "openmv-h7")?;
-        // Last, because cargo's own file must be the firmware without a bug.
+        // Last, because cargo's own file must be the firmware without bugs.
         let firmware = firmware(Board::Weact)?;
-        Ok(Programs { firmware, bugs })
+        Ok(Programs { firmware, others })
     }
 
     /// Sets the environment variables by which a test runner finds the programs.
     pub fn name_to(&self, command: &mut Command) {
         command.env("HIVTAC_ELF", &self.firmware);
-        command.env("HIVTAC_BUG_ELFS", &self.bugs);
+        command.env("HIVTAC_BUG_ELFS", &self.others);
     }
 }
 
@@ -87,10 +81,10 @@ pub fn firmware_command(board: Board, feature: &str) -> Command {
     command
 }
 
-/// The cargo command that builds the firmware with a seeded bug, which is never flashed. It lints
+/// The cargo command that builds the firmware with seeded bugs, which is never flashed. It lints
 /// as builds for this computer do.
-fn with_bug(board: Board, bug: &str) -> Result<Command> {
-    let mut command = firmware_command(board, bug);
+fn with_bugs(board: Board) -> Result<Command> {
+    let mut command = firmware_command(board, SEEDED_BUGS);
     if LINTING.load(Ordering::Relaxed) {
         toolchain::lint_for_target(&mut command)?;
     }
@@ -101,7 +95,7 @@ fn with_bug(board: Board, bug: &str) -> Result<Command> {
 /// the tests for each board, and the image for QEMU.
 pub fn for_target() -> [Command; 3] {
     let [weact, openmv] =
-        [Board::Weact, Board::OpenmvH7].map(|board| firmware_command(board, "bug-polarity"));
+        [Board::Weact, Board::OpenmvH7].map(|board| firmware_command(board, SEEDED_BUGS));
     [weact, openmv, qemu_image_command()]
 }
 
@@ -164,7 +158,7 @@ pub fn everything(serving: bool) -> Vec<Command> {
     [all, by_name].into_iter().chain(serving).collect()
 }
 
-/// Whether builds for this computer also lint this project's packages, and those with a seeded bug.
+/// Whether builds for this computer also lint this project's packages, and those with seeded bugs.
 static LINTING: AtomicBool = AtomicBool::new(false);
 
 /// From now on, builds for this computer also lint. Each package is checked once, and no separate

@@ -190,8 +190,8 @@ fn host_lints(all: bool) -> Result<()> {
     Ok(())
 }
 
-/// Lints both boards' firmware and the image for QEMU. The firmware has a seeded bug, and is what
-/// its test runs: a linter must not change what is flashed.
+/// Lints both boards' firmware and the image for QEMU. The firmware has seeded bugs, and is
+/// what its tests run: a linter must not change what is flashed.
 fn target_lints() -> Result<()> {
     toolchain::ensure_component("clippy", "clippy")?;
     for mut command in artifacts::for_target() {

@@ -83,7 +83,7 @@ pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32:
         mul,
         fracn: None,
         divp: Some(PllDiv::DIV2),
-        divq: (!seeded_bugs::USB_FROM_HSI48).then_some(PllDiv::DIV20),
+        divq: (!seeded_bugs::usb_from_hsi48()).then_some(PllDiv::DIV20),
         divr: None,
     });
     // 480 MHz needs the highest core voltage.
@@ -105,7 +105,7 @@ pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32:
 /// (RM0433, CRS_CFGR).
 fn clock_usb(rcc: &mut Config) {
     rcc.mux.usbsel = mux::Usbsel::PLL1_Q;
-    if seeded_bugs::USB_FROM_HSI48 {
+    if seeded_bugs::usb_from_hsi48() {
         rcc.hsi48 = Some(Hsi48Config {
             sync_from_usb: true,
         });

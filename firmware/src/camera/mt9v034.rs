@@ -4,7 +4,7 @@
 use super::identity::{self, Identity};
 use super::mt9v034_registers::{
     AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, FOUND, Format, LOCKED, RESET,
-    ROW_CLOCKS, SHUTTER_WIDTH, TABLE, blank_rows, longest_exposure, rows_for,
+    ROW_CLOCKS, SHUTTER_WIDTH, blank_rows, longest_exposure, rows_for, table,
 };
 use super::registers::Registers;
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
@@ -101,7 +101,7 @@ impl Camera {
         settings: CameraSettings,
     ) -> Result<(), Error> {
         Timer::after(SETTLE).await;
-        self.registers.set(TABLE).await?;
+        self.registers.set(table()).await?;
         self.set(settings).await
     }
 
@@ -174,7 +174,7 @@ impl Camera {
 
     /// Reads the camera's state, while frames are captured.
     pub async fn setting(&mut self, _format: Format) -> Result<Setting, Error> {
-        let tables = [TABLE, rows_for(self.settings.rate), &self.locked];
+        let tables = [table(), rows_for(self.settings.rate), &self.locked];
         let longest = longest_exposure(self.settings.rate);
         Ok(Setting {
             id: identity::id(&mut self.registers.0)?,

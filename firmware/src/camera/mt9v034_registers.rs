@@ -57,7 +57,7 @@ pub const fn blank_rows(rate: Rate) -> u16 {
     }
 }
 
-/// Registers for the frame rate and the longest exposure, in addition to [`TABLE`].
+/// Registers for the frame rate and the longest exposure, in addition to [`table`].
 pub const fn rows_for(rate: Rate) -> &'static [(u8, u16)] {
     match rate {
         Rate::Full => const { &rows_registers(Rate::Full) },
@@ -103,45 +103,50 @@ impl Format {
     }
 }
 
+/// Read mode: rows (bits 1:0 = 1) and columns (bits 3:2 = 1) binned by two, neither flipped. Bits
+/// 9:8 are reserved and set.
+const READ_MODE: u16 = 0x0305;
+
 /// Register, value: written in this order after a reset, and read back.
-pub const TABLE: &[(u8, u16)] = &[
-    // Chip control: context A (bit 15 clear), exposure during the readout of the previous frame
-    // (bit 8), parallel data (bit 7), endless frames (bit 3). Bit 9, reserved and set after a
-    // reset, is cleared as in OpenMV's driver.
-    (0x07, 0x0188),
-    // Column start, row start, window height and width, in columns and rows of the array.
-    (0x01, FIRST[0] + (ARRAY[0] - WINDOW[0]) / 2),
-    (0x02, FIRST[1] + (ARRAY[1] - WINDOW[1]) / 2),
-    (0x03, WINDOW[1]),
-    (0x04, WINDOW[0]),
-    // Horizontal blanking, clocks.
-    (0x05, ROW_CLOCKS - WINDOW[0]),
-    // Read mode: rows (bits 1:0 = 1) and columns (bits 3:2 = 1) binned by two, neither flipped.
-    // Bits 9:8 are reserved and set.
-    (
-        0x0D,
-        if seeded_bugs::CAMERA_REGISTER {
-            0x0300
-        } else {
-            0x0305
-        },
-    ),
-    // Pixel operation mode: one slope, no high dynamic range, no colours.
-    (0x0F, 0x0000),
-    // ADC: ten bits in proportion to light, in both contexts.
-    (0x1C, 0x0202),
-    // Row noise correction on, in both contexts, as in OpenMV's table.
-    (0x70, 0x0101),
-    // Pixel clock: LINE_VALID and FRAME_VALID high with data, PIXCLK rising in the middle of each
-    // datum. `mt9v034.rs` sets DCMI to match.
-    (0x72, 0x0000),
-    // Target brightness of the automatic control, in 64ths of white: a bright film that is not
-    // saturated, as with the OV7725.
-    (0xA5, 35),
-    // Largest gain, sixteenths: beyond 4× noise costs more than light gains.
-    (0xAB, 64),
-    // Number of pixels in the automatic control's histogram: an eighth of the frame's, as in
-    // OpenMV's driver.
-    (0xB0, WIDTH * HEIGHT / 8),
-    (AEC_AGC_ENABLE, AUTOMATIC_EXPOSURE | AUTOMATIC_GAIN),
-];
+pub fn table() -> &'static [(u8, u16)] {
+    if seeded_bugs::camera_register() {
+        const { &with_read_mode(0x0300) }
+    } else {
+        const { &with_read_mode(READ_MODE) }
+    }
+}
+
+const fn with_read_mode(read_mode: u16) -> [(u8, u16); 15] {
+    [
+        // Chip control: context A (bit 15 clear), exposure during the readout of the previous frame
+        // (bit 8), parallel data (bit 7), endless frames (bit 3). Bit 9, reserved and set after a
+        // reset, is cleared as in OpenMV's driver.
+        (0x07, 0x0188),
+        // Column start, row start, window height and width, in columns and rows of the array.
+        (0x01, FIRST[0] + (ARRAY[0] - WINDOW[0]) / 2),
+        (0x02, FIRST[1] + (ARRAY[1] - WINDOW[1]) / 2),
+        (0x03, WINDOW[1]),
+        (0x04, WINDOW[0]),
+        // Horizontal blanking, clocks.
+        (0x05, ROW_CLOCKS - WINDOW[0]),
+        (0x0D, read_mode),
+        // Pixel operation mode: one slope, no high dynamic range, no colours.
+        (0x0F, 0x0000),
+        // ADC: ten bits in proportion to light, in both contexts.
+        (0x1C, 0x0202),
+        // Row noise correction on, in both contexts, as in OpenMV's table.
+        (0x70, 0x0101),
+        // Pixel clock: LINE_VALID and FRAME_VALID high with data, PIXCLK rising in the middle of
+        // each datum. `mt9v034.rs` sets DCMI to match.
+        (0x72, 0x0000),
+        // Target brightness of the automatic control, in 64ths of white: a bright film that is not
+        // saturated, as with the OV7725.
+        (0xA5, 35),
+        // Largest gain, sixteenths: beyond 4× noise costs more than light gains.
+        (0xAB, 64),
+        // Number of pixels in the automatic control's histogram: an eighth of the frame's, as in
+        // OpenMV's driver.
+        (0xB0, WIDTH * HEIGHT / 8),
+        (AEC_AGC_ENABLE, AUTOMATIC_EXPOSURE | AUTOMATIC_GAIN),
+    ]
+}

@@ -52,9 +52,9 @@ impl Format {
 
     /// Registers and values that select this format. All other registers are the same for all
     /// formats.
-    pub const fn registers(self) -> &'static [(u8, u8)] {
+    pub fn registers(self) -> &'static [(u8, u8)] {
         match self {
-            _ if seeded_bugs::CAMERA_REGISTER => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
+            _ if seeded_bugs::camera_register() => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
             // The high byte of each pixel comes first. The pipeline's threshold table swaps the
             // bytes back.
             Format::Rgb565 => &[(COM7, COM7_QVGA_RGB565), (COM3, 0)],

@@ -1,7 +1,7 @@
 //! Tests of the second board, an OpenMV Cam H7 with an MT9V034: it has the properties of the first
 //! one.
 
-use crate::common::{Run, Setup, bug, command, firmware, openmv, set_threshold};
+use crate::common::{Bug, Run, Setup, command, firmware, openmv, other, set_threshold};
 use crate::led;
 use hivtac_rig::board;
 use hivtac_rig::camera::part;
@@ -211,18 +211,17 @@ fn on_the_other_board_it_breaks_a_rule_of_the_chip() {
 /// times the data.
 #[test]
 fn seeded_bugs_are_noticed() {
-    for name in ["openmv-h7-bug-polarity", "openmv-h7-bug-camera-register"] {
-        let setup = openmv(420);
-        let run = Setup {
-            elf: bug(name),
-            ..setup
+    for bug in [Bug::Polarities, Bug::CameraRegister] {
+        let setup = Setup {
+            elf: other("openmv-h7-seeded-bugs"),
+            ..openmv(420)
         };
-        let run = run.run();
+        let run = setup.run_with(bug);
         let samples = run.samples();
         let forces = samples.iter().filter(|sample| sample.force.is_some());
-        assert_eq!(forces.count(), 0, "{name}");
+        assert_eq!(forces.count(), 0, "{bug:?}");
         let stats = run.stats();
-        assert!(stats.dropped_size >= 4, "{name}: {stats:?}");
-        assert_eq!(stats.frames_processed, 0, "{name}: {stats:?}");
+        assert!(stats.dropped_size >= 4, "{bug:?}: {stats:?}");
+        assert_eq!(stats.frames_processed, 0, "{bug:?}: {stats:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Runs the firmware under a scripted host, and decodes the device's messages.
 //!
-//! `HIVTAC_ELF` names the firmware. `HIVTAC_BUG_ELFS` names a directory with `bug-….elf` for each
-//! seeded bug, `yuv422.elf` with the model for YUV422, and `openmv-h7.elf` for that board.
+//! `HIVTAC_ELF` names the firmware. `HIVTAC_BUG_ELFS` names a directory with `yuv422.elf` with the
+//! model for YUV422, `openmv-h7.elf` for that board, and both boards' with seeded bugs.
 //! `HIVTAC_INSTRUCTIONS_PER_SECOND` runs every test at another speed, `HIVTAC_BUSY_BUS` on a busy
 //! bus.
 
@@ -19,7 +19,7 @@ use hivtac_rig::faults::Faults;
 use hivtac_rig::frame_source::SceneSource;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::mpu::Protection;
-use hivtac_rig::peripherals::flash::Cut;
+use hivtac_rig::peripherals::flash::{Contents, Cut};
 use hivtac_rig::report::Report;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::{Action, Script};
@@ -38,6 +38,16 @@ use hivtac_wire::settings::SettingsReport;
 use hivtac_wire::version::HelloPrefix;
 use serde_json::Value;
 
+/// The bugs of firmware with seeded bugs (`firmware/src/seeded_bugs.rs`).
+#[derive(Clone, Copy, Debug)]
+pub enum Bug {
+    DmamuxRequest = 1,
+    Polarities = 2,
+    CameraRegister = 3,
+    HalfBands = 4,
+    UsbClock = 5,
+}
+
 /// Time at which the host says hello, ms: the port exists from about 140 ms on.
 pub const HELLO_MS: u64 = 160;
 
@@ -54,17 +64,14 @@ pub fn openmv(virtual_ms: u64) -> Setup {
     Setup {
         board: board::Kind::OpenmvH7,
         camera: part::Kind::Mt9v034,
-        ..Setup::new(bug("openmv-h7"), virtual_ms)
+        ..Setup::new(other("openmv-h7"), virtual_ms)
     }
 }
 
-/// Returns the firmware with a seeded bug, another feature, another model, or for another board.
-pub fn bug(name: &str) -> PathBuf {
-    let path = path_from(
-        "HIVTAC_BUG_ELFS",
-        "a directory of firmware ELFs with seeded bugs",
-    )
-    .join(format!("{name}.elf"));
+/// Returns the firmware with seeded bugs, another model, or for another board.
+pub fn other(name: &str) -> PathBuf {
+    let path = path_from("HIVTAC_BUG_ELFS", "a directory of other firmware ELFs")
+        .join(format!("{name}.elf"));
     assert!(
         path.exists(),
         "{} is missing: `cargo xtask test` builds it",
@@ -78,8 +85,7 @@ fn path_from(variable: &str, what: &str) -> PathBuf {
         panic!(
             "set {variable} to {what}. `cargo xtask test` does; by hand: in the project's root, \
              `cargo build --release -p hivtac-firmware --target thumbv7em-none-eabihf`, then \
-             HIVTAC_ELF=$PWD/target/thumbv7em-none-eabihf/release/hivtac-firmware; the seeded bugs \
-             are cargo features of that package"
+             HIVTAC_ELF=$PWD/target/thumbv7em-none-eabihf/release/hivtac-firmware"
         )
     };
     // Cargo runs tests in the package's folder, but a relative path is relative to the project's
@@ -165,6 +171,18 @@ impl Setup {
     pub fn at(mut self, ms: u64, action: Action) -> Self {
         self.actions.push((ms * 1_000_000, action));
         self
+    }
+
+    /// Chooses a bug of firmware with seeded bugs, by the last word of flash.
+    pub fn run_with(mut self, bug: Bug) -> Run {
+        let mut contents = Contents::default();
+        let last = contents.array.len() - 4;
+        contents.array[last..].copy_from_slice(&(bug as u32).to_le_bytes());
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("flash");
+        contents.save(&file).unwrap();
+        self.flash = Some(file);
+        self.run()
     }
 
     /// Enforces the firmware's own regions of memory. Elsewhere they are not enforced, which is
