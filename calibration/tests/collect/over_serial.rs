@@ -47,7 +47,7 @@ fn play(mut gauge: File, begun: Instant, end: Arc<AtomicBool>) {
 /// Frames in which the hand presses and lets go often enough for clocks to be aligned.
 const FRAMES: usize = 400;
 
-/// Waits until a recording holds so many samples.
+/// Waits until a recording holds this number of samples.
 fn wait_for_samples(here: &Path, count: usize) {
     let file = here.join("unit/samples.csv");
     let lines = || std::fs::read_to_string(&file).map_or(0, |text| text.lines().count());

@@ -45,7 +45,7 @@ pub struct RecordArguments {
     devices: Devices,
     /// The file to make, ….mcap or ….csv
     file: PathBuf,
-    /// End after so many seconds
+    /// End after this number of seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<Duration>,
     /// At the end, what became of it as one JSON object

@@ -164,9 +164,9 @@ pub enum SetCommand {
     /// How much the film remembers of its loads
     ///
     /// A held load is seen as if it grew by two parts of itself, within half a second and within
-    /// 20 s, and what is taken off stays behind likewise; the guide to calibration says how they
-    /// are measured. The device takes that off. Without it, or with 0,0, it states how silicones
-    /// differ.
+    /// 20 s. After a release, the same parts of the load stay in the film. The guide to calibration
+    /// says how they are measured. The device subtracts them. Without this setting, or with 0,0,
+    /// its uncertainty is that of silicones in general.
     ///
     /// Example: hivtac settings set creep 0.031,0.042
     Creep {

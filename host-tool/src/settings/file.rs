@@ -361,7 +361,7 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
         ));
     }
     if !file.name.is_empty() {
-        name(&file.name).map_err(|why| format!("the name is none: {why}"))?;
+        name(&file.name).map_err(|why| format!("the name is refused: {why}"))?;
     }
     let threshold = file.threshold();
     threshold

@@ -112,7 +112,8 @@ impl Contacts {
 }
 
 /// The rows of all kinds under a setting, then one of all of them but the longest. `answers` are
-/// the presses with the measurements of their frames; none if the setting is none for a press.
+/// the presses with the measurements of their frames. A press has no measurements if the setting
+/// does not apply to it.
 fn rows_of<'a>(
     setting: Setting,
     answers: impl Iterator<Item = (&'a Press, &'a [Measurement])> + Clone,

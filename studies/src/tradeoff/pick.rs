@@ -11,7 +11,7 @@ const EQUAL: f64 = 0.05;
 /// A user's limits.
 #[derive(Args, Default)]
 pub struct Limits {
-    /// Pick the best that takes at most so many µs a frame, at 480 MHz, modelled.
+    /// Pick the best that takes at most this time for a frame, µs, at 480 MHz, modelled.
     #[arg(long)]
     pub budget_us: Option<f64>,
     /// Pick the best that the core can do at least so often a second, modelled.

@@ -441,8 +441,8 @@ impl Film {
             return Ok(());
         }
         Err(ShellError::Contact(format!(
-            "a state of {other} unknowns is none of a film of {own}: start from a film of as many \
-             cells"
+            "a state of {other} unknowns does not fit a film of {own}: start from a film with as \
+             many cells"
         )))
     }
 }

@@ -37,7 +37,7 @@ pub struct RecordArgs {
     /// Length of a take, s of the sensor's clock.
     #[arg(long, value_name = "S", default_value_t = 20.0, value_parser = seconds)]
     pub seconds: f64,
-    /// One take of presses anywhere instead, of so many seconds, 20 to 1800.
+    /// One take of presses anywhere instead, 20 to 1800 s long.
     #[command(flatten)]
     pub free: FreeArgs,
     /// Length of the take of the untouched film that begins every run, s.
@@ -51,8 +51,8 @@ pub struct RecordArgs {
 /// Presses anywhere, for commands that record.
 #[derive(Clone, Copy, Debug, clap::Args)]
 pub struct FreeArgs {
-    /// Press anywhere within ±4 mm, with any force to 0.25 N, for so many seconds, 20 to 1800: by
-    /// hand with a gauge on a stick, or by a robot. Nobody notes where.
+    /// Press anywhere within ±4 mm, with any force to 0.25 N, for 20 to 1800 seconds: by hand
+    /// with a gauge on a stick, or by a robot. Nobody notes where.
     #[arg(long, value_name = "S", value_parser = free_seconds, conflicts_with = "poses")]
     pub free: Option<f64>,
     /// The axis that such presses are about along: α and β in degrees, such as `0,0`.

@@ -41,7 +41,7 @@ pub struct SimulatedGauge {
     /// What it shows without a force, N.
     #[arg(skip = SimulatedGauge::default().zero_n)]
     pub zero_n: f64,
-    /// One line in so many is damaged; 0: none.
+    /// One line in this number is damaged; 0: no line.
     #[arg(skip = SimulatedGauge::default().damaged_every)]
     pub damaged_every: usize,
     /// Decides the noise.

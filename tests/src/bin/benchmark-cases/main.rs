@@ -70,7 +70,7 @@ enum Work {
     },
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
-    /// The network of a model that tells places, and so many steps from its answer.
+    /// The network of a model that tells places, and the number of steps from its answer.
     Steps(u8, [Marker; 4], Rest),
     /// The threshold's table of 64 KiB.
     Table,

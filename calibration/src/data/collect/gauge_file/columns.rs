@@ -289,7 +289,7 @@ fn force_unit(name: &str, line: usize) -> Result<Option<(Unit, String, usize)>> 
     let is_remark = !is_bracketed || unit.is_empty() || unit.chars().count() > LONGEST_UNIT;
     ensure!(
         found.is_some() || is_remark,
-        "line {line}: `{name}` has a unit that is none of force: N, mN, kN, gf, kgf, lbf and ozf \
+        "line {line}: `{name}` has an unknown unit of force: N, mN, kN, gf, kgf, lbf and ozf \
          are known; write one of them there"
     );
     Ok(found.map(|found| (found, unit.to_owned(), line)))
@@ -303,9 +303,9 @@ fn time_scale(name: &str, line: usize) -> Result<f64> {
     let unit = unit.to_lowercase().replace(['µ', 'μ'], "u");
     match TIME_UNITS.iter().find(|(known, _)| *known == unit) {
         Some((_, scale)) => Ok(*scale),
-        None if is_bracketed && !unit.is_empty() && !unit.contains(':') => bail!(
-            "line {line}: `{name}` has a unit that is none of time: s, ms, us and min are known"
-        ),
+        None if is_bracketed && !unit.is_empty() && !unit.contains(':') => {
+            bail!("line {line}: `{name}` has an unknown unit of time: s, ms, us and min are known")
+        }
         None => Ok(1.0),
     }
 }

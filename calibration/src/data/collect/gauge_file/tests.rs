@@ -105,7 +105,7 @@ fn what_is_not_clear_is_refused_with_what_helps() {
         (
             "t,Force (psi)\n0,1\n",
             None,
-            &["line 1: `Force (psi)` has a unit that is none"],
+            &["line 1: `Force (psi)` has an unknown unit of force"],
         ),
         ("t (h),Force (N)\n0,1\n", None, &["none of time"]),
         (
