@@ -10,9 +10,9 @@ use hivtac_wire::message::Outcome;
 use hivtac_wire::settings::RestPosition;
 
 /// Orders that wait. From the USB tasks and the memory task to the pipeline. A model in one makes
-/// each a kilobyte long: too much for DTCM.
+/// each two kilobytes long: too much for DTCM.
 #[unsafe(link_section = ".sram.orders")]
-pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 4> = Channel::new();
+pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 3> = Channel::new();
 
 /// An order for the pipeline, carried out between two frames. Each is answered with its `id`.
 #[expect(
