@@ -50,9 +50,11 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Call after each row or band.
     #[inline(always)]
     pub(super) fn look_ahead(&mut self) {
-        let markers = self.prepared.as_ref().map_or(0, Prepared::markers);
-        if self.scanner.is_settled() && self.ahead.wants(self.scanner.blobs().len(), markers) {
-            self.work_ahead();
+        if self.scanner.is_settled() {
+            let markers = self.prepared.as_ref().map_or(0, Prepared::markers);
+            if self.ahead.wants(self.scanner.blobs().len(), markers) {
+                self.work_ahead();
+            }
         }
     }
 
