@@ -63,7 +63,6 @@ use dtcm_table::Sensor;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
-use hivtac_sensor::force::forward::Drift;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::kept::Record;
 use memory::Memory;
@@ -149,7 +148,7 @@ fn start() -> Foreground {
 /// that it needs.
 fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
     let Chosen { model, source, .. } = chosen;
-    let settings = model::settings(model.as_ref(), kept.threshold);
+    let settings = model::fitting().settings(model.as_ref(), kept.threshold);
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
     }
@@ -160,18 +159,12 @@ fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
         defmt::warn!("the kept radius of what presses is out of range");
     }
     sensor.set_contact_shape(settings::contact_shape());
-    let tare = kept.tare.as_ref();
-    match tare.map(|tare| settings::rest(tare, sensor.settings())) {
-        Some(Ok(rest)) => {
-            let down = tare.and_then(|tare| tare.down);
-            sensor.set_tare_under(Some(rest), Drift::UNSEEN, down);
-        }
-        Some(Err(_)) => defmt::warn!("the kept rest position is none for these settings"),
-        None => {}
-    }
-    if sensor.set_temporal(kept.temporal).is_err() {
-        defmt::warn!("the kept limits of contact, slip or filter are out of range");
-    }
+    hivtac_device::model::start(sensor, kept, |unusable| {
+        defmt::warn!(
+            "a kept setting cannot be used: {}",
+            defmt::Debug2Format(&unusable)
+        );
+    });
     settings::follow(sensor, source);
     // Always a format that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)

@@ -13,19 +13,19 @@ use crate::model_upload::{self, Whole};
 use crate::orders::{ORDERS, Order};
 use crate::self_test::{self, OfFlash};
 use crate::session::Asked;
-use crate::settings::InUse;
 use crate::thermometer::Thermometer;
 use crate::{camera, capture_task, log, model_slots, outbox, settings};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
+use hivtac_device::kept::{self, Keeper};
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_wire::kept::{KeptModel, MAX_BYTES, Record};
 use hivtac_wire::message::{DeviceMessage, LogLevel, ModelSource, Outcome};
-use hivtac_wire::settings::{Found, Name, Selection, SettingsReport};
+use hivtac_wire::settings::{Found, Name, Selection};
 
 const _: () = assert!(MAX_BYTES <= PAYLOAD_LIMIT);
 
@@ -177,52 +177,16 @@ impl Memory {
         let Some(used) = settings::in_use() else {
             return Outcome::Busy;
         };
-        let kept = self.selection(&used);
-        let InUse {
-            name,
-            threshold,
-            tare,
-            temporal,
-            rezeroed,
-            seen,
-            down,
-            contact_shape,
-            ..
-        } = used;
-        let drift = tare.zip(self.record.tare);
-        let drift = drift.and_then(|(used, kept)| settings::drift(&used, &kept));
         if asked.id().is_some() {
-            outbox::offer(DeviceMessage::Settings(SettingsReport {
-                name,
-                threshold,
-                tare,
-                kept,
+            let keeper = Keeper {
                 found: self.found,
                 erases: self.log.erases(),
                 failures: self.log.failures(),
-                temporal,
-                rezeroed,
-                seen,
-                drift,
-                camera: camera::report(),
-                down,
-                contact_shape,
-            }));
+            };
+            let report = kept::report(used, camera::report(), &self.record, &keeper);
+            outbox::offer(DeviceMessage::Settings(report));
         }
         Outcome::Done
-    }
-
-    /// Returns which settings in use are kept.
-    fn selection(&self, used: &InUse) -> Selection {
-        Selection {
-            name: used.name == self.record.name,
-            threshold: used.own_threshold() == self.record.threshold,
-            tare: used.tare == self.record.tare,
-            temporal: used.temporal == self.record.temporal,
-            camera: camera::report().settings == self.record.camera,
-            down: used.down == self.record.down,
-            contact_shape: used.contact_shape == self.record.contact_shape,
-        }
     }
 
     async fn keep(&mut self, selection: Selection) -> Outcome {
@@ -230,27 +194,7 @@ impl Memory {
             return Outcome::Busy;
         };
         let mut record = self.record.clone();
-        if selection.threshold {
-            record.threshold = used.own_threshold();
-        }
-        if selection.tare {
-            record.tare = used.tare;
-        }
-        if selection.name {
-            record.name = used.name;
-        }
-        if selection.temporal {
-            record.temporal = used.temporal;
-        }
-        if selection.camera {
-            record.camera = camera::report().settings;
-        }
-        if selection.down {
-            record.down = used.down;
-        }
-        if selection.contact_shape {
-            record.contact_shape = used.contact_shape;
-        }
+        kept::keep(&mut record, selection, used, &camera::report());
         if record == self.record && self.is_kept {
             return Outcome::Done;
         }
@@ -276,7 +220,7 @@ impl Memory {
         Whole { slot, bytes }: Whole,
         file: &'static [u8],
     ) -> Result<Chosen, Outcome> {
-        let model = model::check(file).map_err(|refusal| {
+        let model = model::fitting().check(file).map_err(|refusal| {
             log::say(LogLevel::Error, format_args!("{refusal}"));
             refusal.outcome()
         })?;

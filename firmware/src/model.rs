@@ -1,18 +1,15 @@
-//! Selects the model: the built-in one, or one that a host sent; and checks that it fits this
-//! sensor.
+//! Selects the model: the built-in one, or one that a host sent.
 
-use crate::camera::{self, Format};
+use crate::camera;
 use crate::dtcm_table::Sensor;
 use crate::flash::SecondBank;
 use crate::model_slots;
-use core::fmt;
-use hivtac_sensor::force::model::{AlignedFile, Model, ModelError, Origin};
+use hivtac_device::model::Fitting;
+use hivtac_sensor::force::model::{AlignedFile, Model};
 use hivtac_sensor::known_answer::Answer;
-use hivtac_sensor::markers::settings::Settings;
 use hivtac_storage::blob;
-use hivtac_terms::threshold::{ByteOrder, Threshold};
 use hivtac_wire::kept::KeptModel;
-use hivtac_wire::message::{ModelSource, Outcome};
+use hivtac_wire::message::ModelSource;
 
 /// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels
 /// can run it.
@@ -112,102 +109,22 @@ fn read(flash: &mut SecondBank, kept: &KeptModel) -> Option<Model<'static>> {
     });
     read??;
     let file = model_slots::lend(kept.slot, kept.bytes)?;
-    let model = check(file).ok().filter(|model| model.crc() == kept.crc);
+    let model = fitting()
+        .check(file)
+        .ok()
+        .filter(|model| model.crc() == kept.crc);
     if model.is_none() {
         model_slots::give_back(kept.slot);
     }
     model
 }
 
-/// Why a model is refused.
-pub enum Refusal {
-    /// It is not a model file, or not a sound one.
-    Unusable(ModelError),
-    /// It was made for a different camera: lens, frame, pixels.
-    Frames,
-    /// It was calibrated on a sensor with a different microcontroller.
-    Unit,
-    /// The sensor cannot have the settings that it needs.
-    Settings,
-}
-
-impl Refusal {
-    /// Returns the reply.
-    pub fn outcome(&self) -> Outcome {
-        match self {
-            Refusal::Unusable(_) | Refusal::Settings => Outcome::ModelUnusable,
-            Refusal::Frames | Refusal::Unit => Outcome::AnotherSensor,
-        }
-    }
-}
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Refusal::Unusable(error) => error.fmt(f),
-            Refusal::Frames => write!(
-                f,
-                "the model is for another camera than {} at {}x{}",
-                camera::PRESET.name(),
-                camera::WIDTH,
-                camera::HEIGHT
-            ),
-            Refusal::Unit => f.write_str("the model was calibrated on another unit"),
-            Refusal::Settings => f.write_str("the model asks for frames that cannot be read"),
-        }
-    }
-}
-
-/// Reads a model file, and proves that it is sound and fits this sensor.
-///
-/// # Errors
-/// Why it is refused.
-pub fn check(file: &'static [u8]) -> Result<Model<'static>, Refusal> {
-    match Model::parse(file) {
-        Ok(model) => match misfit(&model) {
-            None => Ok(model),
-            Some(refusal) => Err(refusal),
-        },
-        Err(error) => Err(Refusal::Unusable(error)),
-    }
-}
-
-/// Why a sound model cannot be used here; `None` if it can.
-fn misfit(model: &Model<'static>) -> Option<Refusal> {
-    let conditions = &model.conditions;
-    let is_sent = Format::of(conditions.threshold.format()).is_some();
-    if conditions.geometry != camera::GEOMETRY || !is_sent {
-        return Some(Refusal::Frames);
-    }
-    if matches!(conditions.origin, Origin::Unit(unit) if unit != embassy_stm32::uid::uid()) {
-        return Some(Refusal::Unit);
-    }
-    match settings(Some(model), None).check() {
-        Ok(()) => None,
-        Err(_) => Some(Refusal::Settings),
-    }
-}
-
-/// Returns the settings for the camera's frames. The threshold is the first of these whose pixels
-/// the camera sends: the user's `own`, the model's, the usual one of the camera's pixels. A
-/// built-in model for other pixels then gives no force, and every sample reports that.
-pub fn settings(model: Option<&Model<'static>>, own: Option<Threshold>) -> Settings {
-    let order = ByteOrder::Swapped;
-    let geometry = camera::GEOMETRY;
-    let is_sent = |threshold: &Threshold| Format::of(threshold.format()).is_some();
-    let usual = match model.filter(|model| is_sent(&model.conditions.threshold)) {
-        Some(model) => Settings {
-            geometry,
-            ..model.conditions.settings(order)
-        },
-        None => Settings {
-            threshold: Threshold::red(camera::USUAL_FORMAT.pixels()),
-            ..Settings::usual(geometry, order)
-        },
-    };
-    let own = own.filter(|own| is_sent(own) && own.check().is_ok());
-    Settings {
-        threshold: own.unwrap_or(usual.threshold),
-        ..usual
+/// What a model must fit.
+pub fn fitting() -> Fitting {
+    Fitting {
+        preset: camera::PRESET,
+        geometry: camera::GEOMETRY,
+        pixels: camera::PIXELS,
+        device_id: embassy_stm32::uid::uid(),
     }
 }

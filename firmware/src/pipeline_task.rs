@@ -17,6 +17,7 @@ use crate::{outbox, session, settings, stats, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
+use hivtac_device::answer;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::Measurement;
@@ -352,7 +353,7 @@ impl PipelineTask {
         measurement: &Measurement,
         followed: &Followed,
     ) -> Sample {
-        let mut status = followed.status;
+        let mut on_the_way = Status::OK;
         let first = core::mem::replace(&mut self.first, false);
         for (set, bit) in [
             (delivery.after_loss && !first, Status::FRAME_DROPPED),
@@ -360,21 +361,17 @@ impl PipelineTask {
             (delivery.after_restart, Status::CAMERA_RESTARTED),
         ] {
             if set {
-                status |= bit;
+                on_the_way |= bit;
             }
         }
-        let Moment { frame, time_us } = moment(delivery);
-        Sample {
-            sequence: self.sequence,
-            frame,
-            time_us,
-            status,
-            force: followed.force,
-            // A sample has room for four.
-            markers: (measurement.markers)
-                .and_then(|markers| markers.exactly())
-                .filter(|_| session::wants_markers()),
-        }
+        answer::sample(
+            self.sequence,
+            moment(delivery),
+            on_the_way,
+            measurement,
+            followed,
+            session::wants_markers(),
+        )
     }
 
     fn tare_with(&mut self, measurement: &Measurement) {

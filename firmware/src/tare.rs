@@ -4,9 +4,10 @@ use crate::camera;
 use crate::dtcm_table::Sensor;
 use crate::session;
 use embassy_time::{Duration, Instant};
+use hivtac_device::answer;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::Measurement;
-use hivtac_sensor::tare::{Refusal, TareBuilder};
+use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::units::Px;
 use hivtac_wire::message::Outcome;
 
@@ -60,12 +61,7 @@ impl Taring {
         measurement: &Measurement,
     ) -> Option<Result<Rest, Outcome>> {
         let outcome = sensor.tare_with(&mut self.builder, measurement)?;
-        Some(outcome.map_err(|refusal| match refusal {
-            Refusal::MarkersImplausible => Outcome::MarkersImplausible,
-            Refusal::Unsteady => Outcome::Unsteady,
-            Refusal::NotAtRest => Outcome::NotAtRest,
-            Refusal::Touched(looks_like) => Outcome::Touched { looks_like },
-        }))
+        Some(outcome.map_err(answer::refused))
     }
 
     /// The largest standard deviation of a marker's coordinate.
@@ -75,12 +71,6 @@ impl Taring {
 
     /// Returns why there were not enough good frames in time.
     pub fn given_up(&self) -> Outcome {
-        if self.builder.saw_implausible() {
-            Outcome::MarkersImplausible
-        } else if let Some(looks_like) = self.builder.saw_touch() {
-            Outcome::Touched { looks_like }
-        } else {
-            Outcome::NoGoodFrames
-        }
+        answer::given_up(&self.builder)
     }
 }

@@ -31,7 +31,7 @@ use core::sync::atomic::{AtomicI32, Ordering};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::{Duration, Instant};
 use hivtac_capture::Edge;
-use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
+use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
@@ -56,17 +56,6 @@ static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
 
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
-
-/// The limits of its settings.
-pub const LIMITS: CameraLimits = CameraLimits([
-    limits(Rate::Full),
-    limits(Rate::Half),
-    limits(Rate::Quarter),
-]);
-
-const fn limits(rate: Rate) -> RateLimits {
-    RateLimits::new((1_000_000 / frame_us(rate)) as u16, exposures(rate))
-}
 
 /// Exposure and gain are accepted as they are after this time: ten frames at a slow rate.
 const PATIENCE: Duration = Duration::from_millis(300);

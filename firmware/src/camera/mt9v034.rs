@@ -4,48 +4,22 @@
 use super::identity::{self, Identity};
 use super::mt9v034_registers::{
     AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, FOUND, Format, LOCKED, RESET,
-    ROW_CLOCKS, SHUTTER_WIDTH, blank_rows, longest_exposure, rows_for, table,
+    SHUTTER_WIDTH, rows_for, table,
 };
 use super::registers::Registers;
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
 use embassy_time::{Duration, Timer};
-use hivtac_sensor::motion::Motion;
-use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, Rate};
-use hivtac_terms::geometry::Preset;
+pub use hivtac_device::camera::mt9v034::{
+    HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
+};
+use hivtac_device::camera::mt9v034::{longest_exposure, middle_us, rows_in, rows_us};
+use hivtac_terms::camera::{CameraSettings, LEAST_GAIN};
 use hivtac_terms::units::{Microseconds, Sixteenths};
 
 /// Its identification.
 pub const IDENTITY: Identity = identity::MT9V034;
-/// Name in the device's hello.
-pub const NAME: &str = "mt9v034";
-/// Its lens and pixels.
-pub const PRESET: Preset = Preset::Mt9v034;
 /// Its pixel format.
 pub const USUAL_FORMAT: Format = Format::Mono;
-/// Columns of a frame, px. More than the markers need: rows take the same time down to 80.
-pub const WIDTH: u16 = 160;
-/// Rows of a frame, px: the markers' reach in the calibrated range.
-pub const HEIGHT: u16 = 152;
-
-/// Clock that the board supplies, Hz; at most 27 MHz.
-pub const XCLK_HZ: u32 = 240_000_000 / 9;
-
-/// Exposure of its rows: all at once.
-pub const MOTION: Motion = Motion::GLOBAL;
-
-/// Time from frame to frame, µs: rows with data and blank ones.
-pub const fn frame_us(rate: Rate) -> u32 {
-    rows_us(HEIGHT + blank_rows(rate))
-}
-
-/// Shortest and longest exposure: from one row to the longest.
-pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
-    [
-        Microseconds(rows_us(1) + 1),
-        Microseconds(rows_us(longest_exposure(rate))),
-    ]
-}
-
 /// PIXCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
 /// Level of VSYNC (FRAME_VALID) that means "no data": it is high with the rows.
@@ -148,7 +122,7 @@ impl Camera {
         Timer::after(2 * self.frame_time()).await;
         let exposed = self.exposed();
         // All rows' exposure ends before the first one is read.
-        store(-(exposed.0 as i32) / 2, self.settings, exposed, self.gain());
+        store(middle_us(exposed), self.settings, exposed, self.gain());
         Ok(())
     }
 
@@ -202,16 +176,4 @@ impl Camera {
         let [gain, rows] = FOUND;
         Ok([self.registers.read(gain)?, self.registers.read(rows)?])
     }
-}
-
-/// The time of `rows` rows, µs.
-const fn rows_us(rows: u16) -> u32 {
-    (rows as u64 * ROW_CLOCKS as u64 * 1_000_000 / XCLK_HZ as u64) as u32
-}
-
-/// The number of rows nearest to a time.
-fn rows_in(exposure: Microseconds) -> u16 {
-    let clocks = u64::from(exposure.0) * u64::from(XCLK_HZ) / 1_000_000;
-    let row_clocks = u64::from(ROW_CLOCKS);
-    u16::try_from((clocks + row_clocks / 2) / row_clocks).unwrap_or(u16::MAX)
 }

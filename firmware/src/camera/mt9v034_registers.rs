@@ -6,6 +6,7 @@
 
 use super::{HEIGHT, WIDTH};
 use crate::seeded_bugs;
+use hivtac_device::camera::mt9v034::{ROW_CLOCKS, blank_rows, longest_exposure};
 use hivtac_terms::camera::Rate;
 use hivtac_terms::threshold::PixelFormat;
 
@@ -26,16 +27,6 @@ pub const SHUTTER_WIDTH: u8 = 0x0B;
 pub const ANALOG_GAIN: u8 = 0x35;
 /// The values of the automatic control: gain, as in [`ANALOG_GAIN`]; exposure in rows.
 pub const FOUND: [u8; 2] = [0xBA, 0xBB];
-/// Longest exposure, rows. At the full rate it is 2.5 ms, and half of it is part of a force's
-/// latency.
-pub const fn longest_exposure(rate: Rate) -> u16 {
-    match rate {
-        Rate::Full => 96,
-        Rate::Half => 210,
-        Rate::Quarter => 420,
-    }
-}
-
 /// Columns and rows of the array that are binned to one pixel.
 const BINNING: u16 = 2;
 /// Size of the array, and the number of its first column and row.
@@ -43,20 +34,8 @@ const ARRAY: [u16; 2] = [752, 480];
 const FIRST: [u16; 2] = [1, 4];
 /// Columns and rows of the array that are read: around its middle, which the lens images.
 const WINDOW: [u16; 2] = [WIDTH * BINNING, HEIGHT * BINNING];
-/// Clocks of a row. The converters, one for each column, need this many for any width of the
-/// window.
-pub const ROW_CLOCKS: u16 = 690;
 /// Shortest horizontal blanking while columns are binned by two, clocks.
 const LEAST_BLANKING: u16 = 71;
-/// Number of blank rows of a frame, at least 4.
-pub const fn blank_rows(rate: Rate) -> u16 {
-    match rate {
-        Rate::Full => 6,
-        Rate::Half => 164,
-        Rate::Quarter => 480,
-    }
-}
-
 /// Registers for the frame rate and the longest exposure, in addition to [`table`].
 pub const fn rows_for(rate: Rate) -> &'static [(u8, u16)] {
     match rate {

@@ -9,51 +9,17 @@ use super::ov7725_registers::{
 use super::registers::Registers;
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
 use embassy_time::{Duration, Timer};
-use hivtac_sensor::motion::Motion;
-use hivtac_terms::camera::{CameraSettings, Rate};
-use hivtac_terms::geometry::Preset;
+pub use hivtac_device::camera::ov7725::{
+    HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
+};
+use hivtac_device::camera::ov7725::{LINES, exposed, lines, middle_us};
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 
 /// Its identification.
 pub const IDENTITY: Identity = identity::OV7725;
-/// Name in the device's hello.
-pub const NAME: &str = "ov7725";
-/// Its lens and pixels.
-pub const PRESET: Preset = Preset::Ov7725;
 /// Its pixel format if no other one is requested.
 pub const USUAL_FORMAT: Format = Format::Rgb565;
-/// Columns of a frame, px.
-pub const WIDTH: u16 = 320;
-/// Rows of a frame, px.
-pub const HEIGHT: u16 = 240;
-
-/// Clock that the board supplies, Hz.
-pub const XCLK_HZ: u32 = 12_500_000;
-
-/// Lines from frame to frame, blank ones included.
-const LINES: u16 = 278;
-/// Exposure of its rows: one after the other.
-pub const MOTION: Motion = Motion::rolling(LINES);
-/// Clocks from frame to frame: lines of 576 pixels of two bytes, one byte per PCLK.
-const FRAME_CLOCKS: u64 = LINES as u64 * 576 * 2;
-/// Lines from the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the
-/// rows. A row's exposure ends when it is read, which is when it is sent.
-const LINES_TO_MIDDLE_ROW: u32 = 22 + HEIGHT as u32 / 2;
-/// PCLK at the full rate: XCLK times the sensor's PLL factor. Lower rates divide it.
-const FULL_PCLK_HZ: u64 = 4 * XCLK_HZ as u64;
-
-/// Time from frame to frame, µs.
-pub const fn frame_us(rate: Rate) -> u32 {
-    (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
-}
-
-/// Shortest and longest exposure: from one line to one frame.
-pub const fn exposures(rate: Rate) -> [Microseconds; 2] {
-    [
-        Microseconds(frame_us(rate).div_ceil(LINES as u32)),
-        Microseconds(frame_us(rate)),
-    ]
-}
 
 /// PCLK edge on which data is stable.
 pub const SAMPLE_ON_RISING_EDGE: bool = true;
@@ -165,9 +131,8 @@ impl Camera {
         }
         self.take(search.found);
         self.registers.set(&self.locked).await?;
-        let half_lines = 2 * LINES_TO_MIDDLE_ROW - self.lines();
-        let middle_us = half_lines * self.frame_us() / (2 * u32::from(LINES));
-        store(middle_us as i32, self.settings, self.exposed(), self.gain());
+        let middle_us = middle_us(self.lines(), self.settings.rate);
+        store(middle_us, self.settings, self.exposed(), self.gain());
         Ok(())
     }
 
@@ -181,7 +146,7 @@ impl Camera {
     /// Stores the values to keep: those of the settings, otherwise those found.
     fn take(&mut self, [found_gain, found_low, found_high]: [u8; 3]) {
         let CameraSettings { exposure, gain, .. } = self.settings;
-        let lines = exposure.map(|time| lines(time, self.frame_us()).to_le_bytes());
+        let lines = exposure.map(|time| lines(time, self.settings.rate).to_le_bytes());
         let [set_low, set_high] = lines.unwrap_or([found_low, found_high]);
         let [_, (_, gain_register), (_, low), (_, high)] = &mut self.locked;
         *gain_register = gain.map_or(found_gain, register_of);
@@ -203,7 +168,7 @@ impl Camera {
 
     /// The exposure of a row, as kept.
     fn exposed(&self) -> Microseconds {
-        Microseconds(self.lines() * self.frame_us() / u32::from(LINES))
+        exposed(self.lines(), self.settings.rate)
     }
 
     /// The gain, as kept.
@@ -228,12 +193,6 @@ impl Camera {
             registers.read(high)?,
         ])
     }
-}
-
-/// The number of lines nearest to a time, at least 1 and at most a frame's.
-fn lines(exposure: Microseconds, frame_us: u32) -> u16 {
-    let lines = (exposure.0.min(frame_us) * u32::from(LINES) + frame_us / 2) / frame_us.max(1);
-    (lines as u16).clamp(1, LINES)
 }
 
 /// The gain of a register value: each of the upper four bits doubles it, the lower four add

@@ -1,0 +1,81 @@
+//! OmniVision OV7725: 320 × 240, RGB565 or YUV422, rows exposed one after the other.
+
+use hivtac_sensor::motion::Motion;
+use hivtac_terms::camera::{CameraLimits, Rate};
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::PixelFormat;
+use hivtac_terms::units::Microseconds;
+
+/// Name in the device's hello.
+pub const NAME: &str = "ov7725";
+/// Its identification number.
+pub const ID: u16 = 0x7721;
+/// Its lens and pixels.
+pub const PRESET: Preset = Preset::Ov7725;
+/// Columns of a frame, px.
+pub const WIDTH: u16 = 320;
+/// Rows of a frame, px.
+pub const HEIGHT: u16 = 240;
+/// What it can send; the first one if no other is requested.
+pub const PIXELS: &[PixelFormat] = &[PixelFormat::Rgb565, PixelFormat::Yuv422];
+
+/// Clock that the board supplies, Hz.
+pub const XCLK_HZ: u32 = 12_500_000;
+
+/// Lines from frame to frame, blank ones included.
+pub const LINES: u16 = 278;
+/// Exposure of its rows: one after the other.
+pub const MOTION: Motion = Motion::rolling(LINES);
+/// Clocks from frame to frame: lines of 576 pixels of two bytes, one byte per PCLK.
+const FRAME_CLOCKS: u64 = LINES as u64 * 576 * 2;
+/// Lines from the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the
+/// rows. A row's exposure ends when it is read, which is when it is sent.
+const LINES_TO_MIDDLE_ROW: u32 = 22 + HEIGHT as u32 / 2;
+/// PCLK at the full rate: XCLK times the sensor's PLL factor. Lower rates divide it.
+const FULL_PCLK_HZ: u64 = 4 * XCLK_HZ as u64;
+
+/// The limits of its settings.
+pub const LIMITS: CameraLimits = super::limits(
+    [
+        frame_us(Rate::Full),
+        frame_us(Rate::Half),
+        frame_us(Rate::Quarter),
+    ],
+    [
+        exposures(Rate::Full),
+        exposures(Rate::Half),
+        exposures(Rate::Quarter),
+    ],
+);
+
+/// Time from frame to frame, µs.
+pub const fn frame_us(rate: Rate) -> u32 {
+    (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
+}
+
+/// Shortest and longest exposure: from one line to one frame.
+const fn exposures(rate: Rate) -> [Microseconds; 2] {
+    [
+        Microseconds(frame_us(rate).div_ceil(LINES as u32)),
+        Microseconds(frame_us(rate)),
+    ]
+}
+
+/// The number of lines nearest to a time, at least 1 and at most a frame's.
+pub fn lines(exposure: Microseconds, rate: Rate) -> u16 {
+    let frame_us = frame_us(rate);
+    let lines = (exposure.0.min(frame_us) * u32::from(LINES) + frame_us / 2) / frame_us.max(1);
+    (lines as u16).clamp(1, LINES)
+}
+
+/// The exposure of a row, of a number of lines.
+pub const fn exposed(lines: u32, rate: Rate) -> Microseconds {
+    Microseconds(lines * frame_us(rate) / LINES as u32)
+}
+
+/// Time from the VSYNC edge that begins a frame to the middle of its middle row's exposure of at
+/// most [`LINES`] lines, µs.
+pub const fn middle_us(lines: u32, rate: Rate) -> i32 {
+    let half_lines = 2 * LINES_TO_MIDDLE_ROW - lines;
+    (half_lines * frame_us(rate) / (2 * LINES as u32)) as i32
+}
