@@ -34,6 +34,7 @@
 //! | `mechanics`, `surface` | the film as it is, or simplified |
 //! | `creep` | the film's memory of earlier loads |
 //! | `motion`, `scene` | loads in time; the scene itself |
+//! | [`units`] | how exactly units are built, and units drawn so |
 //! | `file` | scenes from TOML files |
 //! | `hard_cases` | scenes in which markers are hard to find (feature `jpeg`) |
 
@@ -61,6 +62,7 @@ mod options;
 mod patch;
 mod scene;
 mod surface;
+pub mod units;
 mod view;
 
 pub use camera::{Camera, FILM_DISTANCE_MM, FOCAL_LENGTH_MM, PresetCamera};

@@ -12,7 +12,6 @@ mod matrix;
 mod noise;
 mod other_units;
 mod tables;
-pub mod tolerances;
 mod unit;
 mod weight;
 

@@ -12,6 +12,7 @@ use hivtac_terms::list::List;
 use hivtac_terms::units::Px;
 use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
+use hivtac_twin::units::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
 use hivtac_twin::{Camera, Disc};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -20,7 +21,6 @@ use serde::{Deserialize, Serialize};
 
 use super::covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
-use super::tolerances::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNESS};
 
 /// Number of films that are drawn.
 const FILMS: u64 = 60;

@@ -1,10 +1,10 @@
 //! The numbers in which units differ, and their priors before any load.
 
 use hivtac_shell::{Change, Design};
+use hivtac_twin::units::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
 use super::own_film::{FoundNumber, OwnFilm};
 use super::problem::Bench;
-use crate::forward::tolerances::{FOCAL, MARKER_MM, MIDDLE_PX, POST_MM, ROLL_DEG};
 
 /// Standard deviations of the pixel grid's effect on a marker at rest, px, and of the camera's
 /// distance from the film beyond the nominal one, mm.
