@@ -36,6 +36,8 @@ mod tare;
 mod template;
 mod threshold_command;
 mod truth;
+#[cfg(feature = "twin")]
+mod twin;
 mod update;
 mod view;
 
@@ -72,6 +74,8 @@ enum Command {
     Focus(focus::FocusArguments),
     BringUp(bring_up::BringUpArguments),
     View(view::ViewArguments),
+    #[cfg(feature = "twin")]
+    Twin(twin::TwinArguments),
     Serve(serve::ServeArguments),
     Template(template::TemplateArguments),
     Sense(sense::SenseArguments),
@@ -98,6 +102,8 @@ impl Command {
             Command::Focus(arguments) => focus::run(&arguments),
             Command::BringUp(arguments) => bring_up::run(&arguments),
             Command::View(arguments) => view::run(&arguments),
+            #[cfg(feature = "twin")]
+            Command::Twin(arguments) => twin::run(&arguments),
             Command::Serve(arguments) => serve::run(&arguments),
             Command::Template(arguments) => template::run(&arguments),
             Command::Sense(arguments) => sense::run(&arguments),

@@ -1,0 +1,152 @@
+//! `hivtac twin`: a simulated sensor in real time, which every other command uses as a device.
+
+mod log;
+mod options;
+#[cfg(unix)]
+mod pty;
+
+use crate::output::{Reader, print};
+use clap::Args;
+use hivtac_host::failure::Failure;
+use hivtac_host::stop;
+use hivtac_live::hand::Hand;
+use hivtac_live::line::Tcp;
+use hivtac_live::run::{Clock, Shared, Told};
+pub use options::{Before, Simulated};
+use std::path::PathBuf;
+
+/// Simulate a sensor in real time, for every other command
+///
+/// Prints `ready tcp=ADDRESS` once hosts may connect: `--port tcp:ADDRESS` of any command, of
+/// Python and of `serve`. Frames come at the camera's rate, and forces from the very sensing that
+/// the device runs. Ends with Ctrl-C; what was kept ends with it. One host at a time; further ones
+/// wait.
+///
+/// Example: hivtac twin --listen 7007
+#[derive(Args)]
+pub struct TwinArguments {
+    #[command(flatten)]
+    simulated: Simulated,
+    /// The port on 127.0.0.1; one that is free when not given
+    #[arg(long, value_name = "PORT", default_value_t = 0)]
+    listen: u16,
+    /// A pseudo-terminal in place of the TCP port, with a symbolic link to it at PATH
+    #[cfg(unix)]
+    #[arg(long, value_name = "PATH", conflicts_with = "listen")]
+    pty: Option<PathBuf>,
+    /// Write one JSON object per frame: its number, and the true force and place; for
+    /// `monitor --truth`
+    #[arg(long, value_name = "FILE")]
+    truth: Option<PathBuf>,
+}
+
+/// Simulates a sensor until the program is interrupted.
+///
+/// # Errors
+/// When the scene, a file or the port cannot be used.
+pub fn run(arguments: &TwinArguments) -> Result<(), Failure> {
+    let (shared, mut clock) = start(&arguments.simulated, Before::Demo, Hand::default())?;
+    let mut log = arguments
+        .truth
+        .as_deref()
+        .map(log::TruthLog::create)
+        .transpose()?;
+    let ready = arguments.open(&shared)?;
+    if print(&ready)? == Reader::Gone {
+        return Ok(());
+    }
+    let mut failed = None;
+    clock.run(
+        || stop::requested(),
+        |told| {
+            if let Some(Err(failure)) = log.as_mut().map(|log| log.write(&told)) {
+                failed = Some(failure);
+                log = None;
+            }
+        },
+    );
+    match failed {
+        Some(failure) => Err(failure),
+        None => stop::check(),
+    }
+}
+
+/// Makes a simulated sensor, and the clock that runs it.
+///
+/// # Errors
+/// When the scene or a file cannot be used.
+pub fn start(
+    simulated: &Simulated,
+    before: Before,
+    hand: Hand,
+) -> Result<(Shared, Clock), Failure> {
+    let (device, eye) = simulated.build(before, hand)?;
+    let shared = Shared::new(device);
+    let clock = Clock::new(shared.clone(), eye);
+    Ok((shared, clock))
+}
+
+/// A simulated sensor in this process, for `hivtac view --twin`.
+pub struct Inside {
+    /// Where it listens, as `--port` takes it.
+    pub port: String,
+    clock: Clock,
+}
+
+impl Inside {
+    /// Starts it on a free port of 127.0.0.1.
+    ///
+    /// # Errors
+    /// When the scene or a file cannot be used, or there is no port.
+    pub fn start(simulated: &Simulated, hand: Hand) -> Result<Inside, Failure> {
+        let (shared, clock) = start(simulated, Before::Rest, hand)?;
+        let port = listen(0, &shared)?;
+        Ok(Inside {
+            port: format!("tcp:127.0.0.1:{port}"),
+            clock,
+        })
+    }
+
+    /// Runs it until the program is interrupted; `tell` hears of each frame's true press.
+    pub fn run(mut self, tell: impl FnMut(Told)) {
+        self.clock.run(stop::requested, tell);
+    }
+}
+
+/// Serves hosts at a TCP port, on a thread of its own; returns the port.
+fn listen(port: u16, shared: &Shared) -> Result<u16, Failure> {
+    let tcp = Tcp::listen(port).map_err(|error| {
+        Failure::input(format!(
+            "cannot listen at port {port} of this computer: {error}; choose another with --listen"
+        ))
+    })?;
+    let (own, shared) = (tcp.port(), shared.clone());
+    std::thread::spawn(move || tcp.serve(&shared));
+    Ok(own)
+}
+
+impl TwinArguments {
+    /// Opens the port; returns the line that says so.
+    #[cfg(unix)]
+    fn open(&self, shared: &Shared) -> Result<String, Failure> {
+        match &self.pty {
+            Some(link) => {
+                let link = pty::serve(link, shared)?;
+                Ok(format!("ready pty={}", link.display()))
+            }
+            None => Ok(format!(
+                "ready tcp=127.0.0.1:{}",
+                listen(self.listen, shared)?
+            )),
+        }
+    }
+
+    /// Opens the port; returns the line that says so.
+    #[cfg(not(unix))]
+    fn open(&self, shared: &Shared) -> Result<String, Failure> {
+        Ok(format!(
+            "ready tcp=127.0.0.1:{}",
+            listen(self.listen, shared)?
+        ))
+    }
+}

@@ -1,0 +1,151 @@
+//! The arguments that say what is simulated.
+
+use clap::{Args, ValueEnum};
+use hivtac_host::failure::Failure;
+use hivtac_live::camera::Kind;
+use hivtac_live::course::Course;
+use hivtac_live::device::Device;
+use hivtac_live::eye::{Disturbances, Eye, Presses};
+use hivtac_live::hand::Hand;
+use hivtac_live::run::device_id;
+use hivtac_twin::Scene;
+use hivtac_twin::units;
+use std::ops::RangeInclusive;
+
+/// Number of the nominal unit.
+const NOMINAL: u64 = 0;
+
+/// What is simulated.
+#[derive(Args)]
+pub struct Simulated {
+    /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or a
+    /// scene file (FILE.toml, docs/scene-file.md)
+    #[arg(long, value_name = "NAME")]
+    scene: Option<String>,
+    /// Forces from a CSV file of `monitor --csv` in place of the scene's, again and again
+    #[arg(long, value_name = "FILE")]
+    course: Option<String>,
+    /// The camera, and with it the rate: ov7725 156 frames a second, mt9v034 244
+    #[arg(long, value_enum, default_value_t)]
+    camera: CameraName,
+    /// Unit N of those that are drawn as people build them, 1 to 1000000; without it the nominal
+    /// one, that of the built-in model
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    unit: Option<u64>,
+    /// Decides the noise, and where the demo starts, of a scene by name
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+    /// A reflection cuts a part off a marker
+    #[arg(long)]
+    glare: bool,
+    /// Brightness of the light once exposure was found, 0.05 to 2; 1 is as it was then
+    #[arg(long, value_name = "PART", value_parser = within(0.05..=2.0))]
+    dim: Option<f64>,
+    /// The camera's picture shifts along x by this many pixels a minute, -10 to 10
+    #[arg(
+        long,
+        value_name = "PX",
+        value_parser = within(-10.0..=10.0),
+        allow_negative_numbers = true
+    )]
+    drift: Option<f64>,
+}
+
+/// A camera's name on the command line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum CameraName {
+    #[default]
+    Ov7725,
+    Mt9v034,
+}
+
+/// What presses when the arguments do not say it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Before {
+    /// The demo's wandering tip.
+    Demo,
+    /// Nothing.
+    Rest,
+}
+
+impl Simulated {
+    /// Makes the device and what its camera sees.
+    ///
+    /// # Errors
+    /// When the scene or a file cannot be used.
+    pub fn build(&self, before: Before, hand: Hand) -> Result<(Device, Eye), Failure> {
+        let kind = match self.camera {
+            CameraName::Ov7725 => Kind::Ov7725,
+            CameraName::Mt9v034 => Kind::Mt9v034,
+        };
+        let name = self.scene.as_deref().unwrap_or(match before {
+            Before::Demo => "demo",
+            Before::Rest => "rest",
+        });
+        let scene = self.as_unit(name, self.scene(name, kind)?)?;
+        let presses = match self.course.as_deref() {
+            Some(path) => Presses::Course(course(path)?),
+            None => Presses::Scene,
+        };
+        let disturbances = Disturbances {
+            glare: self.glare,
+            dim: self.dim.unwrap_or(1.0),
+            drift_px: self.drift.unwrap_or(0.0),
+        };
+        let eye = Eye::new(kind, scene, presses, disturbances, hand);
+        let eye = eye.map_err(|error| refused(name, error))?;
+        // Exposure is found in the light as it is before it dims.
+        let device = Device::new(kind, device_id(kind, self.unit.unwrap_or(NOMINAL)), 1.0);
+        Ok((device, eye))
+    }
+
+    fn scene(&self, name: &str, kind: Kind) -> Result<Scene, Failure> {
+        if name.ends_with(".toml") {
+            let text = read(name)?;
+            return Scene::from_toml(&text).map_err(|error| refused(name, error));
+        }
+        let [width, height] = kind.size().map(u32::from);
+        let scene = Scene::preset(name, kind.preset(), width, height, self.seed);
+        scene.map_err(|error| {
+            Failure::input(format!(
+                "{error}; or a scene file, whose name ends with .toml"
+            ))
+        })
+    }
+
+    fn as_unit(&self, name: &str, scene: Scene) -> Result<Scene, Failure> {
+        let Some(unit) = self.unit else {
+            return Ok(scene);
+        };
+        let options = units::with_unit(unit, scene.camera(), scene.options().clone());
+        scene
+            .with_options(options)
+            .map_err(|error| refused(name, error))
+    }
+}
+
+fn course(path: &str) -> Result<Course, Failure> {
+    Course::parse(&read(path)?).map_err(|error| Failure::of_file(path, error))
+}
+
+fn read(path: &str) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|error| Failure::of_file(path, error))
+}
+
+fn refused(scene: &str, error: impl std::fmt::Display) -> Failure {
+    Failure::input(format!("scene {scene}: {error}"))
+}
+
+/// Reads a number within a range.
+fn within(
+    range: RangeInclusive<f64>,
+) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text: &str| match text.parse::<f64>() {
+        Ok(value) if range.contains(&value) => Ok(value),
+        _ => Err(format!(
+            "a number from {} to {} is needed",
+            range.start(),
+            range.end()
+        )),
+    }
+}

@@ -1,0 +1,276 @@
+//! The camera: its settings, the light that it needs, and its times.
+
+use hivtac_device::camera::{mt9v034, ov7725};
+use hivtac_device::model::Fitting;
+use hivtac_sensor::motion::Motion;
+use hivtac_terms::camera::{CameraLimits, CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
+use hivtac_terms::fixed::Q;
+use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::threshold::PixelFormat;
+use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_twin::Shutter;
+use hivtac_wire::message::Inspection;
+use hivtac_wire::settings::CameraReport;
+
+/// The kinds of camera that the firmware supports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Kind {
+    /// OmniVision OV7725: 320 × 240, in colour, rolling shutter, 156 frames a second.
+    #[default]
+    Ov7725,
+    /// onsemi MT9V034: 160 × 152, mono, global shutter, 244 frames a second.
+    Mt9v034,
+}
+
+impl Kind {
+    /// Its name in the device's hello.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Ov7725 => ov7725::NAME,
+            Kind::Mt9v034 => mt9v034::NAME,
+        }
+    }
+
+    /// Its lens and pixels.
+    pub fn preset(self) -> Preset {
+        match self {
+            Kind::Ov7725 => ov7725::PRESET,
+            Kind::Mt9v034 => mt9v034::PRESET,
+        }
+    }
+
+    /// Columns and rows of its frames.
+    pub fn size(self) -> [u16; 2] {
+        match self {
+            Kind::Ov7725 => [ov7725::WIDTH, ov7725::HEIGHT],
+            Kind::Mt9v034 => [mt9v034::WIDTH, mt9v034::HEIGHT],
+        }
+    }
+
+    /// When its rows are exposed.
+    pub fn motion(self) -> Motion {
+        match self {
+            Kind::Ov7725 => ov7725::MOTION,
+            Kind::Mt9v034 => mt9v034::MOTION,
+        }
+    }
+
+    /// The model that the firmware has built in.
+    pub fn model(self) -> &'static [u8] {
+        match self {
+            Kind::Ov7725 => include_bytes!("../../../calibration/models/default.hvtm"),
+            Kind::Mt9v034 => include_bytes!("../../../calibration/models/mt9v034/default.hvtm"),
+        }
+    }
+
+    /// What a model must fit.
+    pub fn fitting(self, device_id: [u8; 12]) -> Fitting {
+        let [width, height] = self.size();
+        Fitting {
+            preset: self.preset(),
+            geometry: Geometry::preset(self.preset(), width, height),
+            pixels: match self {
+                Kind::Ov7725 => ov7725::PIXELS,
+                Kind::Mt9v034 => mt9v034::PIXELS,
+            },
+            device_id,
+        }
+    }
+
+    fn limits(self) -> CameraLimits {
+        match self {
+            Kind::Ov7725 => ov7725::LIMITS,
+            Kind::Mt9v034 => mt9v034::LIMITS,
+        }
+    }
+
+    /// Time from frame to frame, µs.
+    pub fn frame_us(self, rate: Rate) -> u32 {
+        match self {
+            Kind::Ov7725 => ov7725::frame_us(rate),
+            Kind::Mt9v034 => mt9v034::frame_us(rate),
+        }
+    }
+
+    /// Exposure at which the simulated light exposes the film well with a gain of one, µs: as in
+    /// the rig.
+    fn well_exposed_us(self) -> f64 {
+        match self {
+            Kind::Ov7725 => 4_000.0,
+            Kind::Mt9v034 => 2_000.0,
+        }
+    }
+}
+
+/// A camera with its settings.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Its kind.
+    pub kind: Kind,
+    /// The pixels that it sends.
+    pub pixels: PixelFormat,
+    settings: CameraSettings,
+    /// Exposure of each row, in lines.
+    lines: u16,
+    gain: Sixteenths,
+}
+
+impl Camera {
+    /// A camera with these settings in light of a brightness; 1 is nominal.
+    pub fn new(kind: Kind, pixels: PixelFormat, settings: CameraSettings, light: f64) -> Self {
+        let mut camera = Self {
+            kind,
+            pixels,
+            settings: CameraSettings::default(),
+            lines: 1,
+            gain: LEAST_GAIN,
+        };
+        camera.set(settings, light);
+        camera
+    }
+
+    /// Returns whether the camera can have these settings.
+    pub fn accepts(&self, settings: &CameraSettings) -> bool {
+        self.kind.limits().check(settings).is_ok()
+    }
+
+    /// Applies settings that it [accepts](Self::accepts). What they leave open suits the light:
+    /// exposure changes before gain.
+    pub fn set(&mut self, settings: CameraSettings, light: f64) {
+        self.settings = settings;
+        let limits = self.kind.limits().at(settings.rate);
+        let wanted_us = self.kind.well_exposed_us() / light.max(1e-3);
+        let fixed_gain = settings.gain.unwrap_or(LEAST_GAIN);
+        let exposure = settings.exposure.unwrap_or_else(|| {
+            let us = (16.0 * wanted_us / f64::from(fixed_gain.0)) as u32;
+            Microseconds(us.clamp(limits.shortest.0, limits.longest.0))
+        });
+        self.lines = match self.kind {
+            Kind::Ov7725 => ov7725::lines(exposure, settings.rate),
+            Kind::Mt9v034 => {
+                let longest = mt9v034::longest_exposure(settings.rate);
+                mt9v034::rows_in(exposure).clamp(1, longest)
+            }
+        };
+        self.gain = settings.gain.unwrap_or_else(|| {
+            let sixteenths = 16.0 * wanted_us / f64::from(self.exposed().0.max(1));
+            Sixteenths((sixteenths as u16).clamp(LEAST_GAIN.0, MOST_GAIN.0))
+        });
+    }
+
+    /// Lets automatic exposure and gain adapt to the light.
+    pub fn expose(&mut self, light: f64) {
+        self.set(self.settings, light);
+    }
+
+    /// The exposure of each row.
+    fn exposed(&self) -> Microseconds {
+        match self.kind {
+            Kind::Ov7725 => ov7725::exposed(self.lines.into(), self.settings.rate),
+            Kind::Mt9v034 => Microseconds(mt9v034::rows_us(self.lines)),
+        }
+    }
+
+    /// Returns the picture's brightness over that of a well exposed one, in light of a brightness.
+    /// A picture within 3 % of well exposed counts as such, as in the rig: exposure has steps.
+    pub fn brightness(&self, light: f64) -> f64 {
+        let gain = f64::from(self.gain.0) / 16.0;
+        let brightness = light * f64::from(self.exposed().0) * gain / self.kind.well_exposed_us();
+        let is_close = (brightness - 1.0).abs() < 0.03;
+        if is_close { 1.0 } else { brightness }
+    }
+
+    /// Returns when each row is exposed.
+    pub fn shutter(&self) -> Shutter {
+        let frame_s = 1e-6 * f64::from(self.frame_us());
+        Shutter {
+            exposure_s: 1e-6 * f64::from(self.exposed().0),
+            readout_s: match self.kind {
+                Kind::Ov7725 => frame_s * f64::from(ov7725::HEIGHT) / f64::from(ov7725::LINES),
+                Kind::Mt9v034 => 0.0,
+            },
+        }
+    }
+
+    /// Time from frame to frame, µs.
+    pub fn frame_us(&self) -> u32 {
+        self.kind.frame_us(self.settings.rate)
+    }
+
+    /// Time from a frame's begin to the middle of its exposure, µs.
+    pub fn middle_us(&self) -> i32 {
+        match self.kind {
+            Kind::Ov7725 => ov7725::middle_us(self.lines.into(), self.settings.rate),
+            Kind::Mt9v034 => mt9v034::middle_us(self.exposed()),
+        }
+    }
+
+    /// The settings and their limits, for the host.
+    pub fn report(&self) -> CameraReport {
+        CameraReport {
+            settings: self.settings,
+            exposure: self.exposed(),
+            gain: self.gain,
+            limits: self.kind.limits(),
+        }
+    }
+
+    /// The state for the host. There are no registers to read back.
+    pub fn inspection(&self) -> Inspection {
+        Inspection {
+            silicon: 0,
+            camera_id: match self.kind {
+                Kind::Ov7725 => ov7725::ID,
+                Kind::Mt9v034 => mt9v034::ID,
+            },
+            registers: 0,
+            different: Default::default(),
+            frame_time_us: self.frame_us(),
+            exposure_us: self.exposed().0,
+            longest_exposure_us: self.kind.limits().at(self.settings.rate).longest.0,
+            gain_sixteenths: Q::from_bits(self.gain.0),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(settings: CameraSettings, light: f64) -> Camera {
+        Camera::new(Kind::Ov7725, PixelFormat::Rgb565, settings, light)
+    }
+
+    #[test]
+    fn rates_are_those_of_the_boards() {
+        let hz = |kind: Kind| 1e6 / f64::from(kind.frame_us(Rate::Full));
+        assert!(
+            (hz(Kind::Ov7725) - 156.1).abs() < 0.1,
+            "{}",
+            hz(Kind::Ov7725)
+        );
+        assert!(
+            (hz(Kind::Mt9v034) - 244.6).abs() < 0.1,
+            "{}",
+            hz(Kind::Mt9v034)
+        );
+    }
+
+    #[test]
+    fn automatic_exposure_suits_the_light_and_fixed_values_stay() {
+        let usual = CameraSettings::default();
+        for light in [0.3, 1.0, 2.0] {
+            let brightness = camera(usual, light).brightness(light);
+            assert!((brightness - 1.0).abs() < 0.1, "{light}: {brightness}");
+        }
+        // Locked at the nominal light, a third of it is a third of the brightness.
+        assert!((camera(usual, 1.0).brightness(0.3) - 0.3).abs() < 0.02);
+        let fixed = CameraSettings {
+            exposure: Some(Microseconds(2_000)),
+            gain: Some(Sixteenths(16)),
+            ..usual
+        };
+        let brightness = camera(fixed, 1.0).brightness(1.0);
+        assert!((brightness - 0.5).abs() < 0.01, "{brightness}");
+    }
+}

@@ -1,0 +1,219 @@
+//! What the camera sees: the scene, its disturbances, and what presses it.
+
+use crate::camera::{Camera, Kind};
+use crate::course::Course;
+use crate::hand::{Following, Hand};
+use hivtac_terms::threshold::PixelFormat;
+use hivtac_twin::{Format, Load, Options, Paint, Patch, Scene, SceneError, Shutter, Truth};
+
+/// The light's reflection under `glare`: on the edge of marker 0, where it cuts a part off.
+const GLARE: Patch = Patch {
+    centre_mm: [-3.5, -3.9],
+    radius_mm: 0.25,
+    paint: Paint::Glare,
+};
+/// Number of frames after which the drift's next step comes: a scene takes as long to shift as to
+/// render.
+const DRIFT_EVERY: u32 = 64;
+
+/// What disturbs the camera's view.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Disturbances {
+    /// A reflection on a marker.
+    pub glare: bool,
+    /// Brightness of the light, 1 is nominal, once the camera has found its exposure.
+    pub dim: f64,
+    /// Shift of the picture, px a minute along x, as of a camera that warms up.
+    pub drift_px: f64,
+}
+
+impl Default for Disturbances {
+    fn default() -> Self {
+        Self {
+            glare: false,
+            dim: 1.0,
+            drift_px: 0.0,
+        }
+    }
+}
+
+/// What presses without a hand.
+#[derive(Clone, Debug)]
+pub enum Presses {
+    /// The scene's own motion.
+    Scene,
+    /// A recorded course.
+    Course(Course),
+}
+
+/// A frame as the camera took it.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// Pixels as they lie in the device's memory.
+    pub words: Vec<u16>,
+    /// The truth, in the middle of the exposure.
+    pub truth: Truth,
+}
+
+/// The view of a camera.
+#[derive(Debug)]
+pub struct Eye {
+    /// The scene as it was given.
+    given: Scene,
+    /// The scene as it is seen now.
+    scene: Scene,
+    seen: Seen,
+    disturbances: Disturbances,
+    presses: Presses,
+    following: Following,
+}
+
+/// What a scene as it is seen depends on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Seen {
+    format: Format,
+    brightness: f64,
+    shifted_px: f64,
+}
+
+/// A scene that a camera cannot have.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NotSeen {
+    /// Its frames have another size: its own, then the camera's.
+    Size([u32; 2], [u16; 2]),
+    /// It says what the camera's settings say: the key.
+    Key(&'static str),
+    /// The scene is impossible with the disturbances.
+    Scene(SceneError),
+}
+
+impl std::fmt::Display for NotSeen {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            NotSeen::Size([width, height], [own_width, own_height]) => write!(
+                f,
+                "its frames are {width} × {height}, and this camera's are {own_width} × \
+                 {own_height}: leave width and height out, or choose the other --camera"
+            ),
+            NotSeen::Key(key) => write!(
+                f,
+                "the camera's settings say what its `{key}` is: leave that out"
+            ),
+            NotSeen::Scene(error) => error.fmt(f),
+        }
+    }
+}
+
+impl std::error::Error for NotSeen {}
+
+impl Eye {
+    /// The view of a camera of this kind.
+    ///
+    /// # Errors
+    /// Why the camera cannot have this scene.
+    pub fn new(
+        kind: Kind,
+        scene: Scene,
+        presses: Presses,
+        disturbances: Disturbances,
+        hand: Hand,
+    ) -> Result<Eye, NotSeen> {
+        let size = [scene.camera().width(), scene.camera().height()];
+        if size != kind.size().map(u32::from) {
+            return Err(NotSeen::Size(size, kind.size()));
+        }
+        let usual = Options::of(kind.preset());
+        if scene.options().format != usual.format {
+            return Err(NotSeen::Key("format"));
+        }
+        if scene.options().shutter != Shutter::default() {
+            return Err(NotSeen::Key("shutter"));
+        }
+        let mut options = scene.options().clone();
+        if disturbances.glare {
+            options.patches.push(GLARE);
+        }
+        let given = scene.with_options(options).map_err(NotSeen::Scene)?;
+        let seen = Seen {
+            format: given.options().format,
+            brightness: 1.0,
+            shifted_px: 0.0,
+        };
+        let eye = Eye {
+            scene: given.clone(),
+            given,
+            seen,
+            disturbances,
+            presses,
+            following: Following::new(hand),
+        };
+        // A drift that leaves the range of mountings would end the view later.
+        Ok(eye)
+    }
+
+    /// The brightness of the light on the film.
+    pub fn light(&self) -> f64 {
+        self.disturbances.dim
+    }
+
+    /// Takes a frame, the middle of whose exposure is at a time in seconds. Its number selects its
+    /// noise.
+    pub fn shot(&mut self, camera: &Camera, number: u32, time_s: f64) -> Shot {
+        self.look(camera, number, time_s);
+        let shutter = camera.shutter();
+        let scene = &self.scene;
+        let number = u64::from(number);
+        let hand = self.following.advance(time_s);
+        let own = |load: &dyn Fn(f64) -> Load| scene.frame_under(&shutter, number, load);
+        let frame = match (&self.presses, hand) {
+            (_, true) => own(&|after_s| self.following.load(after_s)),
+            (Presses::Scene, false) => Ok(scene.frame_by(&shutter, number, time_s)),
+            (Presses::Course(course), false) => own(&|after_s| course.load(time_s + after_s)),
+        };
+        // A load that the film's tables do not have is none.
+        let frame = frame.or_else(|_| own(&|_| Load::REST));
+        let frame = frame.unwrap_or_else(|_| scene.frame_by(&shutter, number, time_s));
+        let words = match frame.format {
+            // The camera sends the high byte first.
+            Format::Rgb565 => frame
+                .pixels
+                .iter()
+                .map(|pixel| pixel.swap_bytes())
+                .collect(),
+            _ => frame.words().into_owned(),
+        };
+        Shot {
+            words,
+            truth: frame.truth,
+        }
+    }
+
+    /// Makes the scene that the camera sees now, if it is another one.
+    fn look(&mut self, camera: &Camera, number: u32, time_s: f64) {
+        let seen = Seen {
+            format: match camera.pixels {
+                PixelFormat::Rgb565 => Format::Rgb565,
+                PixelFormat::Yuv422 => Format::Yuv422,
+                PixelFormat::Mono => Format::Mono,
+            },
+            brightness: camera.brightness(self.disturbances.dim),
+            shifted_px: match number % DRIFT_EVERY {
+                0 => self.disturbances.drift_px * time_s / 60.0,
+                _ => self.seen.shifted_px,
+            },
+        };
+        if seen == self.seen {
+            return;
+        }
+        self.seen = seen;
+        let mut options = self.given.options().clone();
+        options.format = seen.format;
+        options.gain = (options.gain * seen.brightness).min(4.0);
+        let [x, _] = &mut options.mounting.shift_px;
+        // The range of a mounting.
+        *x = (*x + seen.shifted_px).clamp(-200.0, 200.0);
+        if let Ok(scene) = self.given.clone().with_options(options) {
+            self.scene = scene;
+        }
+    }
+}

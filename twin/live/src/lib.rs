@@ -1,0 +1,28 @@
+//! The twin in real time: a simulated sensor that answers a host as a device does.
+//!
+//! ```text
+//! scene, course, hand → eye (renders) → device (senses, answers) → line → host
+//! ```
+//!
+//! Frames come at the camera's own rate, from the very scene that tests and calibration use. Sensing
+//! and settings are the code that the firmware runs (`hivtac-sensor`, `hivtac-device`). Only the
+//! chip is missing: its capture, its USB and its flash. So nothing is kept once the twin ends.
+//!
+//! | module | subject |
+//! |---|---|
+//! | [`camera`] | the camera: its settings, the light that it needs, its times |
+//! | [`device`] | frames and a host's bytes in, messages out |
+//! | [`eye`] | what the camera sees: the scene, its disturbances, and what presses |
+//! | [`hand`] | a press of a person |
+//! | [`course`] | a recorded course of forces |
+//! | [`run`] | the clock: one frame after the other, in real time |
+//! | [`line`] | bytes to and from a host |
+
+pub mod camera;
+pub mod course;
+pub mod device;
+pub mod eye;
+pub mod hand;
+pub mod line;
+mod outbox;
+pub mod run;
