@@ -20,8 +20,13 @@ const LOOK_EVERY: Duration = Duration::from_millis(33);
 const SAY_SOMETHING_EVERY: Duration = Duration::from_secs(5);
 
 /// Sends events until the reader is gone or too slow, or the program must end. `obeys` says whether
-/// the sensors take orders from the page.
-pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>], obeys: bool) -> io::Result<()> {
+/// the sensors take orders from the page, `presses` whether it can press their films.
+pub fn stream(
+    out: &mut impl Write,
+    feeds: &[Arc<Feed>],
+    obeys: bool,
+    presses: bool,
+) -> io::Result<()> {
     begin(out, EVENTS)?;
     let mut readers: Vec<(&Feed, Cursor)> =
         feeds.iter().map(|feed| (&**feed, feed.begin())).collect();
@@ -30,6 +35,7 @@ pub fn stream(out: &mut impl Write, feeds: &[Arc<Feed>], obeys: bool) -> io::Res
         &Hello {
             sensors: feeds.len(),
             obeys,
+            presses,
             lights: lights::all(),
         },
     );
@@ -70,6 +76,10 @@ fn told(sensor: usize, news: &News) -> String {
     if let Some(state) = &news.state {
         text += &format!("event: state\ndata: {{\"sensor\":{sensor},\"state\":{state}}}\n\n");
     }
+    if !news.truths.is_empty() {
+        let truths = &news.truths;
+        text += &event("truths", &json!({ "sensor": sensor, "truths": truths }));
+    }
     if !news.samples.is_empty() {
         let samples = news.samples.iter().map(Row::from).collect();
         let skipped = news.skipped;
@@ -90,6 +100,7 @@ fn told(sensor: usize, news: &News) -> String {
 struct Hello {
     sensors: usize,
     obeys: bool,
+    presses: bool,
     lights: Vec<lights::Light>,
 }
 

@@ -3,6 +3,7 @@
 //! The device's thread never waits for a reader. A reader that is too slow misses samples, and gets
 //! their number.
 
+use super::press::Truth;
 use hivtac_wire::message::Sample;
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -23,6 +24,10 @@ struct Contents {
     samples: VecDeque<Sample>,
     /// Number of samples before the first one that is kept.
     before: u64,
+    /// The true presses of a simulated sensor's newest frames.
+    truths: VecDeque<Truth>,
+    /// Number of true presses before the first one that is kept.
+    truths_before: u64,
     state: Arc<str>,
     /// Number of states that were set.
     states: u64,
@@ -32,6 +37,7 @@ struct Contents {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Cursor {
     sample: u64,
+    truth: u64,
     state: u64,
 }
 
@@ -42,6 +48,8 @@ pub struct News {
     pub samples: Vec<Sample>,
     /// Number of samples before them that this reader missed.
     pub skipped: u64,
+    /// True presses of a simulated sensor, the oldest first.
+    pub truths: Vec<Truth>,
     /// The newest state, as JSON; `None` if it has not changed.
     pub state: Option<Arc<str>>,
 }
@@ -59,6 +67,16 @@ impl Feed {
             contents.before += 1;
         }
         contents.samples.push_back(sample);
+    }
+
+    /// Adds the true press in a frame of a simulated sensor, before the frame's sample.
+    pub fn truth(&self, truth: Truth) {
+        let mut contents = self.contents();
+        if contents.truths.len() == AT_ONCE {
+            contents.truths.pop_front();
+            contents.truths_before += 1;
+        }
+        contents.truths.push_back(truth);
     }
 
     /// Sets the device's state, as JSON.
@@ -82,6 +100,7 @@ impl Feed {
         let end = contents.before + contents.samples.len() as u64;
         Cursor {
             sample: end - past as u64,
+            truth: contents.truths_before,
             state: 0,
         }
     }
@@ -100,11 +119,15 @@ impl Feed {
             .cloned()
             .collect();
         cursor.sample += samples.len() as u64;
+        let read = cursor.truth.saturating_sub(contents.truths_before) as usize;
+        let truths: Vec<Truth> = contents.truths.iter().skip(read).copied().collect();
+        cursor.truth = contents.truths_before + contents.truths.len() as u64;
         let is_new = contents.states != cursor.state;
         cursor.state = contents.states;
         News {
             samples,
             skipped,
+            truths,
             state: is_new.then(|| contents.state.clone()),
         }
     }

@@ -5,6 +5,7 @@ mod events;
 mod feed;
 pub mod lights;
 mod order;
+mod press;
 mod request;
 mod response;
 mod server;
@@ -14,5 +15,6 @@ mod unstalled;
 
 pub use feed::Feed;
 pub use order::{Answer, Order, Posted};
+pub use press::{Hand, Press, Truth};
 pub use server::{Sensor, Server};
 pub use told::{Coverage, Covered, Limits, Map, Recording, Told};

@@ -1,11 +1,12 @@
 //! Orders from the page to a device: read from JSON, passed to the device's thread, and answered.
 
+use super::press::Press;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use serde::Deserialize;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// What a device must do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     /// Take the rest position.
     Tare,
@@ -21,6 +22,8 @@ pub enum Order {
     StopRecording,
     /// Take a frame.
     Picture,
+    /// Press the film of a simulated sensor, or release it.
+    Press(Option<Press>),
 }
 
 /// The result of an order.
@@ -61,6 +64,7 @@ struct Written {
     order: String,
     format: Option<String>,
     limits: Option<[u8; 6]>,
+    press: Option<[f64; 5]>,
 }
 
 /// Reads an order and the index of its sensor.
@@ -75,10 +79,22 @@ pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
         "model_threshold" => Order::ModelThreshold,
         "record" => Order::Record,
         "stop_recording" => Order::StopRecording,
+        "press" => Order::Press(Some(press(&written)?)),
+        "release" => Order::Press(None),
         "threshold" => Order::Threshold(threshold(&written)?),
         _ => return Err("there is no such order".to_owned()),
     };
     Ok((written.sensor, order))
+}
+
+fn press(written: &Written) -> Result<Press, String> {
+    let needed = "a press has a place (mm), a force (N) and two angles (degrees)";
+    let [x, y, force_n, alpha, beta] = written.press.ok_or(needed)?;
+    Ok(Press {
+        place_mm: [x, y],
+        force_n,
+        angles_deg: [alpha, beta],
+    })
 }
 
 fn threshold(written: &Written) -> Result<Threshold, String> {
@@ -111,6 +127,19 @@ mod tests {
     }
 
     #[test]
+    fn presses_have_place_force_and_angles() {
+        let press = br#"{"sensor":0,"order":"press","press":[1.5,-2,0.1,4,0]}"#;
+        let expected = Press {
+            place_mm: [1.5, -2.0],
+            force_n: 0.1,
+            angles_deg: [4.0, 0.0],
+        };
+        assert_eq!(parse(press), Ok((0, Order::Press(Some(expected)))));
+        let release = parse(br#"{"sensor":0,"order":"release"}"#);
+        assert_eq!(release, Ok((0, Order::Press(None))));
+    }
+
+    #[test]
     fn whatever_else_comes_is_refused() {
         for body in [
             "",
@@ -119,6 +148,9 @@ mod tests {
             r#"{"sensor":0,"order":"format"}"#,
             r#"{"sensor":0,"order":"tare","more":1}"#,
             r#"{"sensor":0,"order":"threshold"}"#,
+            r#"{"sensor":0,"order":"press"}"#,
+            r#"{"sensor":0,"order":"press","press":[0,0,1]}"#,
+            r#"{"sensor":0,"order":"press","press":[0,0,1e999,0,0]}"#,
             r#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[180,0,0,0,0,0]}"#,
             r#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[300,0,0,0,0,0]}"#,
             r#"{"sensor":0,"order":"threshold","format":"mono","limits":[9,8,0,0,0,0]}"#,

@@ -3,6 +3,7 @@
 use super::events;
 use super::feed::Feed;
 use super::order::{self, Answer, Order, Posted};
+use super::press::Hand;
 use super::request::{self, Method, Request, Timed};
 use super::response::{self, BYTES, CSS, HTML, JSON, SCRIPT, Status};
 use super::token::Token;
@@ -24,7 +25,7 @@ const REQUEST_PATIENCE: Duration = Duration::from_secs(5);
 const ORDER_PATIENCE: Duration = Duration::from_secs(15);
 
 /// The page's files: path, content type and text.
-const FILES: [(&str, &str, &str); 9] = [
+const FILES: [(&str, &str, &str); 10] = [
     ("/", HTML, include_str!("files/index.html")),
     ("/style.css", CSS, include_str!("files/style.css")),
     ("/main.js", SCRIPT, include_str!("files/main.js")),
@@ -32,6 +33,7 @@ const FILES: [(&str, &str, &str); 9] = [
     ("/arrow.js", SCRIPT, include_str!("files/arrow.js")),
     ("/chart.js", SCRIPT, include_str!("files/chart.js")),
     ("/coverage.js", SCRIPT, include_str!("files/coverage.js")),
+    ("/press.js", SCRIPT, include_str!("files/press.js")),
     ("/picture.js", SCRIPT, include_str!("files/picture.js")),
     ("/threshold.js", SCRIPT, include_str!("files/threshold.js")),
 ];
@@ -42,6 +44,8 @@ pub struct Sensor {
     pub feed: Arc<Feed>,
     /// The queue of its orders; `None` if the page only shows it.
     pub orders: Option<SyncSender<Posted>>,
+    /// What presses its film, if it is simulated in this program.
+    pub hand: Option<Hand>,
 }
 
 /// A server on an open port.
@@ -168,7 +172,9 @@ impl Visit {
                 let feeds = self.server.sensors.iter().map(|sensor| sensor.feed.clone());
                 let mut orders = self.server.sensors.iter().map(|sensor| &sensor.orders);
                 let obeys = orders.all(Option::is_some);
-                events::stream(out, &feeds.collect::<Vec<_>>(), obeys)
+                let mut sensors = self.server.sensors.iter();
+                let presses = sensors.all(|sensor| sensor.hand.is_some());
+                events::stream(out, &feeds.collect::<Vec<_>>(), obeys, presses)
             }
             (Method::Post, ..) if path == "/order" => self.order(out, &request.body),
             (Method::Post, Some(_), _) => response::refuse(out, Status::Method),
@@ -201,6 +207,14 @@ impl Visit {
     /// Sends an order to a device, and waits for its answer.
     fn ask(&self, sensor: usize, order: Order) -> Result<Answer, Status> {
         let sensor = self.server.sensors.get(sensor).ok_or(Status::NotFound)?;
+        if let Order::Press(press) = order {
+            let Some(hand) = &sensor.hand else {
+                let why = "only the film of `hivtac view --twin` can be pressed".to_owned();
+                return Ok(Answer::Failed(why));
+            };
+            hand(press);
+            return Ok(Answer::Done(String::new()));
+        }
         let Some(orders) = &sensor.orders else {
             let why = "this page shows the sensor and no more: it is being recorded".to_owned();
             return Ok(Answer::Failed(why));

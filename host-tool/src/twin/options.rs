@@ -16,7 +16,7 @@ use std::ops::RangeInclusive;
 const NOMINAL: u64 = 0;
 
 /// What is simulated.
-#[derive(Args)]
+#[derive(Args, Default, PartialEq)]
 pub struct Simulated {
     /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or a
     /// scene file (FILE.toml, docs/scene-file.md)
@@ -25,16 +25,17 @@ pub struct Simulated {
     /// Forces from a CSV file of `monitor --csv` in place of the scene's, again and again
     #[arg(long, value_name = "FILE")]
     course: Option<String>,
-    /// The camera, and with it the rate: ov7725 156 frames a second, mt9v034 244
-    #[arg(long, value_enum, default_value_t)]
-    camera: CameraName,
+    /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, or mt9v034
+    /// with 244
+    #[arg(long, value_enum)]
+    camera: Option<CameraName>,
     /// Unit N of those that are drawn as people build them, 1 to 1000000; without it the nominal
     /// one, that of the built-in model
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     unit: Option<u64>,
-    /// Decides the noise, and where the demo starts, of a scene by name
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    seed: u64,
+    /// Decides the noise, and where the demo starts, of a scene by name; 1 when not given
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
     /// A reflection cuts a part off a marker
     #[arg(long)]
     glare: bool,
@@ -74,7 +75,7 @@ impl Simulated {
     /// # Errors
     /// When the scene or a file cannot be used.
     pub fn build(&self, before: Before, hand: Hand) -> Result<(Device, Eye), Failure> {
-        let kind = match self.camera {
+        let kind = match self.camera.unwrap_or_default() {
             CameraName::Ov7725 => Kind::Ov7725,
             CameraName::Mt9v034 => Kind::Mt9v034,
         };
@@ -105,7 +106,7 @@ impl Simulated {
             return Scene::from_toml(&text).map_err(|error| refused(name, error));
         }
         let [width, height] = kind.size().map(u32::from);
-        let scene = Scene::preset(name, kind.preset(), width, height, self.seed);
+        let scene = Scene::preset(name, kind.preset(), width, height, self.seed.unwrap_or(1));
         scene.map_err(|error| {
             Failure::input(format!(
                 "{error}; or a scene file, whose name ends with .toml"

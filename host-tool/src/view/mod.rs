@@ -4,15 +4,20 @@ mod owner;
 mod picture;
 mod recorder;
 pub mod state;
+#[cfg(feature = "twin")]
+mod twin;
 
 use crate::device::seconds;
 use crate::output::{Reader, print};
 use clap::Args;
 use hivtac_host::failure::Failure;
+#[cfg(feature = "twin")]
+use hivtac_host::failure::Kind;
 use hivtac_host::link::Link;
 use hivtac_host::page::{Feed, Sensor, Server};
 use hivtac_host::port::Address;
 use hivtac_host::stop;
+use hivtac_wire::message::DeviceHello;
 use owner::Owner;
 use recorder::Recorder;
 use serde_json::json;
@@ -31,7 +36,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 ///
 /// Prints `ready` and the page's address, which holds a secret: nobody else on this computer or
 /// in another page can open it. Ends with Ctrl-C; goes on after a lost connection. `--port`
-/// more than once shows several sensors side by side.
+/// more than once shows several sensors side by side. `--twin` needs no device: press the
+/// simulated film on the page.
 ///
 /// Example: hivtac view
 #[derive(Args)]
@@ -39,6 +45,14 @@ pub struct ViewArguments {
     /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
     #[arg(long, value_name = "PORT")]
     port: Vec<String>,
+    /// A simulated sensor in place of a device: the page presses its film, and shows the true press
+    /// beside what the sensor says
+    #[cfg(feature = "twin")]
+    #[arg(long, conflicts_with = "port")]
+    twin: bool,
+    #[cfg(feature = "twin")]
+    #[command(flatten)]
+    simulated: crate::twin::Simulated,
     /// Longest wait for the device's hello and replies, s
     #[arg(long, value_name = "S", default_value = "2", value_parser = seconds)]
     timeout: Duration,
@@ -58,12 +72,26 @@ pub struct ViewArguments {
 /// # Errors
 /// When a device is missing at the start; one that is lost later is waited for.
 pub fn run(arguments: &ViewArguments) -> Result<(), Failure> {
+    #[cfg(feature = "twin")]
+    if arguments.twin {
+        return serve(vec![twin::open_twin(arguments)?], arguments);
+    } else if arguments.simulated != crate::twin::Simulated::default() {
+        let why = "options of a simulated sensor need --twin";
+        return Err(Failure::new(Kind::Usage, why));
+    }
     let addresses = match arguments.port.as_slice() {
         [] => vec![Address::Find],
         ports => ports.iter().map(|port| Address::parse(port)).collect(),
     };
-    let opened = addresses.iter().map(|address| open(address, arguments));
-    let opened: Vec<(Sensor, Opened)> = opened.collect::<Result<_, _>>()?;
+    let opened = addresses.iter().map(|address| {
+        let feed = Arc::new(Feed::default());
+        let connected = Link::connect(address, arguments.timeout)?;
+        Ok(open(address, connected, feed, arguments))
+    });
+    serve(opened.collect::<Result<_, _>>()?, arguments)
+}
+
+fn serve(opened: Vec<(Sensor, Opened)>, arguments: &ViewArguments) -> Result<(), Failure> {
     let (sensors, opened): (Vec<_>, Vec<_>) = opened.into_iter().unzip();
     let server = Arc::new(Server::new(arguments.listen, sensors, arguments.timeout)?);
     let ready = match arguments.json {
@@ -91,9 +119,12 @@ pub fn run(arguments: &ViewArguments) -> Result<(), Failure> {
 /// A connected device, for its thread.
 type Opened = (Owner, Link);
 
-fn open(address: &Address, arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure> {
-    let (link, hello) = Link::connect(address, arguments.timeout)?;
-    let feed = Arc::new(Feed::default());
+fn open(
+    address: &Address,
+    (link, hello): (Link, DeviceHello),
+    feed: Arc<Feed>,
+    arguments: &ViewArguments,
+) -> (Sensor, Opened) {
     let (orders, posted) = sync_channel(ORDERS);
     let owner = Owner::new(
         address.clone(),
@@ -106,6 +137,7 @@ fn open(address: &Address, arguments: &ViewArguments) -> Result<(Sensor, Opened)
     let sensor = Sensor {
         feed,
         orders: Some(orders),
+        hand: None,
     };
-    Ok((sensor, (owner, link)))
+    (sensor, (owner, link))
 }

@@ -127,6 +127,8 @@ impl Owner {
     fn try_to(&mut self, link: &mut Link, order: Order) -> Result<Answer, Failure> {
         let (request, patience, done) = match order {
             Order::Picture => return self.picture(link),
+            // The server presses by itself.
+            Order::Press(_) => return Ok(Answer::Done(String::new())),
             Order::Record => return self.record(link),
             Order::StopRecording => {
                 self.request(link, Request::GetInfo, self.patience)?;

@@ -17,5 +17,7 @@ mod serve;
 mod settings;
 mod snapshot;
 mod threshold_auto;
+#[cfg(feature = "twin")]
+mod twin;
 mod update;
 mod view;

@@ -32,6 +32,7 @@ impl Watched {
         let sensor = Sensor {
             feed: feed.clone(),
             orders: None,
+            hand: None,
         };
         let server = Arc::new(Server::new(0, vec![sensor], patience)?);
         eprintln!("Watch it in a browser: {}", server.address());

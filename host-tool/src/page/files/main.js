@@ -10,7 +10,7 @@ function begin(hello) {
   room.replaceChildren();
   document.getElementById("keys").hidden = !hello.obeys;
   views = Array.from({ length: hello.sensors }, (_, number) => {
-    const view = new SensorView(number, hello.lights, hello.obeys);
+    const view = new SensorView(number, hello);
     room.append(view.element);
     return view;
   });
@@ -24,6 +24,7 @@ function listen() {
     events.addEventListener(name, (event) => act(JSON.parse(event.data)));
   on("hello", begin);
   on("state", ({ sensor, state }) => views[sensor].state(state));
+  on("truths", ({ sensor, truths }) => views[sensor].truths(truths));
   on("samples", ({ sensor, skipped, samples }) => views[sensor].samples(samples, skipped));
   events.onerror = () => {
     link.textContent = "hivtac has ended or does not answer: start it again, and open the " +

@@ -4,6 +4,7 @@ import { Arrow } from "./arrow.js";
 import { Chart } from "./chart.js";
 import { Coverage } from "./coverage.js";
 import { Picture } from "./picture.js";
+import { Press } from "./press.js";
 import { Threshold } from "./threshold.js";
 
 /** Time for which a light stays on after its last sample, long enough to be read. */
@@ -41,7 +42,7 @@ function sigmas({ vector, magnitude, magnitudeSigma, directionSigma }) {
 }
 
 export class SensorView {
-  constructor(number, lights, obeys) {
+  constructor(number, { lights, obeys, presses }) {
     const template = document.getElementById("sensor");
     this.element = template.content.firstElementChild.cloneNode(true);
     this.number = number;
@@ -61,6 +62,8 @@ export class SensorView {
     this.picture = new Picture(number, (name) => this.part(name));
     this.coverage = new Coverage((name) => this.part(name));
     this.threshold = new Threshold(this.part("sliders"), order);
+    this.part("truth").hidden = !presses;
+    this.hand = presses ? new Press((name) => this.part(name), order) : null;
     for (const button of this.element.querySelectorAll("[data-do]")) {
       button.addEventListener("click", () => this.press(button));
     }
@@ -81,7 +84,7 @@ export class SensorView {
     try {
       const response = await fetch("order", { method: "POST", body });
       const answer = response.ok ? await response.json() : { text: await response.text() };
-      this.say("answer", answer.text);
+      if (answer.text) this.say("answer", answer.text);
       return answer.done === true;
     } catch {
       this.say("answer", "nothing answers");
@@ -118,7 +121,13 @@ export class SensorView {
       this.size.add(sample.shown, force && [force.magnitude], force && [force.magnitudeSigma]);
       this.components.add(sample.shown, force && force.vector, force && sigmas(force));
       this.newest = sample;
+      this.hand?.compare(sample);
     }
+  }
+
+  /** Takes the true presses of a simulated sensor, which come before their samples. */
+  truths(rows) {
+    this.hand?.take(rows);
   }
 
   /** Sets a sample's time on the charts' axis, where a restarted device goes on after a gap. */
@@ -161,6 +170,7 @@ export class SensorView {
     this.drawLights(now);
     const force = this.trouble === null ? this.newest?.force ?? null : null;
     this.drawNumbers(force);
+    this.hand?.draw();
     this.size.draw(this.end);
     this.components.draw(this.end);
     this.arrow.draw(force, this.size.largest(), this.newest?.frame);

@@ -1,0 +1,63 @@
+//! `hivtac view --twin`: a simulated sensor in this program, whose film the page presses.
+
+use super::{Opened, ViewArguments, open};
+use crate::twin::Inside;
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::link::Link;
+use hivtac_host::page::{Feed, Press, Sensor, Truth};
+use hivtac_host::port::Address;
+use hivtac_live::hand::{Hand, Touch};
+use hivtac_live::run::Told;
+use hivtac_terms::contact_shape::ContactShape;
+use hivtac_wire::message::Request;
+use std::sync::Arc;
+
+/// Number of frames of the first tare.
+const TARE_FRAMES: u16 = 64;
+
+/// Starts a simulated sensor and connects to it. It is set up as a user would: it knows its tip,
+/// and has a tare if nothing presses yet.
+///
+/// # Errors
+/// When the scene or a file cannot be used.
+pub fn open_twin(arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure> {
+    let hand = Hand::default();
+    let inside = Inside::start(&arguments.simulated, hand.clone())?;
+    let address = Address::parse(&inside.port);
+    let feed = Arc::new(Feed::default());
+    let told = feed.clone();
+    std::thread::spawn(move || inside.run(|frame| told.truth(truth(&frame))));
+    let (mut link, hello) = Link::connect(&address, arguments.timeout)?;
+    let mut ask = |request| link.request(request, arguments.timeout, |_| {});
+    ask(Request::SetContactShape(ContactShape::Needle))?;
+    let frames = TARE_FRAMES;
+    match ask(Request::Tare { frames }) {
+        // Something presses: the page says that there is no tare.
+        Err(failure) if failure.kind != Kind::Refused => return Err(failure),
+        _ => {}
+    }
+    let (mut sensor, opened) = open(&address, (link, hello), feed, arguments);
+    sensor.hand = Some(Box::new(move |press| {
+        hand.set(press.and_then(|press| touch(press).in_range()));
+    }));
+    Ok((sensor, opened))
+}
+
+fn touch(press: Press) -> Touch {
+    Touch {
+        place_mm: press.place_mm,
+        force_n: press.force_n,
+        angles_deg: press.angles_deg,
+    }
+}
+
+/// The true press of a frame in the integers of the wire format.
+fn truth(told: &Told) -> Truth {
+    let thousandths = |value: f64| (1e3 * value).round() as i64;
+    let force = told.truth.force;
+    let [x, y, z] = force.vector_n();
+    let newtons = [x, y, z, force.magnitude_n()].map(|part| thousandths(1e3 * part));
+    let angles = [force.alpha_deg(), force.beta_deg()].map(thousandths);
+    let place = told.truth.touches_mm.map(|place| place.map(thousandths));
+    Truth(told.frame, newtons, angles, place)
+}

@@ -1,0 +1,383 @@
+//! Tests `hivtac twin`: it answers every command as a device does, and its forces are true.
+
+use crate::run::*;
+use rustix::process::{Pid, Signal, kill_process};
+use serde_json::Value;
+use std::io::{BufRead, BufReader};
+use std::process::Child;
+
+const MODEL: &str = concat!(
+    env!("CARGO_MANIFEST_DIR"),
+    "/../calibration/models/default.hvtm"
+);
+
+/// A press that stays, at a place and with a tilt.
+const PRESSED: &str = "[film]\noffset_mm = [1.5, -1.0]\n[load]\nmotion = \"press\"\n[load.press]\n\
+                       force_n = 0.12\nalpha_deg = 5.0\nbeta_deg = -4.0\nstart_s = 0.0\n\
+                       rise_s = 0.05\nhold_s = 600.0\n";
+
+/// A twin in a folder of its own; ended when it is dropped.
+struct Twin {
+    run: Option<Run>,
+    port: String,
+    folder: tempfile::TempDir,
+}
+
+impl Twin {
+    fn of(arguments: &[&str]) -> Twin {
+        Twin::in_folder(tempfile::tempdir().unwrap(), arguments)
+    }
+
+    fn in_folder(folder: tempfile::TempDir, arguments: &[&str]) -> Twin {
+        let mut run = start(&[&["twin"], arguments].concat());
+        let ready = first_line(run.child());
+        let port = match ready.strip_prefix("ready tcp=") {
+            Some(address) => format!("tcp:{address}"),
+            None => ready.strip_prefix("ready pty=").expect("a port").to_owned(),
+        };
+        Twin {
+            run: Some(run),
+            port,
+            folder,
+        }
+    }
+
+    /// A twin that is pressed as `PRESSED` says and logs the truth; with the log's path.
+    fn pressed(arguments: &[&str]) -> (Twin, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let [scene, truth] = ["press.toml", "truth.jsonl"].map(|name| text(&folder, name));
+        std::fs::write(&scene, PRESSED).unwrap();
+        let own = ["--scene", &scene, "--truth", &truth];
+        (Twin::in_folder(folder, &[&own, arguments].concat()), truth)
+    }
+
+    /// Runs a command on it.
+    fn run(&self, arguments: &[&str]) -> Finished {
+        run(&[arguments, &["--port", &self.port, "--timeout", "10"]].concat())
+    }
+
+    /// Runs a command that must succeed; returns what it prints.
+    fn done(&self, arguments: &[&str]) -> String {
+        let run = self.run(arguments);
+        assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
+        run.stdout
+    }
+
+    /// The samples of a command that prints JSON lines.
+    fn samples(&self, arguments: &[&str]) -> Vec<Value> {
+        let lines = self.done(&[&["monitor", "--json"], arguments].concat());
+        let lines = lines
+            .lines()
+            .map(|line| serde_json::from_str(line).unwrap());
+        lines.collect()
+    }
+
+    fn json(&self, arguments: &[&str]) -> Value {
+        serde_json::from_str(&self.done(&[arguments, &["--json"]].concat())).unwrap()
+    }
+}
+
+impl Drop for Twin {
+    fn drop(&mut self) {
+        if let Some(mut run) = self.run.take() {
+            let child = run.child();
+            // Fails only if it has already ended.
+            let _ = kill_process(Pid::from_child(child), Signal::TERM);
+            let _ = child.wait();
+        }
+    }
+}
+
+fn text(folder: &tempfile::TempDir, name: &str) -> String {
+    folder.path().join(name).to_str().unwrap().to_owned()
+}
+
+fn first_line(child: &mut Child) -> String {
+    let mut line = String::new();
+    let stdout = child.stdout.as_mut().unwrap();
+    BufReader::new(stdout).read_line(&mut line).unwrap();
+    line.trim_end().to_owned()
+}
+
+#[test]
+fn a_twin_answers_as_a_device_does() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    let info = twin.json(&["info"]);
+    assert_eq!(info["board"], "twin + ov7725");
+    assert_eq!(info["model"]["source"], "built-in");
+    let health = twin.json(&["self-test"]);
+    assert_eq!(health["good"], true, "{health}");
+    let tared = twin.done(&["tare"]);
+    assert!(tared.contains("tare"), "{tared}");
+    twin.done(&["settings", "set", "name", "thumb"]);
+    twin.done(&["settings", "set", "contact", "flat:2"]);
+    twin.done(&["settings", "set", "rate", "78"]);
+    let settings = twin.done(&["settings", "get"]);
+    for line in [
+        "thumb",
+        "78 frames a second",
+        "a rigid face of 2 mm radius",
+        "taken",
+    ] {
+        assert!(settings.contains(line), "{line}: {settings}");
+    }
+    twin.done(&["settings", "reset"]);
+    let settings = twin.done(&["settings", "get"]);
+    assert!(settings.contains("156 frames a second"), "{settings}");
+    assert!(!settings.contains("thumb"), "{settings}");
+    twin.done(&["expose"]);
+}
+
+#[test]
+fn a_twin_keeps_what_it_is_told_to_keep() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    twin.done(&["tare", "--keep"]);
+    let settings = twin.done(&["settings", "get"]);
+    assert!(settings.contains("taken (kept)"), "{settings}");
+    let other = ["threshold", "--hsv", "170,10,90,255,45,255"];
+    twin.done(&other);
+    let settings = twin.done(&["settings", "get"]);
+    assert!(settings.contains("V 45–255 (until restart)"), "{settings}");
+}
+
+#[test]
+fn a_twin_sends_the_frame_that_it_senses() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    let [raw, png] = ["frame.pam", "frame.png"].map(|name| text(&twin.folder, name));
+    let said = twin.done(&["snapshot", &png, "--raw", &raw]);
+    assert!(said.contains("320"), "{said}");
+    let sensed = run(&["sense", &raw, "--json"]);
+    assert_eq!(sensed.code, Some(0), "{}", sensed.stderr);
+    // The camera then sends other pixels; the rest position of the former is forgotten.
+    twin.done(&["tare"]);
+    let lines = twin.samples(&["--frames", "5"]);
+    assert!(!status(&lines[4]).contains(&"tare_missing"), "{lines:?}");
+    twin.done(&["threshold", "--cr", "162"]);
+    let lines = twin.samples(&["--frames", "5"]);
+    let seen = status(&lines[4]);
+    assert!(seen.contains(&"model_mismatch"), "{seen:?}");
+    twin.done(&["snapshot", &png]);
+}
+
+fn status(sample: &Value) -> Vec<&str> {
+    let names = sample["status"].as_array().unwrap().iter();
+    names.map(|name| name.as_str().unwrap()).collect()
+}
+
+#[test]
+fn a_twin_takes_models_that_fit_it() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    let sent = twin.done(&["update", "model", MODEL]);
+    assert!(sent.contains("in use and kept"), "{sent}");
+    assert_eq!(twin.json(&["info"])["model"]["source"], "kept");
+    twin.done(&["update", "model", "--built-in"]);
+    assert_eq!(twin.json(&["info"])["model"]["source"], "built-in");
+    let other = MODEL.replace("default.hvtm", "mt9v034/default.hvtm");
+    let refused = twin.run(&["update", "model", &other]);
+    assert_eq!(refused.code, Some(6), "{refused:?}");
+    assert!(
+        refused.stderr.contains("for another camera than ov7725"),
+        "{}",
+        refused.stderr
+    );
+    assert_eq!(twin.json(&["info"])["model"]["source"], "built-in");
+}
+
+/// Returns |sensed − true| over the stated standard uncertainty, of |F|, both angles and both
+/// coordinates of the place.
+fn ratios(sample: &Value, truth: &Value) -> Vec<f64> {
+    let force = &sample["force"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    let one_axis = std::f64::consts::FRAC_1_SQRT_2;
+    let ratio = |name: &str, sigma: &str, part: f64| {
+        (number(&force[name]) - number(&truth[name])).abs() / (part * number(&force[sigma]))
+    };
+    vec![
+        ratio("magnitude_n", "magnitude_sigma_n", 1.0),
+        ratio("alpha_deg", "direction_sigma_deg", one_axis),
+        ratio("beta_deg", "direction_sigma_deg", one_axis),
+        ratio("place_x_mm", "place_sigma_mm", 1.0),
+        ratio("place_y_mm", "place_sigma_mm", 1.0),
+    ]
+}
+
+/// Returns the line of a sample's frame in a truth log.
+fn truth_of(log: &str, sample: &Value) -> Value {
+    let lines = std::fs::read_to_string(log).unwrap();
+    let lines = lines
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let own = lines
+        .into_iter()
+        .find(|line| line["frame"] == sample["frame"]);
+    own.unwrap_or_else(|| panic!("no truth of {sample}"))
+}
+
+#[test]
+fn forces_of_a_press_are_within_three_sigma_of_the_truth() {
+    for camera in ["ov7725", "mt9v034"] {
+        let size = match camera {
+            "ov7725" => "",
+            _ => "[camera]\npreset = \"mt9v034\"\n",
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let [scene, log] = ["press.toml", "truth.jsonl"].map(|name| text(&folder, name));
+        std::fs::write(&scene, format!("{size}{PRESSED}")).unwrap();
+        let own = ["--camera", camera, "--scene", &scene, "--truth", &log];
+        let twin = Twin::in_folder(folder, &own);
+        twin.done(&["settings", "set", "contact", "needle"]);
+        let samples = twin.samples(&["--frames", "150"]);
+        let pressed = samples
+            .iter()
+            .skip(30)
+            .filter(|sample| sample["force"].is_object());
+        let ratios: Vec<f64> = pressed
+            .flat_map(|sample| ratios(sample, &truth_of(&log, sample)))
+            .collect();
+        assert!(ratios.len() > 5 * 100, "{camera}: {}", ratios.len());
+        let within = ratios.iter().filter(|ratio| **ratio < 3.0).count();
+        // 99.7 % of a normal distribution.
+        assert!(
+            within * 100 >= ratios.len() * 99,
+            "{camera}: {within} of {}",
+            ratios.len()
+        );
+    }
+}
+
+#[test]
+fn frames_come_at_the_cameras_rate() {
+    for (camera, hz) in [("ov7725", 156.1), ("mt9v034", 244.6)] {
+        let twin = Twin::of(&["--camera", camera]);
+        let samples = twin.samples(&["--seconds", "2"]);
+        let time = |sample: &Value| 1e-6 * sample["time_us"].as_f64().unwrap();
+        let frame = |sample: &Value| sample["frame"].as_f64().unwrap();
+        let (first, last) = (&samples[0], &samples[samples.len() - 1]);
+        let rate = (frame(last) - frame(first)) / (time(last) - time(first));
+        assert!((rate - hz).abs() < 0.5, "{camera}: {rate}");
+    }
+}
+
+#[test]
+fn disturbances_are_seen() {
+    let seen = |arguments: &[&str]| {
+        let (twin, _) = Twin::pressed(arguments);
+        let samples = twin.samples(&["--frames", "60"]);
+        let last = &samples[59];
+        status(last)
+            .into_iter()
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    };
+    let has = |names: &[String], name: &str| names.iter().any(|it| it == name);
+    let usual = seen(&[]);
+    assert!(!has(&usual, "markers_implausible"), "{usual:?}");
+    let glare = seen(&["--glare"]);
+    assert_ne!(glare, usual);
+    let dim = seen(&["--dim", "0.1"]);
+    assert!(
+        has(&dim, "image_dark") || has(&dim, "frame_disturbed"),
+        "{dim:?}"
+    );
+}
+
+/// Another unit has its own number, and a rest position beside the model's.
+#[test]
+fn units_are_drawn_by_their_number() {
+    let place = |unit: &str| {
+        let twin = Twin::of(&["--scene", "rest", "--unit", unit]);
+        let id = twin.json(&["info"])["device_id"]
+            .as_str()
+            .unwrap()
+            .to_owned();
+        twin.done(&["tare"]);
+        (id, twin.json(&["settings", "get"])["tare"].clone())
+    };
+    let (seventh, again, eighth) = (place("7"), place("7"), place("8"));
+    assert_eq!(seventh.0, again.0);
+    assert_ne!(seventh.0, eighth.0);
+    assert_ne!(seventh.1, eighth.1);
+}
+
+#[test]
+fn a_recorded_course_is_pressed_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let course = text(&folder, "course.csv");
+    let rows = "time_us,x_n,y_n,z_n\n0,0,0,-0.1\n100000,0,0,-0.1\n";
+    std::fs::write(&course, rows).unwrap();
+    let twin = Twin::in_folder(folder, &["--scene", "rest", "--course", &course]);
+    let samples = twin.samples(&["--frames", "40"]);
+    let force = samples[39]["force"]["magnitude_n"].as_f64().unwrap();
+    assert!((force - 0.1).abs() < 0.005, "{force}");
+}
+
+#[test]
+fn a_pseudo_terminal_serves_one_host_after_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let link = text(&folder, "sensor");
+    let twin = Twin::in_folder(folder, &["--pty", &link]);
+    assert_eq!(twin.port, link);
+    let samples = twin.samples(&["--frames", "20"]);
+    assert_eq!(samples.len(), 20);
+    assert_eq!(twin.samples(&["--frames", "20"]).len(), 20);
+    assert_eq!(twin.json(&["info"])["board"], "twin + ov7725");
+}
+
+/// The exit code and message of a twin that does not start.
+fn refused(arguments: &[&str]) -> (Option<i32>, String) {
+    let run = run(&[&["twin"], arguments].concat());
+    (run.code, run.stderr)
+}
+
+#[test]
+fn what_cannot_be_simulated_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str, contents: &str| {
+        std::fs::write(folder.path().join(name), contents).unwrap();
+        text(&folder, name)
+    };
+    let unknown_key = file("key.toml", "[load]\nmotoin = \"rest\"\n");
+    let large = file("large.toml", "[camera]\nwidth = 640\nheight = 480\n");
+    let course = file("course.csv", "time_s,x_n,y_n,z_n\n0,a,0,0\n");
+    let twin = Twin::of(&["--scene", "rest"]);
+    let (_, taken) = twin.port.rsplit_once(':').unwrap();
+    let missing = folder.path().join("none.toml").display().to_string();
+    for (arguments, code, words) in [
+        (["--scene", "dance"], 1, "unknown scene `dance`"),
+        (["--scene", &missing], 1, "none.toml"),
+        (["--scene", &unknown_key], 1, "motoin"),
+        (["--scene", &large], 1, "640 × 480"),
+        (["--course", &course], 1, "line 2: \"a\" is not a number"),
+        (["--unit", "0"], 2, "0 is not in 1..=1000000"),
+        (["--dim", "9"], 2, "from 0.05 to 2"),
+        (["--listen", taken], 1, "choose another with --listen"),
+    ] {
+        let (got, said) = refused(&arguments);
+        assert!(
+            got == Some(code) && said.contains(words),
+            "{arguments:?}: {got:?} {said}"
+        );
+    }
+    let without = run(&["view", "--scene", "demo"]);
+    assert_eq!(without.code, Some(2), "{without:?}");
+    assert!(without.stderr.contains("--twin"), "{}", without.stderr);
+}
+
+#[test]
+fn a_twin_has_no_loader() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    // The begin of a program for the device: its stack, then where it starts.
+    let program = [0x2000_9e00_u32, 0x0800_0301]
+        .map(u32::to_le_bytes)
+        .concat();
+    let file = text(&twin.folder, "firmware.bin");
+    std::fs::write(&file, [program, vec![0; 4096]].concat()).unwrap();
+    let refused = twin.run(&["update", "firmware", &file]);
+    assert_eq!(refused.code, Some(6), "{refused:?}");
+    assert!(
+        refused.stderr.contains("a twin has no loader"),
+        "{}",
+        refused.stderr
+    );
+    assert_eq!(twin.json(&["info"])["board"], "twin + ov7725");
+}
