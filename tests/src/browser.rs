@@ -145,6 +145,31 @@ impl Browser {
         Ok(())
     }
 
+    /// Moves the pointer to a place in the page, px, and there presses or releases its first button:
+    /// `mousePressed`, `mouseMoved` or `mouseReleased`. `shift` says whether that key is held.
+    ///
+    /// # Errors
+    /// If the browser is gone.
+    pub fn pointer(&mut self, kind: &str, [x, y]: [f64; 2], shift: bool) -> Result<()> {
+        let is_held = kind != "mouseReleased";
+        let event = json!({
+            "type": kind, "x": x, "y": y, "button": "left", "clickCount": 1,
+            "buttons": u8::from(is_held), "modifiers": if shift { 8 } else { 0 },
+        });
+        self.call("Input.dispatchMouseEvent", event)?;
+        Ok(())
+    }
+
+    /// Turns the wheel over a place in the page, px; negative is away from the user.
+    ///
+    /// # Errors
+    /// If the browser is gone.
+    pub fn wheel(&mut self, [x, y]: [f64; 2], turn: f64) -> Result<()> {
+        let event = json!({ "type": "mouseWheel", "x": x, "y": y, "deltaX": 0, "deltaY": turn });
+        self.call("Input.dispatchMouseEvent", event)?;
+        Ok(())
+    }
+
     /// Sets the colour scheme that the user prefers, `light` or `dark`.
     ///
     /// # Errors

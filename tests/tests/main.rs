@@ -25,5 +25,7 @@ mod steps;
 mod tares;
 mod three_markers;
 mod turned;
+mod twin;
 mod view;
+mod view_twin;
 mod wire_vectors;

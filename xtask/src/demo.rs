@@ -46,6 +46,11 @@ impl Demo {
         let shown = start.elapsed().as_secs_f64() - built;
         eprintln!("\nbuilt in {built:.1} s, shown in {shown:.1} s");
         eprintln!("truth: {}\nlog:   {}", truth.display(), log.display());
+        eprintln!(
+            "\nGo on in real time, without the emulator: press a simulated film in a browser with\n\
+             \n  cargo install --path host-tool && hivtac view --twin\n\nor run `hivtac twin`, \
+             which every command of hivtac, Python and ROS 2 use as a device."
+        );
         Ok(())
     }
 

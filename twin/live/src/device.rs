@@ -151,8 +151,8 @@ impl Device {
     }
 
     /// Takes the next message for the host; `None` if none waits.
-    pub fn next(&mut self) -> Option<DeviceMessage> {
-        self.out.next()
+    pub fn message(&mut self) -> Option<DeviceMessage> {
+        self.out.take()
     }
 
     /// Call when a message could not be sent whole, because the host does not read.

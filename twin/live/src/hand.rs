@@ -85,7 +85,7 @@ impl Following {
         self.step_s = (at_s - self.at_s).max(0.0);
         self.at_s = at_s;
         self.before = self.now;
-        let part = 1.0 - (-self.step_s / FOLLOWS_S).exp();
+        let part = 1.0 - libm::exp(-self.step_s / FOLLOWS_S);
         let toward = |from: f64, to: f64| from + (to - from) * part;
         self.now = match (self.now, self.hand.wants()) {
             // A new touch begins where the hand is, from no force.

@@ -83,7 +83,7 @@ fn send(mut write: impl Write, shared: &Shared, is_there: &AtomicBool) {
     let mut buffer = [0; 1 + MAX_DEVICE_FRAME];
     let mut cut = true;
     while is_there.load(Ordering::Relaxed) {
-        let Some(message) = shared.next(LOOK_EVERY) else {
+        let Some(message) = shared.message(LOOK_EVERY) else {
             continue;
         };
         let Some(Ok(frame)) = buffer.get_mut(1..).map(|rest| encode(&message, rest)) else {

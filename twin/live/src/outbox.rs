@@ -79,15 +79,15 @@ impl Outbox {
     }
 
     /// Takes the next message; `None` if nothing waits.
-    pub fn next(&mut self) -> Option<DeviceMessage> {
+    pub fn take(&mut self) -> Option<DeviceMessage> {
         let answer = self.answers.pop_front();
         answer
             .or_else(|| self.samples.pop_front().map(DeviceMessage::Sample))
-            .or_else(|| self.next_of_snapshot())
+            .or_else(|| self.take_of_snapshot())
     }
 
     /// The header, then the parts, then the reply.
-    fn next_of_snapshot(&mut self) -> Option<DeviceMessage> {
+    fn take_of_snapshot(&mut self) -> Option<DeviceMessage> {
         let sending = self.snapshot.as_mut()?;
         let Some(sent) = sending.sent else {
             sending.sent = Some(0);

@@ -63,15 +63,15 @@ impl Shared {
     }
 
     /// Takes the next message for the host; waits for one up to `patience`.
-    pub fn next(&self, patience: Duration) -> Option<hivtac_wire::message::DeviceMessage> {
+    pub fn message(&self, patience: Duration) -> Option<hivtac_wire::message::DeviceMessage> {
         let mut device = self.device();
-        if let Some(message) = device.next() {
+        if let Some(message) = device.message() {
             return Some(message);
         }
         let news = &self.0.news;
         let waited = news.wait_timeout(device, patience);
         device = waited.unwrap_or_else(PoisonError::into_inner).0;
-        device.next()
+        device.message()
     }
 }
 

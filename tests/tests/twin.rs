@@ -1,0 +1,175 @@
+//! Tests that the twin answers as the flashed program in the rig does: on the same frames the same
+//! bytes.
+
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
+
+use crate::rig::{Rig, TIMEOUT_S};
+use hivtac_host::link::Link;
+use hivtac_host::port::Address;
+use hivtac_live::camera::Kind;
+use hivtac_live::device::{Captured, Device};
+use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::status::Status;
+use hivtac_terms::threshold::HsvBox;
+use hivtac_twin::{Preset, Scene, Shutter};
+use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
+use hivtac_wire::message::{
+    Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Reply, Request, Sample,
+};
+use hivtac_wire::settings::SettingsReport;
+use hivtac_wire::version::HelloPrefix;
+use serde_json::Value;
+
+const SEED: u64 = 5;
+/// Samples that are compared.
+const SAMPLES: usize = 24;
+const PATIENCE: Duration = Duration::from_secs(TIMEOUT_S as u64);
+
+/// What a new device is told. A threshold, though it is the one in use, makes what earlier frames
+/// left be forgotten.
+fn told() -> [Request; 3] {
+    [
+        Request::SetContactShape(ContactShape::Needle),
+        Request::StartWithMarkers,
+        Request::SetThreshold(HsvBox::RED.into()),
+    ]
+}
+
+/// Returns what the firmware in a rig says of itself, and the samples of successive frames, from
+/// the first one after what it was told.
+fn from_the_rig(rig: &Rig) -> (DeviceHello, SettingsReport, Vec<Sample>) {
+    let address = Address::Tty(rig.port().to_owned());
+    let (mut link, hello) = Link::connect(&address, PATIENCE).unwrap();
+    let mut report = None;
+    let ask = link.request(Request::GetSettings, PATIENCE, |message| {
+        if let DeviceMessage::Settings(settings) = message {
+            report = Some(settings);
+        }
+    });
+    ask.unwrap();
+    for request in told() {
+        link.request(request, PATIENCE, |_| {}).unwrap();
+    }
+    let mut samples: Vec<Sample> = Vec::new();
+    while samples.len() < SAMPLES {
+        let message = link.receive(Instant::now() + PATIENCE).unwrap();
+        if let DeviceMessage::Sample(sample) = message.expect("samples come") {
+            let begins = sample.status.contains(Status::FRAME_DROPPED);
+            if begins || !samples.is_empty() {
+                samples.push(sample);
+            }
+        }
+    }
+    (
+        hello,
+        report.expect("settings come before the reply"),
+        samples,
+    )
+}
+
+/// A twin in a conversation.
+struct Twin(Device);
+
+impl Twin {
+    fn new() -> Twin {
+        let mut twin = Twin(Device::new(Kind::Ov7725, [0; 12], 1.0));
+        twin.send(&HostMessage::Hello(HelloPrefix::OURS.into()));
+        twin
+    }
+
+    fn send(&mut self, message: &HostMessage) {
+        let mut buffer = [0; MAX_HOST_FRAME];
+        self.0.receive(encode(message, &mut buffer).unwrap(), 0);
+    }
+
+    /// Sends a request; returns the messages that come at once.
+    fn ask(&mut self, request: Request) -> Vec<DeviceMessage> {
+        self.send(&HostMessage::Command(Command { id: 1, request }));
+        std::iter::from_fn(|| self.0.message()).collect()
+    }
+}
+
+/// Returns the pixels of an exposure as they lie in the device's memory.
+fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
+    let number = |key: &str| line[key].as_f64().unwrap();
+    let shutter = Shutter {
+        exposure_s: number("exposure_s"),
+        readout_s: number("readout_s"),
+    };
+    let exposure = line["exposure"].as_u64().unwrap();
+    let frame = scene.frame_by(&shutter, exposure, number("time_s"));
+    frame
+        .pixels
+        .iter()
+        .map(|pixel| pixel.swap_bytes())
+        .collect()
+}
+
+fn bytes(sample: Sample) -> Vec<u8> {
+    let mut buffer = [0; MAX_DEVICE_FRAME];
+    encode(&DeviceMessage::Sample(sample), &mut buffer)
+        .unwrap()
+        .to_vec()
+}
+
+/// The number of the sample counts from the device's start, and is the only difference.
+#[test]
+fn a_twin_sends_the_bytes_of_the_flashed_program() {
+    let seed = SEED.to_string();
+    let rig = Rig::start(&["--scene", "demo", "--seed", &seed]).unwrap();
+    let (hello, settings, samples) = from_the_rig(&rig);
+    let lines = rig.truth().unwrap();
+    let lines: HashMap<u64, &Value> = lines
+        .iter()
+        .map(|line| (line["frame"].as_u64().unwrap(), line))
+        .collect();
+    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
+    let mut twin = Twin::new();
+    let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
+        panic!("a hello comes first");
+    };
+    let same = DeviceHello {
+        device_id: hello.device_id,
+        board: hello.board.clone(),
+        ..own
+    };
+    assert_eq!(same, hello);
+    let report = twin.ask(Request::GetSettings);
+    assert_eq!(report[0], DeviceMessage::Settings(settings));
+    for request in told() {
+        let (id, outcome) = (1, Outcome::Done);
+        assert_eq!(
+            twin.ask(request),
+            [DeviceMessage::Reply(Reply { id, outcome })]
+        );
+    }
+    let mut forces = 0;
+    for (nth, sample) in samples.into_iter().enumerate() {
+        let camera = twin.0.camera();
+        let frame = Captured {
+            number: sample.frame,
+            begun_us: sample.time_us - u64::try_from(camera.middle_us()).unwrap(),
+            camera,
+            words: exposed(&scene, lines[&u64::from(sample.frame)]),
+        };
+        twin.0.frame(&frame, nth == 0, sample.time_us);
+        let Some(DeviceMessage::Sample(own)) = twin.0.message() else {
+            panic!("a sample comes of each frame");
+        };
+        forces += usize::from(sample.force.is_some());
+        let sequence = sample.sequence;
+        assert_eq!(
+            bytes(Sample {
+                sequence,
+                ..own.clone()
+            }),
+            bytes(sample.clone()),
+            "{own:?}\n{sample:?}"
+        );
+        // Counters may come, too.
+        while twin.0.message().is_some() {}
+    }
+    assert!(forces > SAMPLES / 2, "{forces}");
+    rig.finish().unwrap();
+}
