@@ -141,21 +141,29 @@ impl Camera {
         let limits = self.kind.limits().at(settings.rate);
         let wanted_us = self.kind.well_exposed_us() / light.max(1e-3);
         let fixed_gain = settings.gain.unwrap_or(LEAST_GAIN);
-        let exposure = settings.exposure.unwrap_or_else(|| {
-            let us = (16.0 * wanted_us / f64::from(fixed_gain.0)) as u32;
-            Microseconds(us.clamp(limits.shortest.0, limits.longest.0))
-        });
-        self.lines = match self.kind {
-            Kind::Ov7725 => ov7725::lines(exposure, settings.rate),
-            Kind::Mt9v034 => {
-                let longest = mt9v034::longest_exposure(settings.rate);
-                mt9v034::rows_in(exposure).clamp(1, longest)
+        let [shortest, longest] = [limits.shortest, limits.longest].map(|it| self.lines_of(it));
+        self.lines = match settings.exposure {
+            Some(exposure) => self.lines_of(exposure),
+            // The automatic control's register holds whole lines.
+            None => {
+                let line_us = f64::from(limits.longest.0) / f64::from(longest);
+                let wanted_us = 16.0 * wanted_us / f64::from(fixed_gain.0);
+                ((wanted_us / line_us) as u16).clamp(shortest, longest)
             }
         };
         self.gain = settings.gain.unwrap_or_else(|| {
             let sixteenths = 16.0 * wanted_us / f64::from(self.exposed().0.max(1));
             Sixteenths((sixteenths as u16).clamp(LEAST_GAIN.0, MOST_GAIN.0))
         });
+    }
+
+    /// The number of lines nearest to an exposure.
+    fn lines_of(&self, exposure: Microseconds) -> u16 {
+        let rate = self.settings.rate;
+        match self.kind {
+            Kind::Ov7725 => ov7725::lines(exposure, rate),
+            Kind::Mt9v034 => mt9v034::rows_in(exposure).clamp(1, mt9v034::longest_exposure(rate)),
+        }
     }
 
     /// Lets automatic exposure and gain adapt to the light.
