@@ -145,8 +145,9 @@ impl Browser {
         Ok(())
     }
 
-    /// Moves the pointer to a place in the page, px, and there presses or releases its first button:
-    /// `mousePressed`, `mouseMoved` or `mouseReleased`. `shift` says whether that key is held.
+    /// Moves the pointer to a place in the page, px, and there presses or releases its first
+    /// button: `mousePressed`, `mouseMoved` or `mouseReleased`. `shift` says whether that key is
+    /// held.
     ///
     /// # Errors
     /// If the browser is gone.

@@ -1,4 +1,5 @@
-//! The settings in use, as the host sees them, and rest positions as they go to a host and come back.
+//! The settings in use, as the host sees them, and rest positions as they go to a host and come
+//! back.
 
 use hivtac_sensor::force::forward::CameraMotion;
 use hivtac_sensor::force::rest::Rest;

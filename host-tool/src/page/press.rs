@@ -16,7 +16,7 @@ pub struct Press {
 /// Presses a simulated film; `None` releases it.
 pub type Hand = Box<dyn Fn(Option<Press>) + Send + Sync>;
 
-/// The true press in a frame: number of the frame; then Fx, Fy, Fz and |F|, µN; α and β, thousandths
-/// of a degree; and the place, µm along x and y, or `None` without a press.
+/// The true press in a frame: number of the frame; then Fx, Fy, Fz and |F|, µN; α and β,
+/// thousandths of a degree; and the place, µm along x and y, or `None` without a press.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Truth(pub u32, pub [i64; 4], pub [i64; 2], pub Option<[i64; 2]>);

@@ -4,9 +4,10 @@
 //! scene, course, hand → eye (renders) → device (senses, answers) → line → host
 //! ```
 //!
-//! Frames come at the camera's own rate, from the very scene that tests and calibration use. Sensing
-//! and settings are the code that the firmware runs (`hivtac-sensor`, `hivtac-device`). Only the
-//! chip is missing: its capture, its USB and its flash. So nothing is kept once the twin ends.
+//! Frames come at the camera's own rate, from the very scene that tests and calibration use.
+//! Sensing and settings are the code that the firmware runs (`hivtac-sensor`, `hivtac-device`).
+//! Only the chip is missing: its capture, its USB and its flash. So nothing is kept once the twin
+//! ends.
 //!
 //! | module | subject |
 //! |---|---|

@@ -87,8 +87,8 @@ pub fn rows_in(exposure: Microseconds) -> u16 {
     u16::try_from((clocks + row_clocks / 2) / row_clocks).unwrap_or(u16::MAX)
 }
 
-/// Time from the VSYNC edge that begins a frame to the middle of its exposure, µs: negative, because
-/// all rows' exposure ends before the first one is read.
+/// Time from the VSYNC edge that begins a frame to the middle of its exposure, µs: negative,
+/// because all rows' exposure ends before the first one is read.
 pub const fn middle_us(exposed: Microseconds) -> i32 {
     -(exposed.0 as i32) / 2
 }
