@@ -56,15 +56,12 @@ pub fn run(arguments: &TwinArguments) -> Result<(), Failure> {
         return Ok(());
     }
     let mut failed = None;
-    clock.run(
-        || stop::requested(),
-        |told| {
-            if let Some(Err(failure)) = log.as_mut().map(|log| log.write(&told)) {
-                failed = Some(failure);
-                log = None;
-            }
-        },
-    );
+    clock.run(stop::requested, |told| {
+        if let Some(Err(failure)) = log.as_mut().map(|log| log.write(&told)) {
+            failed = Some(failure);
+            log = None;
+        }
+    });
     match failed {
         Some(failure) => Err(failure),
         None => stop::check(),

@@ -5,6 +5,8 @@
 
 mod commands;
 mod tares;
+#[cfg(test)]
+mod tests;
 
 use crate::camera::{Camera, Kind};
 use crate::outbox::Outbox;
