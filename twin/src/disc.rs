@@ -21,6 +21,9 @@ const CORNERS: u32 = 48;
 const SPECK_RADIUS_MM: f64 = 0.15;
 const SPECK_CORNERS: u32 = 12;
 
+/// Roundness of images: below the first they have no centroid of use, from the second on they do.
+const ROUNDNESS: [f64; 2] = [0.2, 0.4];
+
 /// A disc drawn on the film. It moves with the film; its fields hold for the film at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
@@ -40,13 +43,24 @@ impl Disc {
     }
 
     /// Returns the centroid of the disc's image, px, on a film whose points (mm) move by
-    /// `displacement`.
+    /// `displacement`. An image without area has none: as the film turns the disc's edge, and then
+    /// its back, to the camera, this becomes the mean of the disc's rim.
     pub fn centroid_px(
         &self,
         displacement: impl Fn([f64; 2]) -> [f64; 3],
         camera: &Camera,
     ) -> [f64; 2] {
-        self.image(displacement, camera).area_and_centroid().1
+        self.image(displacement, camera).middle()
+    }
+
+    /// Returns whether a camera sees the whole disc, and not its edge, on a film whose points (mm)
+    /// move by `displacement`.
+    pub fn is_seen(&self, displacement: impl Fn([f64; 2]) -> [f64; 3], camera: &Camera) -> bool {
+        let image = self.image(displacement, camera);
+        let ([left, top], [right, bottom]) = image.bounds();
+        let [width, height] = [camera.width(), camera.height()].map(f64::from);
+        let is_inside = left.min(top) > -0.5 && right < width - 0.5 && bottom < height - 0.5;
+        is_inside && image.roundness() >= ROUNDNESS[1]
     }
 
     /// Returns the disc's image on a film whose points (mm) move by `displacement`. It is the image
@@ -129,6 +143,34 @@ impl Outline {
         }
         let centroid = [ox + mx / (3.0 * twice_area), oy + my / (3.0 * twice_area)];
         (twice_area / 2.0, centroid)
+    }
+
+    /// Returns the area in parts of that of a circle with the same perimeter; negative if the
+    /// corners are counterclockwise.
+    fn roundness(&self) -> f64 {
+        let lengths = self
+            .edges()
+            .map(|([ax, ay], [bx, by])| libm::hypot(bx - ax, by - ay));
+        let perimeter: f64 = lengths.sum();
+        4.0 * PI * self.area() / (perimeter * perimeter)
+    }
+
+    /// Returns the centroid, px; without roundness, the mean of the corners; between, a part of
+    /// each.
+    fn middle(&self) -> [f64; 2] {
+        let (_, centroid) = self.area_and_centroid();
+        let [flat, round] = ROUNDNESS;
+        let part = (self.roundness() - flat) / (round - flat);
+        if part >= 1.0 {
+            return centroid;
+        }
+        let count = self.corners.len() as f64;
+        let mean = [0, 1].map(|c| self.corners.iter().map(|at| at[c]).sum::<f64>() / count);
+        if part <= 0.0 {
+            return mean;
+        }
+        let part = part * part * (3.0 - 2.0 * part);
+        [0, 1].map(|c| mean[c] + part * (centroid[c] - mean[c]))
     }
 
     /// Returns the part of the outline inside a frame with a margin around it, px. The result has
@@ -237,5 +279,31 @@ mod tests {
             of_centre_px - radius_px > 0.1,
             "the fisheye squeezes the outer half"
         );
+    }
+
+    /// A disc that turns its edge and then its back to the camera keeps its place in the picture,
+    /// although its image has no area there; only from the front is it seen.
+    #[test]
+    fn a_disc_seen_on_edge_stays_where_it_is() {
+        let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
+        let disc = Disc::marker([7.0, -4.5]);
+        let turned = |degrees: f64| {
+            let (sin, cos) = libm::sincos(degrees.to_radians());
+            move |[x, _]: [f64; 2]| {
+                let x = x - 7.0;
+                [x * cos - x, 0.0, x * sin]
+            }
+        };
+        let mut before = disc.centroid_px(turned(0.0), &camera);
+        for degrees in 1..180 {
+            let here = disc.centroid_px(turned(f64::from(degrees)), &camera);
+            let moved = libm::hypot(here[0] - before[0], here[1] - before[1]);
+            assert!(moved < 0.1, "{degrees}°: {moved} px");
+            before = here;
+        }
+        let is_seen = |degrees: f64| disc.is_seen(turned(degrees), &camera);
+        assert!(is_seen(0.0) && !is_seen(90.0) && !is_seen(180.0));
+        let aside = |_: [f64; 2]| [4.0, 0.0, -4.0];
+        assert!(!disc.is_seen(aside, &camera));
     }
 }
