@@ -2,7 +2,8 @@
 //!
 //! Each marker has its own table, finer where the tip is near the marker. All tables share a few
 //! functions of size and tilt, which are sums of the terms. Each marker sees the tilt from its own
-//! side, but the size is the same for all; its part is computed once. A function keeps only terms
+//! side, but the size is the same for all; its part is computed once. So are the functions, for
+//! markers one after the other that see the tilt from the same side. A function keeps only terms
 //! that are even, or only terms that are odd, under a mirror at the tilt's first axis. Films are
 //! nearly symmetric there, and half of the terms are half of the work.
 
@@ -135,13 +136,11 @@ impl<'a> Tables<'a> {
         let mut sizes = Vec::new();
         self.put_sizes(pose.size, limits, &mut sizes);
         let mut functions = Vec::<Factors, MOST_FUNCTIONS>::new();
+        let mut side = None;
         for (dot, table) in self.tables().enumerate() {
-            let [a, b] = table.tilt(pose.tilt);
-            let tilts = Tilts::of(&Powers::at(a, limits), &Powers::at(b, limits));
-            functions.clear();
-            for function in &sizes {
-                // There are at most as many functions as fit.
-                let _ = functions.push(function.at(&tilts));
+            if side != Some(table.away()) {
+                side = Some(table.away());
+                put_functions(&sizes, table.tilt(pose.tilt), limits, &mut functions);
             }
             let beside_mm = beside_mm.get(dot).copied().unwrap_or_default();
             let [x, y] = [0, 1].map(|i| pose.place_mm[i] - beside_mm[i]);
@@ -167,6 +166,22 @@ impl<'a> Tables<'a> {
                 self.terms.put(parts, &sizes, of_size);
             }
         }
+    }
+}
+
+/// The functions under a tilt as a marker sees it.
+#[inline]
+fn put_functions(
+    sizes: &[OfSize],
+    [a, b]: [f32; 2],
+    limits: &Limits,
+    functions: &mut Vec<Factors, MOST_FUNCTIONS>,
+) {
+    let tilts = Tilts::of(&Powers::at(a, limits), &Powers::at(b, limits));
+    functions.clear();
+    for function in sizes {
+        // There are at most as many functions as fit.
+        let _ = functions.push(function.at(&tilts));
     }
 }
 

@@ -105,6 +105,11 @@ impl<'a> Table<'a> {
         self.functions
     }
 
+    /// The direction of the tilt's first part.
+    pub(super) fn away(&self) -> [f32; 2] {
+        self.away
+    }
+
     /// A tilt split along the table's direction and across it.
     pub fn tilt(&self, [a, b]: [f32; 2]) -> [f32; 2] {
         let [c, s] = self.away;
