@@ -103,12 +103,14 @@ impl Covariance {
             let Some(row) = rest.get_mut(..=i) else {
                 return;
             };
-            let own = square(row);
-            for j in (0..i).rev() {
+            // Zeros before the first entry need no work: factors are often diagonal.
+            let first = row.iter().take_while(|part| **part == 0.0).count();
+            let own = square(row.get(first..).unwrap_or_default());
+            for j in (first.min(i)..i).rev() {
                 let Some((before, other)) = above.split_at_mut_checked(triangle(j)) else {
                     return;
                 };
-                let products = other.iter().zip(&*row);
+                let products = other.iter().zip(&*row).skip(first);
                 let sum = products.fold(0.0, |sum, (a, b)| sum + b * a);
                 above = before;
                 if let Some(entry) = row.get_mut(j) {
@@ -293,12 +295,16 @@ pub fn between(value: f32, count: usize) -> [(usize, f32); 2] {
 pub struct Whitening {
     /// The covariance's lower factor, with the reciprocals of its diagonal on the diagonal.
     factor: Covariance,
+    /// The number of zeros that each row begins with. They need no work: noise alone is
+    /// independent between markers.
+    zeros: [u8; MOST_EQUATIONS],
 }
 
 impl Whitening {
     /// Storage without coordinates.
     pub(super) const EMPTY: Whitening = Whitening {
         factor: Covariance::EMPTY,
+        zeros: [0; MOST_EQUATIONS],
     };
 
     /// Sets the covariance, which `put` leaves in its argument. Returns `None` if it is singular,
@@ -311,24 +317,28 @@ impl Whitening {
     /// Cholesky's factor out of the covariance, in place.
     #[inline(never)]
     fn factorize(&mut self) -> Option<()> {
-        let factor = &mut self.factor;
+        let Whitening { factor, zeros } = self;
         let mut above = 0;
         for length in 1.. {
             let (finished, rest) = factor.entries.split_at_mut_checked(above)?;
             let Some(row) = rest.get_mut(..length) else {
                 break;
             };
-            let mut before = &*finished;
-            for j in 1..length {
+            let own_zeros = row.iter().take_while(|part| **part == 0.0).count();
+            *zeros.get_mut(length - 1)? = own_zeros as u8;
+            let first = own_zeros.min(length - 1);
+            let mut before = finished.get(triangle(first)..)?;
+            for j in first + 1..length {
                 let (other, below) = before.split_at_checked(j)?;
                 before = below;
                 let (own, [entry, ..]) = row.split_at_mut_checked(j - 1)? else {
                     return None;
                 };
                 let (reciprocal, other) = other.split_last()?;
-                *entry = less(*entry, own, other) * reciprocal;
+                *entry = less(*entry, own.get(first..)?, other.get(first..)?) * reciprocal;
             }
             let (diagonal, own) = row.split_last_mut()?;
+            let own = own.get(first..)?;
             let left = less(*diagonal, own, own);
             if !(f32::MIN_POSITIVE..f32::MAX).contains(&left) {
                 return None;
@@ -342,10 +352,12 @@ impl Whitening {
     /// Converts a column to these coordinates. Compiled once, because the near memory is scarce.
     #[inline(never)]
     pub fn whiten(&self, column: &mut [f32]) {
-        for row in self.factor.rows() {
-            let head = column.get_mut(..row.len());
+        for (row, zeros) in self.factor.rows().zip(self.zeros) {
+            let zeros = usize::from(zeros);
+            let head = column.get_mut(zeros..row.len());
             let head = head.and_then(<[f32]>::split_last_mut);
-            if let Some(((reciprocal, row), (here, before))) = row.split_last().zip(head) {
+            let own = row.get(zeros..).and_then(<[f32]>::split_last);
+            if let Some(((reciprocal, row), (here, before))) = own.zip(head) {
                 *here = less(*here, row, before) * reciprocal;
             }
         }
