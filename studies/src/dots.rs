@@ -20,10 +20,22 @@ use crate::press::{normal, seeded};
 
 /// Forces, mN.
 const FORCES_MN: [u32; 3] = [50, 100, 200];
-/// The largest distance of a tip from the middle along each axis, mm: of contacts, and of the
-/// tables.
-const WITHIN_MM: f64 = 4.0;
-const LAST_MM: f64 = 4.6;
+/// Areas of contacts, and the errors wanted of eight dots at 100 mN without a dot lost.
+const AREAS: [Area; 3] = [
+    Area {
+        within_mm: 4.0,
+        wanted: [0.11, 0.06, 6.0],
+    },
+    Area {
+        within_mm: 6.0,
+        wanted: [0.14, 0.12, 8.0],
+    },
+    Area {
+        within_mm: 8.0,
+        wanted: [0.25, 0.35, 16.0],
+    },
+];
+const WANTED_MN: u32 = 100;
 /// Tilts of a force, degrees.
 const TILT_DEG: f64 = 8.0;
 /// Noise of each coordinate of a centroid, px: what the simulated camera's frames have.
@@ -49,9 +61,19 @@ pub struct DotsStudy {
     json: bool,
 }
 
+/// An area of contacts.
+#[derive(Clone, Copy, Serialize)]
+struct Area {
+    /// The largest distance from the middle along each axis, mm.
+    within_mm: f64,
+    /// The wanted errors, root mean square: direction, degrees; |F|, mN; place, µm.
+    wanted: [f64; 3],
+}
+
 /// The results for contacts within an area.
 #[derive(Serialize)]
 struct Row {
+    area: Area,
     force_mn: u32,
     /// Number of dots that are not seen.
     lost: u32,
@@ -62,6 +84,9 @@ struct Row {
     /// Root mean square of the errors of |F|, mN, and of the place, µm.
     magnitude_mn: f64,
     place_um: f64,
+    /// The stated standard uncertainties, root mean square, in the same units: direction, |F|,
+    /// place.
+    stated: [f64; 3],
     /// Percentage within the stated 95 %: direction, |F|, place.
     within: [f64; 3],
 }
@@ -90,10 +115,16 @@ impl DotsStudy {
         }
         let mut text = format!(
             "{about}\n\n\
-             | dots lost | force | explained | direction, rms and 95 % | \\|F\\| | place | \
-             within the stated 95 %: direction, \\|F\\|, place |\n\
-             |--:|--:|--:|--:|--:|--:|--:|\n"
+             | {WANTED_MN} mN, all dots seen | direction, wanted | \\|F\\|, wanted | \
+             place, wanted |\n|--:|--:|--:|--:|\n"
         );
+        let of_wanted = rows
+            .iter()
+            .filter(|row| row.force_mn == WANTED_MN && row.lost == 0);
+        text.extend(of_wanted.map(Row::beside_wanted));
+        text += "\n| within | dots lost | force | explained | direction, rms and 95 % | \\|F\\| | \
+                 place | stated | within the stated 95 % |\n\
+                 |--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
         text.extend(rows.iter().map(Row::line));
         print!("{text}");
         page::write("dots.md", include_str!("dots.md"), &text)
@@ -102,7 +133,7 @@ impl DotsStudy {
     /// The results at these forces, mN, and a sentence about the tables.
     fn rows(&self, forces_mn: &[u32]) -> Result<(Vec<Row>, String)> {
         let camera = Camera::new(Preset::Ov7725, 320, 240)?;
-        let (spec, left) = of_layout(self.layout, LAST_MM, STEPS, NOISE_PX, &camera)?;
+        let (spec, left) = of_layout(self.layout, STEPS, NOISE_PX, &camera)?;
         let bytes = spec.to_bytes();
         let forward = Forward::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let dots = forward.tables.dots();
@@ -120,25 +151,32 @@ impl DotsStudy {
             },
             forward,
         };
-        let cases = [0, 1].map(|lost| forces_mn.iter().map(move |force_mn| (*force_mn, lost)));
-        let cases = cases.into_iter().flatten();
-        let rows = cases.map(|(force_mn, lost)| self.row(&bench, force_mn, lost));
-        Ok((rows.collect::<Result<_>>()?, about))
+        let mut rows = Vec::new();
+        let most_mm = bench.film.most_place_mm();
+        for area in AREAS.iter().filter(|area| area.within_mm <= most_mm) {
+            for lost in [0, 1] {
+                for force_mn in forces_mn {
+                    rows.push(self.row(&bench, area, *force_mn, lost)?);
+                }
+            }
+        }
+        Ok((rows, about))
     }
 
-    fn row(&self, bench: &Bench<'_>, force_mn: u32, lost: u32) -> Result<Row> {
+    fn row(&self, bench: &Bench<'_>, area: &Area, force_mn: u32, lost: u32) -> Result<Row> {
         let contacts = (0..self.contacts).into_par_iter();
         let found = contacts.map(|number| {
             let number = u64::from(number) + 1_000 * u64::from(force_mn);
-            bench.contact(number, f64::from(force_mn) * 1e-3, lost)
+            bench.contact(number, area, f64::from(force_mn) * 1e-3, lost)
         });
         let all = found.collect::<Result<Vec<Option<Found>>>>()?;
         let found: Vec<&Found> = all.iter().flatten().collect();
         let count = found.len().max(1) as f64;
-        let rms = |k: usize| {
-            let squares = found.iter().map(|found| found.errors[k] * found.errors[k]);
+        let root_mean_square = |of: &dyn Fn(&Found) -> f64| {
+            let squares = found.iter().map(|found| of(found) * of(found));
             (squares.sum::<f64>() / count).sqrt()
         };
+        let rms = |k: usize| root_mean_square(&|found| found.errors[k]);
         let mut directions: Vec<f64> = found.iter().map(|found| found.errors[0]).collect();
         directions.sort_by(f64::total_cmp);
         let last = directions.get(directions.len() * 95 / 100).copied();
@@ -147,12 +185,14 @@ impl DotsStudy {
             100.0 * within.count() as f64 / count
         };
         Ok(Row {
+            area: *area,
             force_mn,
             lost,
             kept: 100.0 * found.len() as f64 / f64::from(self.contacts),
             direction_deg: [rms(0), last.context("no contact is explained")?],
             magnitude_mn: rms(1),
             place_um: rms(2),
+            stated: [0, 1, 2].map(|k| root_mean_square(&|found| found.stated(k))),
             within: [0, 1, 2].map(is_within),
         })
     }
@@ -160,11 +200,11 @@ impl DotsStudy {
 
 impl Bench<'_> {
     /// The answer to a contact; `None` if none explains the dots.
-    fn contact(&self, number: u64, force_n: f64, lost: u32) -> Result<Option<Found>> {
+    fn contact(&self, number: u64, area: &Area, force_n: f64, lost: u32) -> Result<Option<Found>> {
         let mut random = seeded(number);
         let mut between = |most: f64| random.random_range(-most..most);
         let [alpha, beta] = [TILT_DEG; 2].map(&mut between);
-        let place_mm = [WITHIN_MM; 2].map(&mut between);
+        let place_mm = [area.within_mm; 2].map(&mut between);
         let load = Load::from_angles(force_n, alpha, beta)?.with_offset_mm(place_mm)?;
         let setup = UnitSetup {
             unit: Unit::default(),
@@ -173,16 +213,21 @@ impl Bench<'_> {
         };
         let dots = self.forward.tables.dots();
         let mut moved = Column::defaults(2 * dots);
-        for (dot, moved) in moved.as_chunks_mut().0.iter_mut().enumerate() {
-            let seen = setup.moved_by(&self.film, &load, dot)?;
-            let noise = self.mounting.scale() as f64 * NOISE_PX;
-            *moved = seen.map(|part| (part + noise * normal(&mut random)) as f32);
+        let mut seen: Vec<bool> = (0..dots)
+            .map(|dot| setup.sees(&self.film, &load, dot))
+            .collect();
+        for _ in 0..lost {
+            seen[random.random_range(0..dots)] = false;
         }
         let variance = (self.mounting.scale() * NOISE_PX as f32).powi(2);
         let noise = List::from_fn(dots, |_| [variance, 0.0, variance]);
-        let mut unseen = Lost::NONE;
-        for _ in 0..lost {
-            unseen = unseen.and(random.random_range(0..dots));
+        let unseen = (0..dots).filter(|dot| !seen[*dot]);
+        let unseen = unseen.fold(Lost::NONE, Lost::and);
+        for (dot, moved) in moved.as_chunks_mut().0.iter_mut().enumerate() {
+            let motion = setup.moved_by(&self.film, &load, dot)?;
+            let noise = self.mounting.scale() as f64 * NOISE_PX;
+            let measured = motion.map(|part| (part + noise * normal(&mut random)) as f32);
+            *moved = if seen[dot] { measured } else { [0.0; 2] };
         }
         let observed = Observed {
             moved,
@@ -225,22 +270,44 @@ impl Bench<'_> {
 }
 
 impl Found {
-    /// The largest error within the stated 95 %. For direction and place, of two axes each, the
-    /// sensor states what 95 of 100 errors are within 1.731 times of, and for each axis.
-    fn limit(&self, k: usize) -> f64 {
-        let times = [1.731, WITHIN_95, 1.731 * std::f64::consts::SQRT_2];
+    /// The stated standard uncertainty, of both axes together for direction and place; the sensor
+    /// states that of a place for each axis.
+    fn stated(&self, k: usize) -> f64 {
+        let times = [1.0, 1.0, std::f64::consts::SQRT_2];
         times[k] * self.sigma[k]
+    }
+
+    /// The largest error within the stated 95 %. Of two axes, 95 of 100 errors are within 1.731
+    /// times what is stated.
+    fn limit(&self, k: usize) -> f64 {
+        [1.731, WITHIN_95, 1.731][k] * self.stated(k)
     }
 }
 
 impl Row {
     fn line(&self) -> String {
         let [rms, last] = self.direction_deg;
+        let [direction_deg, magnitude_mn, place_um] = self.stated;
         let [direction, magnitude, place] = self.within;
         format!(
-            "| {} | {} mN | {:.1} % | {rms:.3}°, {last:.3}° | {:.3} mN | {:.1} µm | \
+            "| ±{} mm | {} | {} mN | {:.1} % | {rms:.3}°, {last:.3}° | {:.3} mN | {:.1} µm | \
+             {direction_deg:.3}°, {magnitude_mn:.3} mN, {place_um:.1} µm | \
              {direction:.0}, {magnitude:.0}, {place:.0} % |\n",
-            self.lost, self.force_mn, self.kept, self.magnitude_mn, self.place_um,
+            self.area.within_mm,
+            self.lost,
+            self.force_mn,
+            self.kept,
+            self.magnitude_mn,
+            self.place_um,
+        )
+    }
+
+    fn beside_wanted(&self) -> String {
+        let ([rms, _], [direction, magnitude, place]) = (self.direction_deg, self.area.wanted);
+        format!(
+            "| ±{} mm | {rms:.3}°, {direction}° | {:.3} mN, {magnitude} mN | {:.1} µm, {place} µm \
+             |\n",
+            self.area.within_mm, self.magnitude_mn, self.place_um,
         )
     }
 }
@@ -249,29 +316,28 @@ impl Row {
 mod tests {
     use super::*;
 
-    /// Contacts are found without a network, with an honest uncertainty; also with a dot lost.
+    /// Contacts are found without a network, with an honest uncertainty; also with a dot lost, and
+    /// near the film's edge, where few of them make most of the mean square.
     #[test]
     fn eight_dots_tell_a_contact() {
         let study = DotsStudy {
             layout: "8v".parse().unwrap(),
-            contacts: 40,
+            contacts: 60,
             json: true,
         };
-        for row in study.rows(&[100]).unwrap().0 {
-            let Row {
-                kept,
-                direction_deg: [rms, _],
-                magnitude_mn,
-                place_um,
-                within,
-                ..
-            } = row;
-            assert!(kept >= 97.0, "{kept} %");
+        for row in study.rows(&[WANTED_MN]).unwrap().0 {
+            let (within_mm, wanted) = (row.area.within_mm, row.area.wanted);
+            let rms = [row.direction_deg[0], row.magnitude_mn, row.place_um];
+            assert!(row.kept >= 95.0, "±{within_mm} mm: {} %", row.kept);
+            for (rms, wanted) in rms.into_iter().zip(wanted) {
+                let times = if within_mm > 6.0 { 2.0 } else { 1.5 };
+                assert!(rms < times * wanted, "±{within_mm} mm: {rms}, {wanted}");
+            }
             assert!(
-                rms < 0.15 && magnitude_mn < 0.1 && place_um < 8.0,
-                "{rms} {magnitude_mn}"
+                row.within.iter().all(|part| *part >= 88.0),
+                "{:?}",
+                row.within
             );
-            assert!(within.iter().all(|part| *part >= 85.0), "{within:?}");
         }
     }
 }

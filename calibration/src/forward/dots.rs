@@ -1,28 +1,37 @@
 //! The film run forwards for any layout of dots: its tables come from those of the whole film, so
 //! that a layout needs no new finite elements.
 
-use anyhow::Result;
-use hivtac_sensor::force::forward::{Markers, Noise, Stiffness};
-use hivtac_sensor::force::model::ForwardSpec;
+use anyhow::{Result, anyhow};
+use hivtac_sensor::force::forward::{
+    Forward, Markers, Noise, Pose as ChipPose, Stiffness, between,
+};
+use hivtac_sensor::force::model::{CovarianceSpec, ForwardSpec};
 use hivtac_twin::Camera;
-use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Unit};
+use hivtac_twin::film::reduced::{LARGEST_SIZE, NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::film::{Film, Layout};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
-use super::tables::{Dot, UnitSetup, tables};
+use super::tables::{Dot, STEEP_COUNTS_LESS, UnitSetup, tables};
 use super::{limits, rest_image};
 
 /// Nodes of a dot's table along each axis.
 const NODES: usize = 16;
+/// Knots along the size, y and x of the tables' own error.
+const KNOTS: [usize; 3] = [4, 4, 4];
+/// Loads by which that error is measured, and their largest tilt along each axis, rad.
+const LOADS: u64 = 6_000;
+const TILT: f64 = 0.2;
 
-/// The nominal film with the dots of a layout, under a needle within ±`last_mm` along each axis.
-/// Also the error of its tables, root mean square, focal lengths. `noise_px` is that of a dot's
-/// coordinates, px of the camera.
+/// The nominal film with the dots of a layout, under a needle anywhere that it may press. Also the
+/// error of its tables, root mean square over loads as steep as the film allows, focal lengths.
+/// `noise_px` is that of a dot's coordinates, px of the camera.
 ///
 /// # Errors
 /// When the motion does not fit into tables.
 pub fn of_layout(
     layout: Layout,
-    last_mm: f64,
     steps: u8,
     noise_px: f64,
     camera: &Camera,
@@ -33,14 +42,15 @@ pub fn of_layout(
         tip_radius_mm: NOMINAL_RADIUS_MM,
         camera,
     };
-    let places_mm = film.markers_mm();
+    let (places_mm, last_mm) = (film.markers_mm(), film.most_place_mm());
     let dots = places_mm
         .iter()
         .map(|place| Dot::within(*place, NODES, last_mm));
     let dots: Vec<Dot> = dots.collect();
-    let (tables, left) = tables(&dots, |pose, dot| setup.moved(&film, pose, dot))?;
+    let moved = |pose: &Pose, dot| setup.moved(&film, pose, dot);
+    let (tables, left) = tables(&dots, moved, STEEP_COUNTS_LESS)?;
     let [linear_n, cubic_n] = setup.stiffness_n().map(|part| part as f32);
-    let spec = ForwardSpec {
+    let mut spec = ForwardSpec {
         steps,
         limits: limits(),
         stiffness: Stiffness { linear_n, cubic_n },
@@ -56,5 +66,94 @@ pub fn of_layout(
         other: None,
         weight: None,
     };
+    let bytes = spec.to_bytes();
+    let chip = Forward::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
+    spec.own = Some(errors(&chip, &setup, &film)?);
     Ok((spec, left))
+}
+
+/// The error that a chip's tables leave in each coordinate, by size and place, as the covariance of
+/// independent errors. It is that of usual loads, and of dots that a camera sees.
+fn errors(chip: &Forward<'_>, setup: &UnitSetup<'_>, film: &Film) -> Result<CovarianceSpec> {
+    let last_mm = film.most_place_mm();
+    let left = (0..LOADS).into_par_iter().map(|number| {
+        let pose = drawn(number, last_mm);
+        Ok((pose, left(chip, setup, film, &pose)?))
+    });
+    let left = left.collect::<Result<Vec<_>>>()?;
+    let [sizes, lines, places] = KNOTS;
+    let coordinates = 2 * chip.tables.dots();
+    let mut sums = vec![vec![[0.0; 2]; coordinates]; sizes * lines * places];
+    for (pose, left) in &left {
+        let size = (pose.size / LARGEST_SIZE).sqrt();
+        let [x, y] = pose.place_mm.map(|part| 0.5 + 0.5 * part / last_mm);
+        for (i, of_size) in between(size as f32, sizes) {
+            for (j, of_y) in between(y as f32, lines) {
+                for (k, of_x) in between(x as f32, places) {
+                    let weight = f64::from(of_size * of_y * of_x);
+                    let knot = &mut sums[(i * lines + j) * places + k];
+                    for ([sum, whole], left) in knot.iter_mut().zip(left) {
+                        if let Some(left) = left {
+                            *sum += weight * left * left;
+                            *whole += weight;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    let factor = |knot: &Vec<[f64; 2]>| {
+        let row = |(c, [sum, whole]): (usize, &[f64; 2])| {
+            let mut row = vec![0.0; coordinates];
+            row[c] = if *whole > 0.0 {
+                (sum / whole).sqrt()
+            } else {
+                0.0
+            };
+            row
+        };
+        knot.iter().enumerate().map(row).collect()
+    };
+    Ok(CovarianceSpec {
+        counts: KNOTS.map(|count| count as u8),
+        end_mm: last_mm as f32,
+        factors: sums.iter().map(factor).collect(),
+    })
+}
+
+/// A usual load.
+fn drawn(number: u64, last_mm: f64) -> Pose {
+    let mut random = ChaCha8Rng::seed_from_u64(number);
+    let root: f64 = random.random();
+    let mut within = |most: f64| random.random_range(-most..most);
+    Pose {
+        size: LARGEST_SIZE * root * root,
+        tilt: [TILT; 2].map(&mut within),
+        place_mm: [last_mm; 2].map(&mut within),
+    }
+}
+
+/// What a chip's tables leave of the motion under a load, by coordinate, focal lengths; `None` for
+/// dots that the camera does not see.
+fn left(
+    chip: &Forward<'_>,
+    setup: &UnitSetup<'_>,
+    film: &Film,
+    pose: &Pose,
+) -> Result<Vec<Option<f64>>> {
+    let load = setup.load(pose)?;
+    let at = ChipPose {
+        size: pose.size as f32,
+        tilt: pose.tilt.map(|part| part as f32),
+        place_mm: pose.place_mm.map(|part| part as f32),
+    };
+    let nowhere = Markers::defaults(chip.tables.dots());
+    let told = chip.tables.predict(&at, &chip.limits, &nowhere);
+    let mut all = Vec::new();
+    for dot in 0..chip.tables.dots() {
+        let moved = setup.moved_by(film, &load, dot)?;
+        let is_seen = setup.sees(film, &load, dot);
+        all.extend([0, 1].map(|i| is_seen.then(|| moved[i] - f64::from(told.moved[2 * dot + i]))));
+    }
+    Ok(all)
 }

@@ -31,7 +31,8 @@ pub struct Sampled {
 
 /// The tables of markers with this motion, with the fewest functions of size and tilt whose error
 /// is at most `left`. That is root mean square over loads, places and directions, in focal lengths.
-/// With `most` functions where more would be needed. Also returns the remaining error.
+/// With `most` functions where more would be needed. Also returns the remaining error. Loads of the
+/// largest tilt weigh less than those without by a factor of 1 + `steep`.
 ///
 /// # Errors
 /// When an axis has invalid nodes.
@@ -40,10 +41,11 @@ pub fn compressed(
     dots: &[Sampled],
     left: f64,
     most: usize,
+    steep: f64,
 ) -> Result<(TablesSpec, f64)> {
     let terms = Terms::with_sizes(sizes);
     let odd = odd_terms(sizes);
-    let metric = cholesky(apart(gram(&terms), &odd));
+    let metric = cholesky(apart(gram(&terms, steep), &odd));
     let components = components(apart(squares(dots, &metric, terms.count()), &odd), &odd);
     let mut square: f64 = components.iter().map(|own| own.square.max(0.0)).sum();
     let mut count = 0;
@@ -146,15 +148,21 @@ fn table(dot: &Sampled, metric: &[Vec<f64>], kept: &[&[f64]]) -> Result<TableSpe
 }
 
 /// Mean products of terms over typical loads: with them, sums of terms are as large as the motions.
-fn gram(terms: &Terms) -> Vec<Vec<f64>> {
+fn gram(terms: &Terms, steep: f64) -> Vec<Vec<f64>> {
     let count = terms.count();
     let mut sum = vec![vec![0.0; count]; count];
     let loads = loads();
+    let weight = |pose: &Pose| {
+        let [a, b] = pose.tilt.map(|part| part / LARGEST_TILT);
+        let less = 1.0 + steep * (a * a + b * b);
+        1.0 / (less * less)
+    };
+    let whole: f64 = loads.iter().map(weight).sum();
     for pose in &loads {
         let [values, ..] = terms.rows(pose);
         for (row, a) in sum.iter_mut().zip(&values) {
             for (sum, b) in row.iter_mut().zip(&values) {
-                *sum += a * b / loads.len() as f64;
+                *sum += weight(pose) * a * b / whole;
             }
         }
     }

@@ -19,6 +19,8 @@ const FILM_NODES_MM: [f64; 16] = [
 /// Distance from the marker, mm, at which the spacing of other nodes is twice that at the marker.
 /// The spacing grows with the distance.
 const TWICE_MM: f64 = 2.0;
+/// The same for tables that reach to the film's edge.
+const TWICE_WIDE_MM: f64 = 0.8;
 /// Number of powers of size in the terms without tilt, of its first degree, and higher degrees.
 const TERMS: [u8; MOST_TILTS] = [8, 6, 5, 4, 3];
 /// The error allowed to functions of size and tilt, root mean square, focal lengths: 0.0022 px at
@@ -27,7 +29,7 @@ const LEFT: f64 = 0.0022 / 175.0;
 /// The most functions, for files that fit into a device.
 const FUNCTIONS: usize = 16;
 /// Samples of the largest tilt weigh less than those without tilt by this factor plus one.
-const STEEP_COUNTS_LESS: f64 = 12.0;
+pub(super) const STEEP_COUNTS_LESS: f64 = 12.0;
 /// Keeps loads within the film's own limits, in spite of rounding.
 const WITHIN: f64 = 1.0 - 1e-6;
 
@@ -44,11 +46,7 @@ pub struct UnitSetup<'a> {
 impl UnitSetup<'_> {
     /// Motion of a marker's image under a load, focal lengths.
     pub fn moved(&self, film: &Film, pose: &Pose, marker: usize) -> Result<[f64; 2]> {
-        let force_n = self.force_n(pose);
-        let load = Load::from_vector(force_n.map(|part| WITHIN * part))?
-            .with_offset_mm(pose.place_mm)?
-            .with_tip_radius_mm(self.tip_radius_mm)?;
-        self.moved_by(film, &load, marker)
+        self.moved_by(film, &self.load(pose)?, marker)
     }
 
     /// The same for a load given by its force.
@@ -61,6 +59,22 @@ impl UnitSetup<'_> {
         let here = disc.centroid_px(|_| [0.0; 3], self.camera);
         let focal_px = self.camera.focal_px();
         Ok([0, 1].map(|i| (there[i] - here[i]) / focal_px))
+    }
+
+    /// Whether the camera sees a marker whole, and not its edge, under a load.
+    pub fn sees(&self, film: &Film, load: &Load, marker: usize) -> bool {
+        let disc = Disc::marker(film.markers_mm()[marker]);
+        let [x, y] = disc.centre_mm;
+        let motion = film.marker_motion(load, marker);
+        disc.is_seen(|[px, py]| motion.at([px - x, py - y]), self.camera)
+    }
+
+    /// The load of a pose.
+    pub fn load(&self, pose: &Pose) -> Result<Load> {
+        let force_n = self.force_n(pose);
+        Ok(Load::from_vector(force_n.map(|part| WITHIN * part))?
+            .with_offset_mm(pose.place_mm)?
+            .with_tip_radius_mm(self.tip_radius_mm)?)
     }
 
     /// The force of a pose on this unit's film, N.
@@ -88,7 +102,7 @@ impl UnitSetup<'_> {
     pub fn tables(&self) -> Result<(TablesSpec, f64)> {
         let film = Film::of(self.unit)?;
         let dots = film.markers_mm().array::<4>().map(Dot::of_film);
-        tables(&dots, |pose, dot| self.moved(&film, pose, dot))
+        tables(&dots, |pose, dot| self.moved(&film, pose, dot), 0.0)
     }
 }
 
@@ -99,19 +113,27 @@ pub struct Dot {
     pub place_mm: [f64; 2],
     /// Places of the tip along x and along y at which its motion is sampled, mm, ascending.
     pub nodes_mm: [Vec<f64>; 2],
+    /// Unit vector along which it sees the first part of a tilt.
+    pub away: [f64; 2],
 }
 
 impl Dot {
     /// At a place, with `count` nodes (6 to 16) along each axis, closer together near it.
     pub fn new(place_mm: [f64; 2], count: usize) -> Dot {
-        Dot::within(place_mm, count, MAX_PLACE_MM)
+        Dot {
+            place_mm,
+            nodes_mm: place_mm.map(|part| nodes_near(part, count, MAX_PLACE_MM, TWICE_MM)),
+            away: from_middle(place_mm),
+        }
     }
 
-    /// As [`Dot::new`], for tips within ±`last_mm` along each axis.
+    /// As [`Dot::new`], for tips within ±`last_mm` along each axis. All such dots see tilts along
+    /// the film's axes, so that a chip computes the functions of a load once for all.
     pub fn within(place_mm: [f64; 2], count: usize, last_mm: f64) -> Dot {
         Dot {
             place_mm,
-            nodes_mm: place_mm.map(|part| nodes_near(part, count, last_mm)),
+            nodes_mm: place_mm.map(|part| nodes_near(part, count, last_mm, TWICE_WIDE_MM)),
+            away: [1.0, 0.0],
         }
     }
 
@@ -128,24 +150,25 @@ impl Dot {
         Dot {
             place_mm,
             nodes_mm: place_mm.map(nodes),
-        }
-    }
-
-    /// Unit vector from the film's middle; along x in the middle.
-    fn away(&self) -> [f64; 2] {
-        let [x, y] = self.place_mm;
-        let far = libm::hypot(x, y);
-        match far > 0.0 {
-            true => [x / far, y / far],
-            false => [1.0, 0.0],
+            away: from_middle(place_mm),
         }
     }
 }
 
-/// Nodes with even steps of a measure that is densest at a place.
-fn nodes_near(place_mm: f64, count: usize, last_mm: f64) -> Vec<f64> {
+/// Unit vector from the film's middle; along x in the middle.
+fn from_middle([x, y]: [f64; 2]) -> [f64; 2] {
+    let far = libm::hypot(x, y);
+    match far > 0.0 {
+        true => [x / far, y / far],
+        false => [1.0, 0.0],
+    }
+}
+
+/// Nodes within ±`last_mm`, with even steps of a measure that is densest at a place; at
+/// `twice_mm` from there, the spacing is twice as large.
+fn nodes_near(place_mm: f64, count: usize, last_mm: f64, twice_mm: f64) -> Vec<f64> {
     let measure = |at_mm: f64| {
-        let far = (at_mm - place_mm).abs() / TWICE_MM;
+        let far = (at_mm - place_mm).abs() / twice_mm;
         libm::log1p(far).copysign(at_mm - place_mm)
     };
     let (last, [from, to]) = (count - 1, [-last_mm, last_mm].map(measure));
@@ -154,22 +177,25 @@ fn nodes_near(place_mm: f64, count: usize, last_mm: f64) -> Vec<f64> {
         k if k == last => last_mm,
         k => {
             let measure = from + (to - from) * k as f64 / last as f64;
-            place_mm + (TWICE_MM * libm::expm1(measure.abs())).copysign(measure)
+            place_mm + (twice_mm * libm::expm1(measure.abs())).copysign(measure)
         }
     };
     (0..count).map(at).collect()
 }
 
 /// The tables of markers whose image motion under a load is `moved`, by marker number, focal
-/// lengths. Also their error, root mean square over loads and places, focal lengths.
+/// lengths. Also their error, root mean square over loads and places, focal lengths. Among those,
+/// loads of the largest tilt weigh less than those without by a factor of 1 + `steep`.
 ///
 /// # Errors
 /// When a sample cannot be computed, or the tables cannot hold the motion.
 pub fn tables(
     dots: &[Dot],
     moved: impl Fn(&Pose, usize) -> Result<[f64; 2]> + Sync,
+    steep: f64,
 ) -> Result<(TablesSpec, f64)> {
-    compressed(TERMS, &samples(dots, moved, TERMS)?, LEFT, FUNCTIONS)
+    let samples = samples(dots, moved, TERMS)?;
+    compressed(TERMS, &samples, LEFT, FUNCTIONS, steep)
 }
 
 /// The coefficients of terms at the nodes of each marker.
@@ -186,7 +212,7 @@ fn samples(
     let rows: Vec<Vec<f64>> = loads.iter().map(weighted_row).collect();
     let least_squares = LeastSquares::new(&rows)?;
     let sampled = |(number, dot): (usize, &Dot)| -> Result<Sampled> {
-        let away = dot.away();
+        let away = dot.away;
         let at = |place_mm: [f64; 2]| -> Result<[Vec<f64>; 2]> {
             let seen = loads.iter().map(|pose| {
                 let tilt = turned(away, pose.tilt);

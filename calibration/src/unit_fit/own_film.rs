@@ -232,7 +232,7 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
         .collect();
     // A node's coefficients give all its loads, which are queried one after the other.
     let known: Mutex<HashMap<[u64; 3], Coefficients>> = Mutex::default();
-    tables(&dots, |pose, number| {
+    let moved = |pose: &Pose, number: usize| {
         let [x, y] = pose.place_mm.map(f64::to_bits);
         let key = [number as u64, x, y];
         let poisoned = |_| anyhow::anyhow!("a thread stopped");
@@ -247,7 +247,8 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
         };
         let [values, ..] = field.terms().rows(pose);
         Ok(coefficients.each_ref().map(|row| dot(row, &values)))
-    })
+    };
+    tables(&dots, moved, 0.0)
 }
 
 /// Covariances of how the unit's dots move, as the loads leave them open. `beside` is an

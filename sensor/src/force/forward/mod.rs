@@ -25,7 +25,6 @@
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 //! | `three` | the same while a marker is lost |
 
-use covariance::between;
 use pose::limited;
 
 mod axis;
@@ -45,7 +44,9 @@ mod three;
 pub mod weight;
 
 pub use axis::{Axis, NODES};
-pub use covariance::{Covariance, CovarianceGrid, KNOTS, LARGEST_STEP, Unknown, Whitening};
+pub use covariance::{
+    Covariance, CovarianceGrid, KNOTS, LARGEST_STEP, Unknown, Whitening, between,
+};
 pub use descent::Descent;
 pub use drift::Drift;
 pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, stated};
