@@ -19,7 +19,7 @@ use hivtac_twin::{Load, Options, Paint, Patch, Scene};
 
 static FILE: LazyLock<Vec<u8>> = LazyLock::new(|| {
     let layout = "8v".parse().unwrap();
-    layout_model(layout, 4.6, 2).unwrap().encode().unwrap()
+    layout_model(layout, 2).unwrap().encode().unwrap()
 });
 
 fn model() -> Model<'static> {

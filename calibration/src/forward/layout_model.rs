@@ -17,7 +17,7 @@ use hivtac_terms::geometry::Geometry;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
-use hivtac_twin::film::Layout;
+use hivtac_twin::film::{Film, Layout};
 use hivtac_twin::{Load, MarkerTruth, Options, Preset, Scene};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -41,15 +41,16 @@ const EDGE_PX: f64 = 2.8;
 const LARGEST_FORCE: MicroNewtons = MicroNewtons(250_000);
 const LARGEST_ANGLE: MilliDegrees = MilliDegrees(12_000);
 
-/// The model of a layout on the nominal film, for presses within ±`last_mm` along each axis, seen by
-/// the camera `ov7725` at 320 × 240 in RGB565.
+/// The model of a layout on the nominal film, for presses anywhere on the film's tables, seen by the
+/// camera `ov7725` at 320 × 240 in RGB565.
 ///
 /// # Errors
 /// If the motion does not fit into tables, or the dots are not seen in frames of the untouched film.
-pub fn layout_model(layout: Layout, last_mm: f64, steps: u8) -> Result<ModelSpec> {
+pub fn layout_model(layout: Layout, steps: u8) -> Result<ModelSpec> {
+    let last_mm = Film::default().with_layout(layout)?.most_place_mm();
     let scene = layout_scene(layout)?;
     let camera = scene.camera();
-    let (forward, _) = of_layout(layout, last_mm, steps, NOISE_PX, camera)?;
+    let (forward, _) = of_layout(layout, steps, NOISE_PX, camera)?;
     let conditions = conditions();
     let spec = ModelSpec {
         conditions,
