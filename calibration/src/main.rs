@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 use commands::data::DatasetArgs;
 use commands::default_model::DefaultModelArgs;
+use commands::layout::LayoutArgs;
 use commands::model::{CheckArgs, EvaluateArgs, ExportArgs};
 use commands::network::{FilmArgs, TrainArgs, UnitArgs};
 use hivtac_calibration::data::collect::CollectCommand;
@@ -44,6 +45,9 @@ enum Command {
     /// Measure freshly rendered frames with a model file and print how far its forces are from the
     /// truth.
     Check(CheckArgs),
+    /// The model file of the nominal sensor with another layout of dots, for presses anywhere on the
+    /// film. It has no network: its steps begin where the dots moved most.
+    Layout(LayoutArgs),
     /// Dataset, train, film, export and check in one, for the model that firmware and host tool
     /// embed: a tip anywhere within ±4 mm.
     DefaultModel(DefaultModelArgs),
@@ -61,6 +65,7 @@ fn main() -> Result<()> {
         Command::Train(args) => args.run(),
         Command::Film(args) => args.run(),
         Command::Check(args) => args.run(),
+        Command::Layout(args) => args.run(),
         Command::DefaultModel(args) => args.run(),
     }
 }

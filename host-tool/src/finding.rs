@@ -10,6 +10,9 @@ use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
+/// The markers 0 to 3 of four.
+const CORNERS: [&str; 4] = ["upper left", "upper right", "lower right", "lower left"];
+
 /// Everything found in one picture. Positions are in pixels, exact, with 16 binary places.
 #[derive(Serialize)]
 pub struct Finding<'a> {
@@ -94,9 +97,15 @@ impl<'a> Finding<'a> {
         blobs: &[Blob],
         measurement: Measurement,
     ) -> Finding<'a> {
-        let markers = measurement.markers.as_deref().map(MarkerJson::all);
+        let markers = measurement.markers.as_deref().map(|markers| {
+            let mut all = MarkerJson::all(markers);
+            all.retain(|marker| !measurement.lost.contains(marker.id));
+            all
+        });
+        // The paper's features are those of four markers.
         let features = measurement
             .features
+            .filter(|features| features.centroids.len() == CORNERS.len())
             .map(|features| features.to_array().map(|number| number.to_f64()).to_vec());
         Finding {
             image,
@@ -179,10 +188,12 @@ impl<'a> Finding<'a> {
         let Some(markers) = &self.markers else {
             return vec!["  markers   none".to_owned()];
         };
-        const CORNERS: [&str; 4] = ["upper left", "upper right", "lower right", "lower left"];
-        let lines = markers.iter().zip(CORNERS).map(|(marker, corner)| {
+        let is_square = markers.len() == CORNERS.len();
+        let lines = markers.iter().map(|marker| {
             let MarkerJson { id, x, y, area } = marker;
-            format!("  marker {id}  {corner:<12} ({x:.3}, {y:.3}), area {area}")
+            let corner = CORNERS.get(*id).filter(|_| is_square);
+            let corner = corner.map_or(String::new(), |corner| format!("{corner:<12} "));
+            format!("  marker {id}  {corner}({x:.3}, {y:.3}), area {area}")
         });
         lines.collect()
     }

@@ -182,7 +182,7 @@ impl<'a> Bench<'a> {
             None => {
                 let status: Vec<_> = measurement.status.names().collect();
                 Err(Failure::input(format!(
-                    "the tare picture {path} does not show the four markers ({}); look at it with \
+                    "the tare picture {path} does not show all markers ({}); look at it with \
                      `hivtac sense {path}`",
                     status.join(" ")
                 )))

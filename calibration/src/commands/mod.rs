@@ -2,5 +2,6 @@
 
 pub mod data;
 pub mod default_model;
+pub mod layout;
 pub mod model;
 pub mod network;

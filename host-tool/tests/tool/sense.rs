@@ -296,7 +296,7 @@ fn a_tare_takes_its_status_bit_away() {
     assert!(
         failed
             .stderr
-            .contains("does not show the four markers (image_dark "),
+            .contains("does not show all markers (image_dark "),
         "{}",
         failed.stderr
     );

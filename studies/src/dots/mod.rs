@@ -1,5 +1,7 @@
 //! Measures what another layout of dots tells of a contact: the film run forwards for its dots, on
-//! contacts of the simulated film, without frames.
+//! contacts of the simulated film; and frames of it.
+
+mod frames;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
@@ -56,6 +58,9 @@ pub struct DotsStudy {
     /// Contacts of each row.
     #[arg(long, default_value_t = 400)]
     contacts: u32,
+    /// Frames of each row about faults.
+    #[arg(long, default_value_t = 800)]
+    frames: u32,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
@@ -93,6 +98,7 @@ struct Row {
 
 /// Errors of a found load, and its stated standard uncertainties: direction, degrees; |F|, mN;
 /// place, µm.
+#[derive(Clone)]
 struct Found {
     errors: [f64; 3],
     sigma: [f64; 3],
@@ -110,8 +116,10 @@ impl DotsStudy {
     /// Runs the study.
     pub fn run(&self) -> Result<()> {
         let (rows, about) = self.rows(&FORCES_MN)?;
+        let frames = frames::rows(self.layout, self.frames)?;
         if self.json {
-            return page::print_rows(&rows);
+            println!("{}", serde_json::json!({ "rows": rows, "frames": frames }));
+            return Ok(());
         }
         let mut text = format!(
             "{about}\n\n\
@@ -126,8 +134,11 @@ impl DotsStudy {
                  place | stated | within the stated 95 % |\n\
                  |--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
         text.extend(rows.iter().map(Row::line));
+        text += "\n## Frames\n\n";
+        text += frames::Row::HEAD;
+        text.extend(frames.iter().map(frames::Row::line));
         print!("{text}");
-        page::write("dots.md", include_str!("dots.md"), &text)
+        page::write("dots.md", include_str!("page.md"), &text)
     }
 
     /// The results at these forces, mN, and a sentence about the tables.
@@ -323,6 +334,7 @@ mod tests {
         let study = DotsStudy {
             layout: "8v".parse().unwrap(),
             contacts: 60,
+            frames: 0,
             json: true,
         };
         for row in study.rows(&[WANTED_MN]).unwrap().0 {
