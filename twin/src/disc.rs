@@ -22,7 +22,10 @@ const SPECK_RADIUS_MM: f64 = 0.15;
 const SPECK_CORNERS: u32 = 12;
 
 /// Roundness of images: below the first they have no centroid of use, from the second on they do.
-const ROUNDNESS: [f64; 2] = [0.2, 0.4];
+/// The layout `4` has none below the second.
+const ROUNDNESS: [f64; 2] = [0.05, 0.15];
+/// The least roundness of a disc that is seen: its image is five to six times as long as wide.
+const SEEN: f64 = 0.4;
 
 /// A disc drawn on the film. It moves with the film; its fields hold for the film at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +63,7 @@ impl Disc {
         let ([left, top], [right, bottom]) = image.bounds();
         let [width, height] = [camera.width(), camera.height()].map(f64::from);
         let is_inside = left.min(top) > -0.5 && right < width - 0.5 && bottom < height - 0.5;
-        is_inside && image.roundness() >= ROUNDNESS[1]
+        is_inside && image.roundness() >= SEEN
     }
 
     /// Returns the disc's image on a film whose points (mm) move by `displacement`. It is the image
