@@ -155,7 +155,7 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
             let focal = off_px as f32 * mounting.scale();
             observed.moved[2 * marker] += focal * turn.cos();
             observed.moved[2 * marker + 1] += focal * turn.sin();
-            let found = forward.estimate(&observed, mounting, forward.unknown(true), pose);
+            let found = forward.estimate(&observed, mounting, forward.unknown(true), Some(pose));
             cell.take(forward, &pose, off_px, &found);
         }
     }

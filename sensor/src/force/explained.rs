@@ -46,8 +46,6 @@ const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
-/// Where the search for any load begins, as a fraction of the largest size.
-const HALF_SIZE: f32 = 0.5;
 /// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
 /// axis, mm. `BUILT`: any shift and turn of the camera; focal length and distance from the film as
 /// a fraction of the pattern's radius.
@@ -179,7 +177,7 @@ impl Resting {
             ..Pose::default()
         };
         let unknown = forward.unknown(resting.is_own);
-        let estimate = forward.estimate(&observed, &resting.mounting, unknown, guess);
+        let estimate = forward.estimate(&observed, &resting.mounting, unknown, Some(guess));
         let (force, by_noise) = force(&forward.strength(resting.is_own), &estimate);
         Some((force.magnitude, by_noise))
     }
@@ -245,7 +243,7 @@ impl Resting {
             &observed,
             &self.mounting,
             forward.unknown(self.is_own),
-            guess,
+            Some(guess),
         )
     }
 
@@ -266,8 +264,7 @@ impl Resting {
         (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
     }
 
-    /// Returns the load that explains the markers but the `lost` ones best. The steps begin where
-    /// the markers moved most.
+    /// Returns the load that explains the markers but the `lost` ones best, without a guess.
     pub fn estimate_without_guess(
         &self,
         forward: &Forward<'_>,
@@ -277,24 +274,12 @@ impl Resting {
     ) -> Estimate {
         let mut observed = self.observed(forward, markers, noise);
         observed.lost = lost;
-        for dot in lost.identities() {
-            observed
-                .moved
-                .iter_mut()
-                .skip(2 * dot)
-                .take(2)
-                .for_each(|part| *part = 0.0);
-        }
-        let guess = Pose {
-            size: HALF_SIZE * forward.limits.size,
-            place_mm: forward.rest_image.where_most(&observed.moved),
-            ..Pose::default()
-        };
+        lost.clear(&mut observed.moved);
         forward.estimate(
             &observed,
             &self.mounting,
             forward.unknown(self.is_own),
-            guess,
+            None,
         )
     }
 

@@ -38,6 +38,15 @@ impl Lost {
         self.0 & !other.0 == 0
     }
 
+    /// Sets their coordinates to 0, in a column of x and y of each marker.
+    pub fn clear(self, coordinates: &mut [f32]) {
+        for (identity, at) in coordinates.as_chunks_mut().0.iter_mut().enumerate() {
+            if self.contains(identity) {
+                *at = [0.0; 2];
+            }
+        }
+    }
+
     /// Their identities, the lowest first.
     pub fn identities(self) -> impl Iterator<Item = usize> {
         (0..MOST_MARKERS).filter(move |identity| self.contains(*identity))
@@ -57,5 +66,8 @@ mod tests {
         assert!(!lost.contains(16) && !Lost::NONE.contains(0));
         assert!(Lost::only(3).is_within(lost) && !lost.is_within(Lost::only(3)));
         assert!(Lost::NONE.is_within(Lost::NONE));
+        let mut coordinates = [1.0; 8];
+        lost.clear(&mut coordinates);
+        assert_eq!(coordinates, [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
     }
 }

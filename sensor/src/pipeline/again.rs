@@ -55,6 +55,7 @@ const NOISY: f32 = 2.0;
 pub(super) const BLUR: Px = Px(5_243);
 
 /// Which look at a frame is active, or was the last.
+#[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
 #[derive(Clone, Debug)]
 pub(super) enum Look {
     /// The first look; no second one is wanted.

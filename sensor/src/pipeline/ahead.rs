@@ -12,6 +12,7 @@ use crate::markers::tables::Table;
 const MOST_BESIDE: usize = 4;
 
 /// The result of computing ahead.
+#[expect(clippy::large_enum_variant, reason = "nothing is allocated")]
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Ahead {
     /// Computing ahead is disabled.

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::forward::{UnitSetup, of_layout};
-use hivtac_sensor::force::forward::{Column, Estimate, Forward, Markers, Mounting, Observed, Pose};
+use hivtac_sensor::force::forward::{Column, Estimate, Forward, Markers, Mounting, Observed};
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_terms::list::List;
 use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Unit};
@@ -44,8 +44,6 @@ const TILT_DEG: f64 = 8.0;
 const NOISE_PX: f64 = 0.011;
 /// Gauss–Newton steps, as models ask for.
 const STEPS: u8 = 2;
-/// Where steps begin, as a part of the largest size.
-const FIRST_SIZE: f32 = 0.5;
 /// 95 of 100 normal errors are within this many standard uncertainties.
 const WITHIN_95: f64 = 1.96;
 
@@ -248,13 +246,8 @@ impl Bench<'_> {
             hanging: None,
             pressing: None,
         };
-        let guess = Pose {
-            size: FIRST_SIZE * self.forward.limits.size,
-            place_mm: self.forward.rest_image.where_most(&moved),
-            ..Pose::default()
-        };
         let unknown = self.forward.unknown(true);
-        let found = (self.forward).estimate(&observed, &self.mounting, unknown, guess);
+        let found = (self.forward).estimate(&observed, &self.mounting, unknown, None);
         Ok(self.judged(&found, &load))
     }
 

@@ -18,6 +18,8 @@ use hivtac_terms::list::List;
 /// not explain the markers. Little-known units begin far from the result.
 pub const STEPS_AT_MOST: u8 = 8;
 
+/// Where steps without a guess begin, as a fraction of the largest size.
+const HALF: f32 = 0.5;
 /// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
 /// nothing.
 const LOST: f32 = 1e6;
@@ -94,16 +96,17 @@ pub struct Estimate {
 }
 
 impl Forward<'_> {
-    /// Takes steps from a guess. If they get stuck, or end at a load that does not explain the
-    /// markers, also takes steps from where the markers moved most. These succeed where a guess was
-    /// bad. Returns the better load. Compiled once, because the near memory is scarce.
+    /// Takes steps from a guess, or without one from where the markers moved most. If they get
+    /// stuck, or end at a load that does not explain the markers, also takes steps from where the
+    /// markers moved most, or from the nearest of a few presses. These succeed where the first
+    /// steps began badly. Returns the better load. Compiled once, because the near memory is scarce.
     #[inline(never)]
     pub fn estimate(
         &self,
         observed: &Observed<'_>,
         mounting: &Mounting,
         unknown: Unknown<'_>,
-        guess: Pose,
+        guess: Option<Pose>,
     ) -> Estimate {
         let mut storage = Storage::new();
         let mut descend = |guess| {
@@ -112,14 +115,19 @@ impl Forward<'_> {
                 self, observed, mounting, unknown, guess, storage,
             ))
         };
-        let (found, is_done) = descend(guess);
+        let where_most = |size| Pose {
+            size,
+            place_mm: self.rest_image.where_most(&observed.moved),
+            ..Pose::default()
+        };
+        let first = guess.unwrap_or_else(|| where_most(HALF * self.limits.size));
+        let (found, is_done) = descend(first);
         if is_done {
             return found;
         }
-        let (other, _) = descend(Pose {
-            size: guess.size,
-            place_mm: self.rest_image.where_most(&observed.moved),
-            ..Pose::default()
+        let (other, _) = descend(match guess {
+            Some(guess) => where_most(guess.size),
+            None => self.nearest_press(observed, &mounting.beside_mm),
         });
         let looks = found.looks + other.looks;
         let nearer = if other.unexplained < found.unexplained {

@@ -52,17 +52,19 @@ impl Forward<'_> {
         unknown: Unknown<'_>,
     ) -> (Estimate, [f32; 2]) {
         observed.lost = Lost::only(lost);
-        leave_out(&mut observed.moved, lost);
-        let guess = self.nearest_press(&observed.moved, lost, &mounting.beside_mm);
-        let estimate = self.estimate(&observed, mounting, unknown, guess);
+        observed.lost.clear(&mut observed.moved);
+        let guess = self.nearest_press(&observed, &mounting.beside_mm);
+        let estimate = self.estimate(&observed, mounting, unknown, Some(guess));
         let moved = self.moved(&estimate.pose, &mounting.beside_mm);
         let [lost_x, lost_y] = [2 * lost, 2 * lost + 1].map(|k| moved.get(k).copied());
         let at = lost_x.zip(lost_y).unwrap_or_default();
         (estimate, at.into())
     }
 
-    /// The straight press that moves the three markers most nearly as they `moved`.
-    fn nearest_press(&self, moved: &Column, lost: usize, beside_mm: &Markers) -> Pose {
+    /// The straight press that moves the markers that are seen most nearly as they moved.
+    #[inline(never)]
+    pub(super) fn nearest_press(&self, observed: &Observed<'_>, beside_mm: &Markers) -> Pose {
+        let (moved, lost) = (&observed.moved, observed.lost);
         let (mut nearest, mut least) = (Pose::default(), f32::INFINITY);
         let [_, end] = self.tables.ends_mm();
         let size = SIZE * self.limits.size;
@@ -73,7 +75,7 @@ impl Forward<'_> {
                 ..Pose::default()
             };
             let mut pressed = self.moved(&press, beside_mm);
-            leave_out(&mut pressed, lost);
+            lost.clear(&mut pressed);
             // Motion is nearly proportional to the size.
             let times = product(moved, &pressed) / square(&pressed).max(f32::MIN_POSITIVE);
             let pairs = moved.iter().zip(pressed.iter());
@@ -93,12 +95,6 @@ impl Forward<'_> {
     #[inline(never)]
     fn moved(&self, pose: &Pose, beside_mm: &Markers) -> Column {
         self.tables.predict(pose, &self.limits, beside_mm).moved
-    }
-}
-
-fn leave_out(column: &mut Column, lost: usize) {
-    for part in column.iter_mut().skip(2 * lost).take(2) {
-        *part = 0.0;
     }
 }
 
