@@ -42,7 +42,7 @@ fn nominal() -> Scene {
 }
 
 fn untared() -> Box<Sensor<'static>> {
-    let mut sensor: Box<Sensor<'static>> = Box::new(Sensor::new());
+    let mut sensor: Box<Sensor<'static>> = Box::default();
     let settings = model().conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(model())).unwrap();
     sensor

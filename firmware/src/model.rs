@@ -64,8 +64,7 @@ impl Chosen {
 
 /// Returns `None`, with a log line, if the file is not usable.
 fn built_in() -> Option<Model<'static>> {
-    let file = if NEAR != 0 { &COPY.0[..] } else { &FILE.0 };
-    match Model::parse(file) {
+    match Model::parse(built_in_file()) {
         Ok(model) => Some(model),
         Err(error) => {
             defmt::error!("the built-in model: {}", defmt::Display2Format(&error));
@@ -74,11 +73,17 @@ fn built_in() -> Option<Model<'static>> {
     }
 }
 
+fn built_in_file() -> &'static [u8] {
+    if NEAR != 0 { &COPY.0[..] } else { &FILE.0 }
+}
+
 /// Returns whether the built-in model answers the known question as on a computer; false if it is
-/// not usable.
+/// not usable. The model is not copied, to spare the stack.
 pub fn answers_right(sensor: &mut Sensor) -> bool {
-    let answer = built_in().map(|model| sensor.known_answer(&model));
-    answer.is_some() && answer == ANSWER
+    match &Model::parse(built_in_file()) {
+        Ok(model) => ANSWER.is_some_and(|answer| sensor.known_answer(model) == answer),
+        Err(_) => false,
+    }
 }
 
 /// The sector of the flash's second bank that keeps the model of a slot, after those of the log.

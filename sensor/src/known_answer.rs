@@ -25,9 +25,9 @@ pub fn of(model: &Model<'_>, network: &mut Network) -> Answer {
     let features = Features::of_markers(&markers);
     let output = network.run(model, &features, &model.rest.features);
     let resting = Resting::of_model(model, &model.rest);
-    let (force, _) = match model.forward.as_ref().zip(resting) {
-        Some((forward, resting)) => resting.force(forward, &model.range, &markers, &output),
-        None => force::of_outputs(model, &output),
+    let (force, _) = match (&model.forward, &resting) {
+        (Some(forward), Some(resting)) => resting.force(forward, &model.range, &markers, &output),
+        _ => force::of_outputs(model, &output),
     };
     let [x, y, z] = force.cartesian.map(|component| component.0);
     let [place_x, place_y, place_sigma] = match force.place {

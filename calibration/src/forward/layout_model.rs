@@ -128,7 +128,7 @@ fn expected(scene: &Scene) -> Result<MarkerList> {
 
 /// A sensor with this model.
 fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
-    let mut sensor: Box<Sensor<'_>> = Box::new(Sensor::new());
+    let mut sensor: Box<Sensor<'_>> = Box::default();
     let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(*model))?;
     Ok(sensor)

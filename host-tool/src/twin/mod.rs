@@ -8,11 +8,13 @@ mod pty;
 use crate::output::{Reader, print};
 use clap::Args;
 use hivtac_host::failure::Failure;
+use hivtac_host::shown::to_json;
 use hivtac_host::stop;
 use hivtac_live::hand::Hand;
 use hivtac_live::line::Tcp;
 use hivtac_live::run::{Clock, Shared, Told};
 pub use options::{Before, Simulated};
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Simulate a sensor in real time, for every other command
@@ -38,6 +40,9 @@ pub struct TwinArguments {
     /// `monitor --truth`
     #[arg(long, value_name = "FILE")]
     truth: Option<PathBuf>,
+    /// Print one JSON object in place of the line: `port`, as `--port` takes it
+    #[arg(long)]
+    json: bool,
 }
 
 /// Simulates a sensor until the program is interrupted.
@@ -52,7 +57,11 @@ pub fn run(arguments: &TwinArguments) -> Result<(), Failure> {
         .map(log::TruthLog::create)
         .transpose()?;
     let ready = arguments.open(&shared)?;
-    if print(&ready)? == Reader::Gone {
+    let line = match arguments.json {
+        true => to_json(&ready),
+        false => ready.line(),
+    };
+    if print(&line)? == Reader::Gone {
         return Ok(());
     }
     let mut failed = None;
@@ -122,28 +131,31 @@ fn listen(port: u16, shared: &Shared) -> Result<u16, Failure> {
     Ok(own)
 }
 
-impl TwinArguments {
-    /// Opens the port; returns the line that says so.
-    #[cfg(unix)]
-    fn open(&self, shared: &Shared) -> Result<String, Failure> {
-        match &self.pty {
-            Some(link) => {
-                let link = pty::serve(link, shared)?;
-                Ok(format!("ready pty={}", link.display()))
-            }
-            None => Ok(format!(
-                "ready tcp=127.0.0.1:{}",
-                listen(self.listen, shared)?
-            )),
+/// Where hosts connect.
+#[derive(Serialize)]
+struct Ready {
+    /// As `--port` takes it.
+    port: String,
+}
+
+impl Ready {
+    fn line(&self) -> String {
+        match self.port.strip_prefix("tcp:") {
+            Some(address) => format!("ready tcp={address}"),
+            None => format!("ready pty={}", self.port),
         }
     }
+}
 
-    /// Opens the port; returns the line that says so.
-    #[cfg(not(unix))]
-    fn open(&self, shared: &Shared) -> Result<String, Failure> {
-        Ok(format!(
-            "ready tcp=127.0.0.1:{}",
-            listen(self.listen, shared)?
-        ))
+impl TwinArguments {
+    /// Opens the port.
+    fn open(&self, shared: &Shared) -> Result<Ready, Failure> {
+        #[cfg(unix)]
+        if let Some(link) = &self.pty {
+            let port = pty::serve(link, shared)?.display().to_string();
+            return Ok(Ready { port });
+        }
+        let port = format!("tcp:127.0.0.1:{}", listen(self.listen, shared)?);
+        Ok(Ready { port })
     }
 }

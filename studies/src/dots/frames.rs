@@ -112,7 +112,7 @@ fn of_dot(
 
 /// A sensor with this model, tared on this scene. What presses is known to be a needle.
 fn tared<'m>(model: &Model<'m>, scene: &Scene) -> Result<Box<Sensor<'m>>> {
-    let mut sensor: Box<Sensor<'_>> = Box::new(Sensor::new());
+    let mut sensor: Box<Sensor<'_>> = Box::default();
     let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(*model))?;
     let mut tare = TareBuilder::new(TARE_FRAMES).context("no frames")?;

@@ -71,7 +71,7 @@ enum Work {
     /// One inference of a model with these layer widths.
     Network(&'static [u16]),
     /// The network of a model that tells places, and the number of steps from its answer.
-    Steps(u8, [Marker; 4], Rest),
+    Steps(u8, [Marker; 4], Box<Rest>),
     /// The threshold's table of 64 KiB.
     Table,
 }
@@ -169,7 +169,7 @@ fn stepping(steps: u8) -> Result<Case> {
     let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
     let markers = seen(geometry, format, RednessWeighted, &pressed.words())?.1;
     Ok(Case {
-        work: Work::Steps(steps, markers, rest),
+        work: Work::Steps(steps, markers, Box::new(rest)),
         model,
         size,
         format,

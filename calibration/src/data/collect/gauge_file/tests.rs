@@ -107,7 +107,7 @@ fn what_is_not_clear_is_refused_with_what_helps() {
             None,
             &["line 1: `Force (psi)` has an unknown unit of force"],
         ),
-        ("t (h),Force (N)\n0,1\n", None, &["none of time"]),
+        ("t (h),Force (N)\n0,1\n", None, &["unknown unit of time"]),
         (
             "t,F (mN)\n0,1\n1,2\n",
             Some("N"),
