@@ -8,8 +8,8 @@ use hivtac_tests::artifact;
 use object::{Object, ObjectSymbol, SymbolKind};
 
 const ITCM: Range<u64> = 0..0x1_0000;
-const STACK: Range<u64> = 0x2000_0000..0x2000_9E00;
-const DTCM: Range<u64> = 0x2000_9E00..0x2002_0000;
+const STACK: Range<u64> = 0x2000_0000..0x2000_A000;
+const DTCM: Range<u64> = 0x2000_A000..0x2002_0000;
 const SRAM: Range<u64> = 0x3000_0000..0x3004_8000;
 const AXI_SRAM: Range<u64> = 0x2400_0000..0x2408_0000;
 
