@@ -45,8 +45,8 @@ enum Command {
     /// Measure freshly rendered frames with a model file and print how far its forces are from the
     /// truth.
     Check(CheckArgs),
-    /// The model file of the nominal sensor with another layout of dots, for presses anywhere on the
-    /// film. It has no network: its steps begin where the dots moved most.
+    /// The model file of the nominal sensor with another layout of dots, for presses anywhere on
+    /// the film. It has no network: its steps begin where the dots moved most.
     Layout(LayoutArgs),
     /// Dataset, train, film, export and check in one, for the model that firmware and host tool
     /// embed: a tip anywhere within ±4 mm.

@@ -58,8 +58,8 @@ impl Motion {
         self.before = self.now.take();
     }
 
-    /// Call at the end of each frame, with its markers and those that are lost, whose places are not
-    /// used; `None` if it showed no markers.
+    /// Call at the end of each frame, with its markers and those that are lost, whose places are
+    /// not used; `None` if it showed no markers.
     pub fn ended(&mut self, seen: Option<(&MarkerList, Lost)>) {
         self.now = seen.map(|(markers, lost)| Seen {
             markers: *markers,

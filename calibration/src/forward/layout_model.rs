@@ -1,4 +1,5 @@
-//! The model file of a layout of dots on the nominal film: the film run forwards, without a network.
+//! The model file of a layout of dots on the nominal film: the film run forwards, without a
+//! network.
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use hivtac_sensor::force::forward::{Markers, Noise};
@@ -41,11 +42,12 @@ const EDGE_PX: f64 = 2.8;
 const LARGEST_FORCE: MicroNewtons = MicroNewtons(250_000);
 const LARGEST_ANGLE: MilliDegrees = MilliDegrees(12_000);
 
-/// The model of a layout on the nominal film, for presses anywhere on the film's tables, seen by the
-/// camera `ov7725` at 320 × 240 in RGB565.
+/// The model of a layout on the nominal film, for presses anywhere on the film's tables, seen by
+/// the camera `ov7725` at 320 × 240 in RGB565.
 ///
 /// # Errors
-/// If the motion does not fit into tables, or the dots are not seen in frames of the untouched film.
+/// If the motion does not fit into tables, or the dots are not seen in frames of the untouched
+/// film.
 pub fn layout_model(layout: Layout, steps: u8) -> Result<ModelSpec> {
     let last_mm = Film::default().with_layout(layout)?.most_place_mm();
     let scene = layout_scene(layout)?;
@@ -163,8 +165,8 @@ fn seen_at_rest(spec: ModelSpec, scene: &Scene) -> Result<ModelSpec> {
     bail!("too few frames of the untouched film show all dots");
 }
 
-/// How exactly the dots are seen under presses: away from the axis and across, at rest and with four
-/// times the area.
+/// How exactly the dots are seen under presses: away from the axis and across, at rest and with
+/// four times the area.
 fn noise(sensor: &mut Sensor<'_>, rest: &Rest, scene: &Scene) -> Result<Noise> {
     let at_rest = scene.truth_under(&Load::REST)?;
     let middle =

@@ -1,14 +1,15 @@
 //! Computes the force ahead, while the camera still sends the rows below the markers.
 //!
-//! Once as many blobs as markers are complete and no blob is open, their measurement is computed. If no
-//! other blob follows until the frame ends, it is the frame's measurement, and only that check is
-//! left after the last row. Otherwise it is computed anew. The measurement depends on the blobs
-//! alone.
+//! Once as many blobs as markers are complete and no blob is open, their measurement is computed.
+//! If no other blob follows until the frame ends, it is the frame's measurement, and only that
+//! check is left after the last row. Otherwise it is computed anew. The measurement depends on the
+//! blobs alone.
 
 use super::{Measurement, Prepared, Sensor};
 use crate::markers::tables::Table;
 
-/// With more blobs beside the markers, nothing is computed ahead; that bounds how often it is done in vain.
+/// With more blobs beside the markers, nothing is computed ahead; that bounds how often it is done
+/// in vain.
 const MOST_BESIDE: usize = 4;
 
 /// The result of computing ahead.

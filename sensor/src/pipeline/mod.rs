@@ -48,8 +48,8 @@ pub struct Measurement {
     pub status: Status,
     /// The markers where the frame shows them; `None` if they were not all found.
     pub markers: Option<MarkerList>,
-    /// Those of the markers that the frame does not show: `markers` has their rest places. Never one
-    /// of four dots.
+    /// Those of the markers that the frame does not show: `markers` has their rest places. Never
+    /// one of four dots.
     pub lost: Lost,
     /// Their features at one common time ([`Sensor::set_motion`]); present exactly if there are
     /// markers and none is lost.

@@ -1,5 +1,5 @@
-//! Frames of the film with another layout of dots, through the sensor's own code: all dots seen, one
-//! lost, in glare, or moved on the film.
+//! Frames of the film with another layout of dots, through the sensor's own code: all dots seen,
+//! one lost, in glare, or moved on the film.
 
 use anyhow::{Context, Result, anyhow};
 use hivtac_calibration::evaluation::errors::angle_deg;
@@ -78,8 +78,8 @@ pub fn rows(layout: Layout, frames: u32) -> Result<Vec<Row>> {
     rows.collect()
 }
 
-/// What the frames with a fault of this dot tell: the force's errors, and whether it goes on without
-/// a dot; `None` without a force.
+/// What the frames with a fault of this dot tell: the force's errors, and whether it goes on
+/// without a dot; `None` without a force.
 fn of_dot(
     model: &Model<'_>,
     layout: Layout,

@@ -36,8 +36,8 @@ pub struct Placed {
 }
 
 impl Finder {
-    /// Returns the markers among `blobs`, by their places in `rest`. If all are seen, and the camera
-    /// `may_be_shifted` since that picture, their middle shows by how much.
+    /// Returns the markers among `blobs`, by their places in `rest`. If all are seen, and the
+    /// camera `may_be_shifted` since that picture, their middle shows by how much.
     ///
     /// # Errors
     /// [`Status::MARKERS_MISSING`] if fewer than four are seen, or three are lost.

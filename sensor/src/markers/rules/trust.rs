@@ -257,8 +257,8 @@ impl Trust {
     }
 }
 
-/// The factors of a pixel format on limits of second moments, and of means, that come from the pixel
-/// grid.
+/// The factors of a pixel format on limits of second moments, and of means, that come from the
+/// pixel grid.
 pub(super) fn grid(format: PixelFormat) -> (f32, f32) {
     match format {
         PixelFormat::Yuv422 => (2.0, 1.125),
