@@ -4,7 +4,7 @@
 use std::sync::LazyLock;
 
 use hivtac_calibration::evaluation::errors::angle_deg;
-use hivtac_calibration::forward::{layout_model, layout_scene};
+use hivtac_calibration::forward::{self, layout_model, layout_scene};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{AlignedFile, Model};
@@ -42,10 +42,7 @@ fn nominal() -> Scene {
 }
 
 fn untared() -> Box<Sensor<'static>> {
-    let mut sensor: Box<Sensor<'static>> = Box::default();
-    let settings = model().conditions.settings(ByteOrder::Native);
-    sensor.configure(settings, Some(model())).unwrap();
-    sensor
+    forward::untared(&model()).unwrap()
 }
 
 fn seen(sensor: &mut Sensor<'_>, scene: &Scene, load: &Load, number: u64) -> Measurement {

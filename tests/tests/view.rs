@@ -23,9 +23,9 @@ const STAYS: &str = "[film]\noffset_mm = [2.2, -1.5]\n[load]\nmotion = \"press\"
                      force_n = 0.18\nstart_s = 1.2\nrise_s = 0.3\nhold_s = 60.0\n";
 
 /// A tool that serves its page; killed when it is dropped.
-struct View {
-    process: Child,
-    address: String,
+pub struct View {
+    pub process: Child,
+    pub address: String,
 }
 
 impl View {
@@ -104,7 +104,7 @@ fn screenshots() -> Option<PathBuf> {
 }
 
 /// Returns a part of the page, as an expression.
-fn part(name: &str) -> String {
+pub fn part(name: &str) -> String {
     format!("document.querySelector('[data-is=\"{name}\"]')")
 }
 

@@ -3,8 +3,9 @@
 use std::env;
 use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 
+use crate::view::{View, part};
 use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
 use serde_json::Value;
@@ -15,13 +16,8 @@ const FILM_MM: f64 = 5.0;
 /// Frames of a press that are compared.
 const FRAMES: usize = 40;
 
-/// A tool that serves the twin's page; killed when it is dropped.
-struct View {
-    process: Child,
-    address: String,
-}
-
 impl View {
+    /// Serves the twin's page.
     fn start() -> View {
         let mut process = Command::new(artifact::named_by("HIVTAC_TOOL"))
             .args(["view", "--twin"])
@@ -37,18 +33,6 @@ impl View {
             process,
         }
     }
-}
-
-impl Drop for View {
-    fn drop(&mut self) {
-        // Fails only if the tool has already ended.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
-}
-
-fn part(name: &str) -> String {
-    format!("document.querySelector('[data-is=\"{name}\"]')")
 }
 
 /// Returns the place in the page, px, of a place on the film, mm.

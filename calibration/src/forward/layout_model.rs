@@ -128,41 +128,54 @@ fn expected(scene: &Scene) -> Result<MarkerList> {
     ))
 }
 
-/// A sensor with this model.
-fn sensor<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
+/// A sensor with a model, without a tare.
+///
+/// # Errors
+/// If the model's settings are out of range.
+pub fn untared<'m>(model: &Model<'m>) -> Result<Box<Sensor<'m>>> {
     let mut sensor: Box<Sensor<'_>> = Box::default();
     let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(*model))?;
     Ok(sensor)
 }
 
+/// The rest position that the sensor takes from frames of the scene's untouched film, numbered from
+/// `first` on.
+///
+/// # Errors
+/// If the frames are refused, or too few show all dots.
+pub fn rest_of(sensor: &mut Sensor<'_>, scene: &Scene, first: u64) -> Result<Rest> {
+    let mut tare = TareBuilder::new(REST_FRAMES).context("no frames")?;
+    for number in 0..2 * u64::from(REST_FRAMES) {
+        let frame = scene.render_load(&Load::REST, first + number)?;
+        let seen = sensor.measure_frame(&frame.to_rgb565());
+        if let Some(outcome) = sensor.tare_with(&mut tare, &seen) {
+            return outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"));
+        }
+    }
+    bail!("no rest position: too few frames of the untouched film show all dots");
+}
+
 /// The same with the rest position that frames of the untouched film show.
 fn seen_at_rest(spec: ModelSpec, scene: &Scene) -> Result<ModelSpec> {
     let encoded = spec.encode().map_err(|error| anyhow!("{error}"))?;
     let model = Model::parse(&encoded).map_err(|error| anyhow!("{error}"))?;
-    let mut sensor = sensor(&model)?;
-    let mut tare = TareBuilder::new(REST_FRAMES).context("no frames")?;
-    for number in 0..2 * u64::from(REST_FRAMES) {
-        let seen = sensor.measure_frame(&scene.render_load(&Load::REST, number)?.to_rgb565());
-        let Some(outcome) = sensor.tare_with(&mut tare, &seen) else {
-            continue;
+    let mut sensor = untared(&model)?;
+    let rest = rest_of(&mut sensor, scene, 0)?;
+    let off = rest.markers().into_iter().zip(spec.rest.markers());
+    let off = off.map(|(seen, own)| [(seen.x - own.x).to_f32(), (seen.y - own.y).to_f32()]);
+    let mut forward = spec.forward;
+    if let Some(forward) = &mut forward {
+        forward.noise = Noise {
+            rest_px: Markers::of(off),
+            ..noise(&mut sensor, &rest, scene)?
         };
-        let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
-        let off = rest.markers().into_iter().zip(spec.rest.markers());
-        let off = off.map(|(seen, own)| [(seen.x - own.x).to_f32(), (seen.y - own.y).to_f32()]);
-        let rest_px = Markers::of(off);
-        let mut forward = spec.forward;
-        if let Some(forward) = &mut forward {
-            forward.noise = noise(&mut sensor, &rest, scene)?;
-            forward.noise.rest_px = rest_px;
-        }
-        return Ok(ModelSpec {
-            rest,
-            forward,
-            ..spec
-        });
     }
-    bail!("too few frames of the untouched film show all dots");
+    Ok(ModelSpec {
+        rest,
+        forward,
+        ..spec
+    })
 }
 
 /// How exactly the dots are seen under presses: away from the axis and across, at rest and with

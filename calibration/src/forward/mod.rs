@@ -32,7 +32,7 @@ use covariances::even;
 pub use covariances::{Covariance, EQUATIONS, KNOTS, Moved, covariances, knots, sum_of_squares};
 pub use dots::of_layout;
 pub use functions::{Sampled, compressed};
-pub use layout_model::{layout_model, layout_scene};
+pub use layout_model::{layout_model, layout_scene, rest_of, untared};
 pub(crate) use least_squares::{LeastSquares, dot};
 pub use noise::Noise;
 pub use other_units::OtherUnits;

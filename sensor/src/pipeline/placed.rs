@@ -10,7 +10,7 @@ use super::{Look, Measurement, Prepared, Sensor};
 use crate::force::features::Features;
 use crate::force::forward::{Column, Estimate, Forward};
 use crate::force::rest::Rest;
-use crate::force::{FrameNoise, Resting};
+use crate::force::{Force, FrameNoise, Resting};
 use crate::markers::lost::Lost;
 use crate::markers::rules::Placed;
 use crate::markers::tables::Table;
@@ -63,7 +63,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             Ok(placed) => placed,
             Err(reason) => return self.measurement(Err(reason)),
         };
-        let mut status = self.standing_status();
+        let prepared = self.prepared.as_ref();
+        let mut status = prepared.map_or(Status::OK, |prepared| prepared.standing);
         let rows = self.settings.geometry.height;
         let moved = self
             .motion
@@ -84,7 +85,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     }
 
     /// Returns the force of markers at one common time; `None` if `status` forbids one.
-    fn explain(&mut self, placed: &Placed, status: &mut Status) -> Option<crate::force::Force> {
+    fn explain(&mut self, placed: &Placed, status: &mut Status) -> Option<Force> {
         if status.intersects(Status::NO_FORCE) {
             return None;
         }

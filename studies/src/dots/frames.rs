@@ -1,16 +1,14 @@
 //! Frames of the film with another layout of dots, through the sensor's own code: all dots seen,
 //! one lost, in glare, or moved on the film.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Result, anyhow};
 use hivtac_calibration::evaluation::errors::angle_deg;
-use hivtac_calibration::forward::{layout_model, layout_scene};
+use hivtac_calibration::forward::{layout_model, layout_scene, rest_of, untared};
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Sensor;
-use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::ByteOrder;
 use hivtac_twin::film::{Dots, Layout};
 use hivtac_twin::{Load, Options, Paint, Patch, Scene};
 use rand::Rng;
@@ -23,8 +21,8 @@ use crate::press::seeded;
 /// The largest distance of a press from the middle along each axis, mm; forces, N.
 const WITHIN_MM: f64 = 4.0;
 const FORCES_N: [f64; 2] = [0.05, 0.2];
-/// Frames of a tare.
-const TARE_FRAMES: u16 = 64;
+/// The number of the first frame of a tare.
+const TARE_FRAMES: u64 = 1_000_000;
 /// Millimetres of film that a marker moves by for 0.1 px of its image.
 const TENTH_OF_A_PX_MM: f64 = 0.0058;
 /// Radius of glare, mm.
@@ -112,20 +110,10 @@ fn of_dot(
 
 /// A sensor with this model, tared on this scene. What presses is known to be a needle.
 fn tared<'m>(model: &Model<'m>, scene: &Scene) -> Result<Box<Sensor<'m>>> {
-    let mut sensor: Box<Sensor<'_>> = Box::default();
-    let settings = model.conditions.settings(ByteOrder::Native);
-    sensor.configure(settings, Some(*model))?;
-    let mut tare = TareBuilder::new(TARE_FRAMES).context("no frames")?;
-    for number in 0..2 * u64::from(TARE_FRAMES) {
-        let frame = scene.render_load(&Load::REST, 1_000_000 + number)?;
-        let seen = sensor.measure_frame(&frame.to_rgb565());
-        if let Some(outcome) = sensor.tare_with(&mut tare, &seen) {
-            let rest = outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))?;
-            sensor.set_tare(Some(rest), Drift::NONE);
-            return Ok(sensor);
-        }
-    }
-    Err(anyhow!("no rest position: too few frames show the dots"))
+    let mut sensor = untared(model)?;
+    let rest = rest_of(&mut sensor, scene, TARE_FRAMES)?;
+    sensor.set_tare(Some(rest), Drift::NONE);
+    Ok(sensor)
 }
 
 fn spoil(options: &mut Options, layout: Layout, fault: Fault, dot: usize) {

@@ -122,15 +122,6 @@ impl Placed {
         lost <= MOST_LOST && lost + FEWEST <= self.markers.len()
     }
 
-    /// The same without another marker.
-    #[must_use]
-    pub fn without(&self, identity: usize) -> Placed {
-        Placed {
-            lost: self.lost.and(identity),
-            ..*self
-        }
-    }
-
     /// Whether these are whole markers of a film at rest, as the film of another rest picture has
     /// them.
     pub fn may_rest(&self, other: &[Marker]) -> bool {
