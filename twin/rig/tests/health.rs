@@ -36,7 +36,7 @@ fn a_device_that_was_just_switched_on_has_no_problem() {
     // The emulator's part is at 30 °C.
     let temperature = health.temperature_centidegrees.expect("its sensor tells");
     assert!((2_900..3_100).contains(&temperature), "{health:?}");
-    assert_eq!(health.stack_bytes, 40_448);
+    assert_eq!(health.stack_bytes, 40_960);
     let free = health.stack_bytes - health.stack_used;
     assert!(health.stack_used > 1_000 && free > 6_000, "{health:?}");
     assert_eq!((health.problems, health.at_start), (0, 0), "{health:?}");
