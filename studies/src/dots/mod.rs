@@ -335,7 +335,12 @@ mod tests {
             let rms = [row.direction_deg[0], row.magnitude_mn, row.place_um];
             assert!(row.kept >= 95.0, "±{within_mm} mm: {} %", row.kept);
             for (rms, wanted) in rms.into_iter().zip(wanted) {
-                let times = if within_mm > 6.0 { 2.0 } else { 1.5 };
+                // Less exact than wanted of all dots: near the edge, and with a dot lost.
+                let times = if within_mm > 6.0 || row.lost > 0 {
+                    2.0
+                } else {
+                    1.5
+                };
                 assert!(rms < times * wanted, "±{within_mm} mm: {rms}, {wanted}");
             }
             assert!(
