@@ -33,7 +33,7 @@ impl Taring {
         Some(Self {
             id,
             conversation: session::number(),
-            builder: if anyway { builder.insisting() } else { builder },
+            builder: if anyway { builder.forced() } else { builder },
             deadline: Instant::now() + patience,
         })
     }

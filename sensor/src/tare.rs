@@ -10,7 +10,7 @@
 //!    without either, only as far as the exactness of building units allows to see a touch;
 //! 4. the markers' distance from their centre fits a film at rest ([`Rest::fits`]).
 //!
-//! [Insisting](TareBuilder::insisting) skips 2 and 3.
+//! [Forced](TareBuilder::forced) skips 2 and 3.
 
 use crate::force::features::Features;
 use crate::force::rest::Rest;
@@ -52,7 +52,7 @@ pub enum Refusal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TareBuilder {
     wanted: u16,
-    insists: bool,
+    is_forced: bool,
     taken: u16,
     implausible: u16,
     touched: u16,
@@ -75,7 +75,7 @@ impl TareBuilder {
         let wanted = frames;
         let empty = TareBuilder {
             wanted,
-            insists: false,
+            is_forced: false,
             taken: 0,
             implausible: 0,
             touched: 0,
@@ -92,9 +92,9 @@ impl TareBuilder {
 
     /// Accepts all frames, even if something moves or touches the film.
     #[must_use]
-    pub fn insisting(self) -> TareBuilder {
+    pub fn forced(self) -> TareBuilder {
         TareBuilder {
-            insists: true,
+            is_forced: true,
             ..self
         }
     }
@@ -130,8 +130,8 @@ impl TareBuilder {
     }
 
     /// Returns whether touched frames are accepted.
-    pub fn insists(&self) -> bool {
-        self.insists
+    pub fn is_forced(&self) -> bool {
+        self.is_forced
     }
 
     /// The force of the last touched frame; `None` if no frame was touched.
@@ -190,7 +190,7 @@ impl TareBuilder {
 
     fn judge(&self, geometry: &Geometry) -> Result<Rest, Refusal> {
         let rest = self.mean();
-        if !self.insists && !self.is_steady() {
+        if !self.is_forced && !self.is_steady() {
             Err(Refusal::Unsteady)
         } else if !rest.fits(geometry) {
             Err(Refusal::NotAtRest)
@@ -333,11 +333,11 @@ mod tests {
 
     /// With a square wave of 0.2 px, and with one that is too large to be steady.
     #[test]
-    fn the_spread_is_the_standard_deviation_and_who_insists_has_it_taken() {
-        let spread = |jump: f64, insists: bool| {
+    fn the_spread_is_the_standard_deviation_and_a_forced_tare_takes_any() {
+        let spread = |jump: f64, is_forced: bool| {
             let mut builder = TareBuilder::new(64).unwrap();
-            if insists {
-                builder = builder.insisting();
+            if is_forced {
+                builder = builder.forced();
             }
             let mut outcome = None;
             for nth in 0..64 {

@@ -53,16 +53,13 @@ pub fn write(path: &Path, columns: usize, maps: &[Map]) -> Result<()> {
             number % columns * ACROSS + LEFT,
             number / columns * DOWN + TOP,
         );
-        svg += &format!(
-            "<g transform=\"translate({x} {y})\">\n{}</g>\n",
-            map.drawn()
-        );
+        svg += &format!("<g transform=\"translate({x} {y})\">\n{}</g>\n", map.svg());
     }
     page::write_file(path, &(svg + "</svg>\n"))
 }
 
 impl Map {
-    fn drawn(&self) -> String {
+    fn svg(&self) -> String {
         let mut svg = format!("<text x=\"0\" y=\"-8\">{}</text>\n", self.title);
         let colour = |value: &f64| COLOURS[self.levels.partition_point(|level| level <= value)];
         for (row, values) in self.values.chunks(PLACES).enumerate() {

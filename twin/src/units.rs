@@ -27,12 +27,12 @@ const AT_MOST: f64 = 2.5;
 
 /// Draws a unit: its scene's options, with a camera of a focal length in µm, and in px for the
 /// nominal unit. `normal` gives random numbers of the standard normal distribution.
-pub fn drawn(mut normal: impl FnMut() -> f64, focal_um: f64, focal_px: f64) -> Options {
-    let mut drawn = |sigma: f64, at_most: f64| {
+pub fn random_unit(mut normal: impl FnMut() -> f64, focal_um: f64, focal_px: f64) -> Options {
+    let mut within = |sigma: f64, at_most: f64| {
         let mut all = std::iter::repeat_with(|| sigma * normal());
         all.find(|value| value.abs() <= at_most).unwrap_or(0.0)
     };
-    let mut usual = |sigma: f64| drawn(sigma, AT_MOST * sigma);
+    let mut usual = |sigma: f64| within(sigma, AT_MOST * sigma);
     let mounting = Mounting {
         shift_px: [usual(MIDDLE_PX), usual(MIDDLE_PX)],
         roll_deg: usual(ROLL_DEG),
@@ -41,7 +41,7 @@ pub fn drawn(mut normal: impl FnMut() -> f64, focal_um: f64, focal_px: f64) -> O
     let (stiffness, thickness) = (1.0 + usual(STIFFNESS), 1.0 + usual(THICKNESS));
     let posts_mm = std::array::from_fn(|_| [usual(POST_MM), usual(POST_MM)]);
     let glued_mm: [[f64; 2]; 4] =
-        std::array::from_fn(|_| [0, 1].map(|_| drawn(MARKER_MM, MARKER_AT_MOST_MM)));
+        std::array::from_fn(|_| [0, 1].map(|_| within(MARKER_MM, MARKER_AT_MOST_MM)));
     Options {
         film: Mechanics {
             unit: Unit {
@@ -69,7 +69,7 @@ pub fn with_unit(number: u64, camera: &Camera, options: Options) -> Options {
     // The sum of twelve uniform numbers: nearly normal, with variance 1.
     let normal = || random.by_ref().take(12).map(|part| part - 0.5).sum();
     let focal_um = 1000.0 * camera.preset().focal_length_mm();
-    let unit = drawn(normal, focal_um, camera.focal_px());
+    let unit = random_unit(normal, focal_um, camera.focal_px());
     Options {
         film: Mechanics {
             unit: unit.film.unit,

@@ -173,7 +173,7 @@ pub fn longest_rest() -> RestPosition {
         markers: longest_sample().markers.unwrap(),
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
         rect_area: Q::from_bits(i64::MIN),
-        down: LONGEST_DOWN.told(),
+        down: LONGEST_DOWN.direction(),
     }
 }
 
@@ -761,7 +761,7 @@ pub fn any_rest() -> impl Strategy<Value = RestPosition> {
             markers,
             rect_center: (Px(x), Px(y)),
             rect_area: Q::from_bits(rect_area),
-            down: down.told(),
+            down: down.direction(),
         },
     )
 }

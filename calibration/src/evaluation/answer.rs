@@ -62,6 +62,6 @@ impl<'m> Chip<'m> {
         let markers: Vec<Marker> = markers.collect();
         let noise = FrameNoise::AS_MODELLED;
         let estimate = resting.estimate(forward, &markers, noise, &output);
-        Ok(resting.told(forward, &self.model.range, noise, &estimate))
+        Ok(resting.force_and_status(forward, &self.model.range, noise, &estimate))
     }
 }

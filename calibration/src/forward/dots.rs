@@ -77,7 +77,7 @@ pub fn of_layout(
 fn errors(chip: &Forward<'_>, setup: &UnitSetup<'_>, film: &Film) -> Result<CovarianceSpec> {
     let last_mm = film.most_place_mm();
     let left = (0..LOADS).into_par_iter().map(|number| {
-        let pose = drawn(number, last_mm);
+        let pose = random_pose(number, last_mm);
         Ok((pose, left(chip, setup, film, &pose)?))
     });
     let left = left.collect::<Result<Vec<_>>>()?;
@@ -122,7 +122,7 @@ fn errors(chip: &Forward<'_>, setup: &UnitSetup<'_>, film: &Film) -> Result<Cova
 }
 
 /// A usual load.
-fn drawn(number: u64, last_mm: f64) -> Pose {
+fn random_pose(number: u64, last_mm: f64) -> Pose {
     let mut random = ChaCha8Rng::seed_from_u64(number);
     let root: f64 = random.random();
     let mut within = |most: f64| random.random_range(-most..most);

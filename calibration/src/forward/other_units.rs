@@ -77,7 +77,7 @@ impl OtherUnits {
     pub(super) fn of_films(chip: &Forward<'_>, camera: &Camera) -> Result<Self> {
         let drawn = (0..FILMS)
             .into_par_iter()
-            .map(|number| Other::drawn(number, chip, camera)?.matches());
+            .map(|number| Other::random(number, chip, camera)?.matches());
         let drawn: Vec<Vec<Match>> = drawn
             .collect::<Vec<_>>()
             .into_iter()
@@ -166,7 +166,7 @@ struct Match {
 }
 
 impl<'a> Other<'a> {
-    fn drawn(number: u64, chip: &'a Forward<'a>, camera: &'a Camera) -> Result<Self> {
+    fn random(number: u64, chip: &'a Forward<'a>, camera: &'a Camera) -> Result<Self> {
         let mut random = ChaCha8Rng::seed_from_u64(number);
         let design = design(number, &mut random);
         let (roll_deg, focal) = (ROLL_DEG * normal(&mut random), FOCAL * normal(&mut random));

@@ -121,7 +121,7 @@ impl<'a> Field<'a> {
             let nearest = (0..k).min_by(|a, b| near(a).total_cmp(&near(b)));
             let start = nearest.map_or_else(
                 || self.at.rest.clone(),
-                |other| foretold(film, &solved[other], &self.poses[other], pose),
+                |other| extrapolated(film, &solved[other], &self.poses[other], pose),
             );
             let state = film.press_force(place_mm, self.force_n(pose), &start)?;
             let by_load = film.responses(&state)?;
@@ -245,7 +245,7 @@ pub fn force_n([a, b]: [f64; 2], pose: &Pose) -> [f64; 3] {
 }
 
 /// The state under `pose`, extrapolated by the slopes of the solved state under `there`.
-fn foretold(film: &Film, from: &Solved, there: &Pose, pose: &Pose) -> Equilibrium {
+fn extrapolated(film: &Film, from: &Solved, there: &Pose, pose: &Pose) -> Equilibrium {
     let steps = [
         pose.size - there.size,
         pose.tilt[0] - there.tilt[0],

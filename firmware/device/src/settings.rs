@@ -113,7 +113,7 @@ impl InUse {
 
 /// Returns what is known of gravity: unknown if it is not a valid direction.
 pub fn known(down: Down) -> Down {
-    let is_sound = down.told().is_none_or(Direction::is_sound);
+    let is_sound = down.direction().is_none_or(Direction::is_sound);
     if is_sound { down } else { Down::Unknown }
 }
 
@@ -140,7 +140,7 @@ pub fn tared<const BLOBS: usize, T: Table>(
 ) -> TareReport {
     let before = sensor.tare();
     TareReport {
-        rest: position(rest, sensor.down().told(), sensor.settings()),
+        rest: position(rest, sensor.down().direction(), sensor.settings()),
         spread,
         moved: before.map(|before| moved(before, rest)),
     }

@@ -138,7 +138,7 @@ impl Conversation {
         keep(&mut self.link, selection)?;
         let report = self.settings()?;
         let taken = report.tare.map(|tare| tare.down);
-        if report.down.told().is_some() && taken == Some(None) {
+        if report.down.direction().is_some() && taken == Some(None) {
             note(
                 "hivtac: nobody knows which way the sensor was held when its tare was taken: take \
                  it anew",

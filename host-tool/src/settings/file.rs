@@ -373,7 +373,7 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
     let taken = file.tare.and_then(|rest| rest.down).map(Direction);
     if !taken
         .into_iter()
-        .chain(file.down().told())
+        .chain(file.down().direction())
         .all(Direction::is_sound)
     {
         return Err("down is no direction: its length is not 1000 thousandths".to_owned());

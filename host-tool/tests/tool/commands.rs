@@ -219,13 +219,13 @@ fn a_tare_is_taken_refused_or_not_answered() {
         good.commands.iter().collect::<Vec<_>>(),
         [Request::Tare { frames: 64 }]
     );
-    let insisting = device(Some(Outcome::Done));
-    let done = run(&["tare", "--force", "--json", "--port", &insisting.port]);
+    let forced = device(Some(Outcome::Done));
+    let done = run(&["tare", "--force", "--json", "--port", &forced.port]);
     let tared: serde_json::Value = serde_json::from_str(&done.stdout).unwrap();
     assert_eq!(tared["markers"][2], serde_json::json!([220.0, 180.0]));
     assert_eq!(tared["moved"]["farthest_px"], 20_316.0 / 65_536.0);
     assert_eq!(
-        insisting.commands.iter().collect::<Vec<_>>(),
+        forced.commands.iter().collect::<Vec<_>>(),
         [Request::TareAnyway { frames: 32 }]
     );
     let looks_like = MicroNewtons(1_043);

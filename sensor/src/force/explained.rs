@@ -306,7 +306,7 @@ impl Resting {
     /// load explains the markers badly, its uncertainties are widened and the status is
     /// [`Status::LOOSELY_EXPLAINED`]. It is [`Status::UNEXPLAINED`] if that is not
     /// [allowed](Self::may_be_loose), or the load is the largest in the tables.
-    pub fn told(
+    pub fn force_and_status(
         &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,
@@ -345,7 +345,7 @@ impl Resting {
     ) -> (Force, Status) {
         let noise = FrameNoise::AS_MODELLED;
         let estimate = self.estimate(forward, markers, noise, output);
-        self.told(forward, range, noise, &estimate)
+        self.force_and_status(forward, range, noise, &estimate)
     }
 }
 

@@ -210,7 +210,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// was taken. With `None`, or if it is not [sound](Rest::is_sound), the model's rest position
     /// is used.
     pub fn set_tare(&mut self, rest: Option<Rest>, drift: Drift) {
-        self.set_tare_under(rest, drift, self.down.told());
+        self.set_tare_under(rest, drift, self.down.direction());
     }
 
     /// As [`set_tare`](Self::set_tare), for a rest position that was taken under this gravity;
@@ -525,7 +525,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);
                 }
-                resting.told(forward, &model.range, noise, &estimate)
+                resting.force_and_status(forward, &model.range, noise, &estimate)
             }
             None => force::of_outputs(model, &output),
         };

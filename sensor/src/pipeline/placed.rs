@@ -102,8 +102,8 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         if !is_again && lost == Lost::NONE {
             self.noise.saw(noise, &estimate.left);
         }
-        let (force, told) = resting.told(forward, &model.range, noise, &estimate);
-        *status |= told;
+        let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
+        *status |= found;
         if lost != Lost::NONE {
             *status |= Status::MARKER_LOST;
         }

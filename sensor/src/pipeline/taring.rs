@@ -35,7 +35,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let geometry = &self.settings.geometry;
         // Relative to the model's rest position every unit looks touched.
         let is_touched = self.tare.is_some() && measurement.status.contains(Status::CONTACT);
-        if is_touched && !tare.insists() {
+        if is_touched && !tare.is_forced() {
             let touch = measurement.force.map(|force| force.magnitude);
             return tare.add_touched(touch.unwrap_or_default()).map(Err);
         }
@@ -46,7 +46,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             return tare.add_implausible().map(Err);
         }
         let outcome = tare.add(markers, features, geometry)?;
-        let touch = |rest: &Rest| self.touch(rest).filter(|_| !tare.insists());
+        let touch = |rest: &Rest| self.touch(rest).filter(|_| !tare.is_forced());
         Some(outcome.and_then(|rest| match touch(&rest) {
             None => Ok(rest),
             Some(touch) => Err(Refusal::Touched(touch)),

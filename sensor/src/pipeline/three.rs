@@ -58,9 +58,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let marker = markers.get_mut(lost)?;
         (marker.x, marker.y) = at;
         status |= prepared.finder.judge_three(&three, trust, &markers.array());
-        let (force, told) = resting.told(forward, &model.range, noise, &estimate);
-        status |= told | Status::MARKER_LOST;
-        let is_touched = told.contains(Status::CONTACT);
+        let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
+        status |= found | Status::MARKER_LOST;
+        let is_touched = found.contains(Status::CONTACT);
         let is_known = !is_touched || forward.is_far_from(lost, &estimate);
         let is_explained = is_known && estimate.is_explained_by_three(is_touched);
         if !is_explained || status.intersects(Status::NO_FORCE) {

@@ -18,7 +18,7 @@ pub enum Down {
 
 impl Down {
     /// The direction, if it was set by the host.
-    pub fn told(self) -> Option<Direction> {
+    pub fn direction(self) -> Option<Direction> {
         match self {
             Down::Told(direction) => Some(direction),
             Down::Fixed | Down::Unknown => None,

@@ -1,14 +1,14 @@
 //! Known presses on simulated sensors, and the sensor's answers.
 
 mod bound;
-mod drawn;
+mod random_unit;
 mod real;
 mod rows;
 mod unit;
 
 pub use bound::Information;
-use drawn::Drawn;
-pub use drawn::{normal, seeded};
+use random_unit::RandomUnit;
+pub use random_unit::{normal, seeded};
 pub use real::RealFilm;
 pub use rows::{Errors, Row};
 pub use unit::{Answer, Tared, TestedUnit};

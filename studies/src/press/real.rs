@@ -26,8 +26,8 @@ pub struct RealFilm {
 impl RealFilm {
     /// The film with this number, with the posts and dots of these options, under a tip with a
     /// radius in mm.
-    pub fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
-        let film = Film::new(&drawn(number, options, tip_radius_mm))?;
+    pub fn random(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
+        let film = Film::new(&random_design(number, options, tip_radius_mm))?;
         Ok(Self {
             rest: film.rest(),
             film,
@@ -75,7 +75,7 @@ fn far(load: &Load, other: &Load) -> f64 {
 }
 
 /// The design of the film with this number.
-fn drawn(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
+fn random_design(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
     let mut random = seeded(77_000 + number);
     let mut between = |from: f64, to: f64| random.random_range(from..to);
     let unit = &options.film.unit;

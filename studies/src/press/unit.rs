@@ -13,7 +13,7 @@ use hivtac_twin::film::Pressed;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 
-use super::{Drawn, RealFilm};
+use super::{RandomUnit, RealFilm};
 
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
@@ -65,20 +65,20 @@ impl TestedUnit {
     }
 
     /// The unit with this number among randomly drawn units.
-    pub fn drawn(conditions: &Conditions, number: u64) -> Result<Self> {
+    pub fn random(conditions: &Conditions, number: u64) -> Result<Self> {
         let focal_px = conditions.geometry.focal.to_f64();
-        let Drawn {
+        let RandomUnit {
             options,
             tip_radius_mm,
-        } = Drawn::new(number, focal_px);
+        } = RandomUnit::new(number, focal_px);
         Self::new(conditions, options, tip_radius_mm, number)
     }
 
     /// The same unit with the film of this number among randomly drawn films.
     pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
-        let unit = Self::drawn(conditions, number)?;
+        let unit = Self::random(conditions, number)?;
         let options = unit.scene.options();
-        let film = RealFilm::drawn(number, options, unit.tip_radius_mm)?;
+        let film = RealFilm::random(number, options, unit.tip_radius_mm)?;
         Ok(Self {
             real: Some(film),
             ..unit

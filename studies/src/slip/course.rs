@@ -59,7 +59,7 @@ pub struct Course {
 
 impl Course {
     /// A random course of a kind, with a tip's radius in mm.
-    pub fn drawn(kind: Kind, tip_radius_mm: f64, random: &mut ChaCha8Rng) -> Self {
+    pub fn random(kind: Kind, tip_radius_mm: f64, random: &mut ChaCha8Rng) -> Self {
         let ratio = random.random_range(RATIOS[0]..RATIOS[1]);
         let (sin, cos) = random.random_range(0.0..std::f64::consts::TAU).sin_cos();
         let start_mm = [0; 2].map(|_| random.random_range(-REACH_MM..REACH_MM));
@@ -128,7 +128,7 @@ struct Run<'r> {
 }
 
 impl Run<'_> {
-    fn drawn(&mut self, from: f64, to: f64) -> f64 {
+    fn uniform(&mut self, from: f64, to: f64) -> f64 {
         self.random.random_range(from..to)
     }
 
@@ -152,9 +152,9 @@ impl Run<'_> {
     }
 
     fn press(&mut self) {
-        let force_n = self.drawn(0.03, 0.15);
-        let [rises_s, falls_s] = [0; 2].map(|_| self.drawn(0.03, 0.3));
-        let leans_mm = self.drawn(0.0, 0.6) * self.ratio * force_n / STIFFNESS;
+        let force_n = self.uniform(0.03, 0.15);
+        let [rises_s, falls_s] = [0; 2].map(|_| self.uniform(0.03, 0.3));
+        let leans_mm = self.uniform(0.0, 0.6) * self.ratio * force_n / STIFFNESS;
         let pressed = |part| (force_n * part, leans_mm * part);
         self.until(rises_s, |part| pressed(ramp(part)));
         self.until(0.3, |_| pressed(1.0));
@@ -162,44 +162,44 @@ impl Run<'_> {
     }
 
     fn drag(&mut self) {
-        let (force_n, rises_s) = (self.drawn(0.03, 0.15), self.drawn(0.05, 0.3));
+        let (force_n, rises_s) = (self.uniform(0.03, 0.15), self.uniform(0.05, 0.3));
         self.until(rises_s, |part| (force_n * ramp(part), 0.0));
         self.until(0.1, |_| (force_n, 0.0));
-        let speed = 20f64.powf(self.drawn(0.0, 1.0));
+        let speed = 20f64.powf(self.uniform(0.0, 1.0));
         let sticks_mm = self.ratio * force_n / STIFFNESS;
-        let slides_mm = (0.6 * speed).min(self.drawn(1.0, 2.0));
+        let slides_mm = (0.6 * speed).min(self.uniform(1.0, 2.0));
         let way_mm = sticks_mm + slides_mm;
         self.until(way_mm / speed, |part| (force_n, way_mm * part));
         self.until(0.2, |_| (force_n, way_mm));
-        let falls_s = self.drawn(0.05, 0.3);
+        let falls_s = self.uniform(0.05, 0.3);
         self.until(falls_s, |part| (force_n * (1.0 - ramp(part)), way_mm));
     }
 
     fn release(&mut self) {
-        let (force_n, rises_s) = (self.drawn(0.05, 0.15), self.drawn(0.1, 0.3));
-        let pulled_mm = self.drawn(0.5, 0.9) * self.ratio * force_n / STIFFNESS;
+        let (force_n, rises_s) = (self.uniform(0.05, 0.15), self.uniform(0.1, 0.3));
+        let pulled_mm = self.uniform(0.5, 0.9) * self.ratio * force_n / STIFFNESS;
         self.until(rises_s, |part| (force_n * ramp(part), 0.0));
-        let pulls_s = self.drawn(0.1, 0.4);
+        let pulls_s = self.uniform(0.1, 0.4);
         self.until(pulls_s, |part| (force_n, pulled_mm * ramp(part)));
         self.until(0.2, |_| (force_n, pulled_mm));
-        let falls_s = self.drawn(0.1, 0.5);
+        let falls_s = self.uniform(0.1, 0.5);
         self.until(falls_s, |part| (force_n * (1.0 - part), pulled_mm));
     }
 
     /// An object hangs from the film while it sticks; a heavy one falls.
     fn grasp(&mut self) {
-        let grip_n = self.drawn(0.04, 0.1);
-        let closes_s = self.drawn(0.1, 0.3);
+        let grip_n = self.uniform(0.04, 0.1);
+        let closes_s = self.uniform(0.1, 0.3);
         self.until(closes_s, |part| (grip_n * ramp(part), 0.0));
         self.until(0.1, |_| (grip_n, 0.0));
         let is_light = self.random.random_bool(0.5);
         let part = if is_light {
-            self.drawn(0.4, 0.8)
+            self.uniform(0.4, 0.8)
         } else {
-            self.drawn(1.02, 1.3)
+            self.uniform(1.02, 1.3)
         };
         let weight_n = part * self.ratio * grip_n;
-        let [lifts_s, reacts_s] = [self.drawn(0.15, 0.4), self.drawn(0.04, 0.08)];
+        let [lifts_s, reacts_s] = [self.uniform(0.15, 0.4), self.uniform(0.04, 0.08)];
         let mut object = Moved {
             mass_kg: weight_n / GRAVITY,
             ..Moved::default()
@@ -227,10 +227,10 @@ impl Run<'_> {
 
     /// Like the scene's `catch`, with a motion along the film that friction slows.
     fn catch(&mut self) {
-        let (peak_n, hold_n) = (self.drawn(0.08, 0.15), self.drawn(0.03, 0.06));
-        let frequency_hz = self.drawn(6.0, 12.0);
+        let (peak_n, hold_n) = (self.uniform(0.08, 0.15), self.uniform(0.03, 0.06));
+        let frequency_hz = self.uniform(6.0, 12.0);
         let speed = match self.random.random_bool(0.5) {
-            true => self.drawn(20.0, 100.0),
+            true => self.uniform(20.0, 100.0),
             false => 0.0,
         };
         let mut object = Moved {

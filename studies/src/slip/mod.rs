@@ -100,7 +100,7 @@ impl Slip {
     fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Scores> {
         let conditions = &model.conditions;
         let nominal = TestedUnit::new(conditions, Options::default(), 0.5, number)?;
-        let drawn = TestedUnit::drawn(conditions, number)?;
+        let drawn = TestedUnit::random(conditions, number)?;
         let own = (Bench::Ten)
             .calibrate(weights, &drawn, &mut drawn.tare(model)?, number)
             .and_then(|own| export(&own))
@@ -131,7 +131,7 @@ impl Slip {
 /// A course that the simulated film can hold, with all markers in the picture.
 fn shown(unit: &TestedUnit, kind: Kind, random: &mut ChaCha8Rng) -> Result<Course> {
     for _ in 0..DRAWS {
-        let course = Course::drawn(kind, unit.tip_radius_mm, random);
+        let course = Course::random(kind, unit.tip_radius_mm, random);
         let steps = (course.duration_s() / LOOKED_AT_S) as u32;
         let is_shown = |step: u32| {
             let load = course.load(f64::from(step) * LOOKED_AT_S);

@@ -66,7 +66,7 @@ impl TradeoffArgs {
     pub fn run(&self) -> Result<()> {
         let all = configurations()?;
         let picked = best(&all, &self.limits)?;
-        println!("{}", told(picked));
+        println!("{}", described(picked));
         if let Some(folder) = &self.out {
             let rendering = bar("rendering", model::FRAMES);
             println!("{}", model::write(picked, folder, || rendering.inc(1))?);
@@ -134,7 +134,7 @@ impl fmt::Display for Configuration {
     }
 }
 
-fn told(picked: &Configuration) -> String {
+fn described(picked: &Configuration) -> String {
     format!(
         "picked: {picked}\n  simulated: direction {:.3}° ± {:.3}° from 50 mN up, {:.3}° over all; \
          |F| {:.3} mN RMSE; place {:.1} µm along x and y each\n  modelled: {} cycles, {:.0} µs, \

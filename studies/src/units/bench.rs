@@ -103,7 +103,7 @@ impl Bench {
                 let load = Load::from_angles(force_n, alpha, beta)?;
                 let load = load.with_offset_mm(there(place_mm))?;
                 let seen = tared.seen_px(unit, load, FRAMES, 50_000 + 10 * number)?;
-                loads.push(told(seen, load.vector_n(), place_mm, random));
+                loads.push(with_gauge_error(seen, load.vector_n(), place_mm, random));
             }
             return Ok(loads);
         }
@@ -129,19 +129,19 @@ impl Bench {
             }
             let seen = tared.seen_px(unit, load, FRAMES, number)?;
             if self == Bench::ByHand {
-                let told = told(seen, [0.0, 0.0, -force_n], [0.0; 2], random);
+                let load = with_gauge_error(seen, [0.0, 0.0, -force_n], [0.0; 2], random);
                 loads.push(SeenLoad {
                     direction_rad: HAND_DEG.to_radians(),
                     each_place_mm: f64::INFINITY,
                     // Areas at rest suffice for a rough place.
-                    place_mm: rough.place_mm(&told.observation(rest.areas_px)),
-                    ..told
+                    place_mm: rough.place_mm(&load.observation(rest.areas_px)),
+                    ..load
                 });
             } else {
                 let noted = place_mm.map(|part| part + PLACE_MM * normal(random));
                 loads.push(SeenLoad {
                     each_place_mm: PLACE_MM,
-                    ..told(seen, load.vector_n(), noted, random)
+                    ..with_gauge_error(seen, load.vector_n(), noted, random)
                 });
             }
         }
@@ -151,16 +151,16 @@ impl Bench {
 
 /// A load with this force, N, changed by the gauge's error, with this place, mm, and the markers'
 /// places, px.
-fn told(
+fn with_gauge_error(
     seen_px: [[f64; 2]; 4],
     force_n: [f64; 3],
     place_mm: [f64; 2],
     random: &mut ChaCha8Rng,
 ) -> SeenLoad {
     let size_n = force_n.iter().map(|part| part * part).sum::<f64>().sqrt();
-    let told = 1.0 + GAUGE_N * normal(random) / size_n;
+    let scale = 1.0 + GAUGE_N * normal(random) / size_n;
     SeenLoad {
-        force_n: force_n.map(|part| told * part),
+        force_n: force_n.map(|part| scale * part),
         size_n: GAUGE_N,
         direction_rad: 0.0,
         place_mm,

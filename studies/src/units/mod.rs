@@ -128,7 +128,7 @@ impl Units {
 
     fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Tested> {
         let unit = match self.films {
-            Films::Nominal => TestedUnit::drawn(&model.conditions, number)?,
+            Films::Nominal => TestedUnit::random(&model.conditions, number)?,
             Films::Real => TestedUnit::with_real_film(&model.conditions, number)?,
         };
         let mut tared = unit.tare(model)?;

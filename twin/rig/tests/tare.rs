@@ -86,7 +86,7 @@ fn answered_by(mut setup: Setup, asked: &[(u64, Request, Result<Outcome, Touch>)
 }
 
 /// The rest position goes to a sensor over whose film a tip moves. A press at that depth is refused
-/// even with insistence. Then a rest position with an error of a pixel goes to a sensor at rest.
+/// even when forced. Then a rest position with an error of a pixel goes to a sensor at rest.
 #[test]
 fn a_touched_film_is_not_tared_and_a_tare_tells_how_far_it_is_from_the_one_before() {
     let rest = report(&tared("rest", 200)).rest;

@@ -497,7 +497,7 @@ impl Equilibrium {
 
     /// Returns the state at a place of a path, predicted by the polynomial through known states: a
     /// start for [`Film::press`]. Returns `None` if `path` is empty.
-    pub fn foretold(path: &[(f64, &Equilibrium)], at: f64) -> Option<Equilibrium> {
+    pub fn extrapolated(path: &[(f64, &Equilibrium)], at: f64) -> Option<Equilibrium> {
         let mut state = (*path.last()?.1).clone();
         state.unknowns.fill(0.0);
         for (k, (place, known)) in path.iter().enumerate() {

@@ -23,7 +23,7 @@ impl Path {
         let latest = &self.0[self.0.len().saturating_sub(FORETOLD_FROM)..];
         let known: Vec<_> = latest.iter().map(|(at, state)| (*at, state)).collect();
         let last = &self.0[self.0.len() - 1].1;
-        let state = Equilibrium::foretold(&known, place)
+        let state = Equilibrium::extrapolated(&known, place)
             .and_then(|start| film.press(contact, &start).ok())
             .map_or_else(|| film.press(contact, last), Ok)?;
         self.0.push((place, state.clone()));

@@ -471,7 +471,7 @@ impl WithSimd for BySheet<'_> {
     fn with_simd<S: Simd>(self, _: S) -> Vec<Vec<f64>> {
         let BySheet { shell, u, changes } = self;
         let any = |one: fn(&Change) -> bool| changes.iter().any(one);
-        let asked = Asked {
+        let needed = NeededRates {
             law: any(|change| matches!(change, Change::NeoHooke | Change::Stiffening)),
             stretch: any(|change| matches!(change, Change::Stretch(_))),
         };
@@ -485,7 +485,7 @@ impl WithSimd for BySheet<'_> {
             for (j, (_, y)) in cell.y.iter().enumerate() {
                 for i in 0..cell.x.len() {
                     let x = shell.vectors(&moved[i], y);
-                    let rates = Rates::new(shell, &x, cell.shares[j][i], cell.at(i, j), asked);
+                    let rates = Rates::new(shell, &x, cell.shares[j][i], cell.at(i, j), needed);
                     for (line, change) in lines.iter_mut().zip(changes) {
                         spread(&mut line[i], y, &rates.gradient(*change));
                         if heavy || matches!(change, Change::Down(_)) {
@@ -498,27 +498,27 @@ impl WithSimd for BySheet<'_> {
                 shell.scatter(sum, cell.origin, &gathered(line, cell.x));
             }
         }
-        shell.add_dots(u, changes, asked, &mut sums);
+        shell.add_dots(u, changes, needed, &mut sums);
         sums
     }
 }
 
 /// The costly derivatives that the caller asked for.
 #[derive(Clone, Copy)]
-struct Asked {
+struct NeededRates {
     law: bool,
     stretch: bool,
 }
 
 impl Shell {
     /// Adds the dots' part of the gradient's derivatives by changes.
-    fn add_dots(&self, u: &[f64], changes: &[Change], asked: Asked, sums: &mut [Vec<f64>]) {
+    fn add_dots(&self, u: &[f64], changes: &[Change], needed: NeededRates, sums: &mut [Vec<f64>]) {
         let stiffening = self.sheet.dot_stiffening;
         for (&origin, spots) in &self.spots {
             let local = self.grid.gather(u, origin);
             for spot in spots {
                 let x = self.surface(&spot.slopes, &local);
-                let rates = Rates::new(self, &x, spot.share, spot.at, asked);
+                let rates = Rates::new(self, &x, spot.share, spot.at, needed);
                 for (sum, change) in sums.iter_mut().zip(changes) {
                     let gradient = match change {
                         Change::DotStiffening => rates.gradient(Change::Youngs),
@@ -547,7 +547,13 @@ struct Rates<'a> {
 
 impl<'a> Rates<'a> {
     #[inline(always)]
-    fn new(shell: &'a Shell, x: &Point, share: Share, at: [f64; 2], asked: Asked) -> Rates<'a> {
+    fn new(
+        shell: &'a Shell,
+        x: &Point,
+        share: Share,
+        at: [f64; 2],
+        needed: NeededRates,
+    ) -> Rates<'a> {
         let zero = [[[0.0; 3]; VECTORS]; 2];
         let (sheet, mut terms) = (&shell.sheet, Sheet::terms_at(at));
         let mut relative = 1.0;
@@ -562,11 +568,11 @@ impl<'a> Rates<'a> {
             share,
             terms,
             parts: shell.laws.parts(x),
-            by_law: match asked.law {
+            by_law: match needed.law {
                 true => shell.laws.by_law(x),
                 false => zero,
             },
-            by_stretch: match asked.stretch {
+            by_stretch: match needed.stretch {
                 true => [
                     by_stretch(shell, x, share, 0),
                     by_stretch(shell, x, share, 1),

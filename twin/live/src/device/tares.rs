@@ -32,7 +32,7 @@ impl Device {
         let patience_us = u64::from(self.camera.frame_us()) * FRAME_TIMES_EACH * u64::from(frames);
         self.taring = Some(Taring {
             id,
-            builder: if anyway { builder.insisting() } else { builder },
+            builder: if anyway { builder.forced() } else { builder },
             deadline_us: self.now_us + patience_us + EXTRA_US,
         });
         None

@@ -1,7 +1,7 @@
 //! Draws random units, as people build them.
 
 use hivtac_twin::Options;
-use hivtac_twin::units::{TIP_RADIUS_MM, drawn};
+use hivtac_twin::units::{TIP_RADIUS_MM, random_unit};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -10,18 +10,18 @@ const FOCAL_UM: f64 = 2100.0;
 
 /// A unit that was drawn at random.
 #[derive(Clone, Debug)]
-pub struct Drawn {
+pub struct RandomUnit {
     /// Its scene.
     pub options: Options,
     /// Its tip's radius, mm.
     pub tip_radius_mm: f64,
 }
 
-impl Drawn {
+impl RandomUnit {
     /// The unit with this number, with a camera's focal length in px.
     pub fn new(number: u64, focal_px: f64) -> Self {
         let mut random = seeded(number);
-        let options = drawn(|| normal(&mut random), FOCAL_UM, focal_px);
+        let options = random_unit(|| normal(&mut random), FOCAL_UM, focal_px);
         let [from, to] = TIP_RADIUS_MM;
         Self {
             options,
