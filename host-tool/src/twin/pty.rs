@@ -9,7 +9,7 @@ use hivtac_live::line::converse;
 use hivtac_live::run::Shared;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, open};
-use rustix::io::Errno;
+use rustix::io::{Errno, FdFlags, fcntl_setfd};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use std::ffi::OsStr;
@@ -48,7 +48,9 @@ pub fn serve(link: &Path, shared: &Shared) -> Result<PathBuf, Failure> {
 
 /// The device's side, the host's side, and the path of the latter.
 fn raw_terminal() -> Result<(OwnedFd, OwnedFd, PathBuf), Errno> {
-    let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC)?;
+    let device = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY)?;
+    // Not every system takes it as a flag of `openpt`.
+    fcntl_setfd(&device, FdFlags::CLOEXEC)?;
     grantpt(&device)?;
     unlockpt(&device)?;
     let name = ptsname(&device, Vec::new())?;
