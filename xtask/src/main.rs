@@ -8,6 +8,7 @@ mod fuzz;
 mod packages;
 mod process;
 mod python;
+mod release;
 mod report;
 mod size;
 mod test;
@@ -31,6 +32,8 @@ enum Task {
     Bench(bench::Bench),
     /// Show what the firmware takes of each memory.
     Size,
+    /// Make the files of a release: programs, Python wheels and firmware, and install them.
+    Release(release::Release),
 }
 
 fn main() -> ExitCode {
@@ -51,6 +54,7 @@ fn run(task: Task) -> Result<()> {
         Task::Demo(demo) => demo.run(),
         Task::Test(test) => test.run(),
         Task::Bench(bench) => bench.run(),
+        Task::Release(release) => release.run(),
         Task::Size => size::memories().map(|table| println!("{table}")),
     }
 }

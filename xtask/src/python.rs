@@ -52,7 +52,7 @@ fn obstacle(environment: [&str; 3], missing: &'static str) -> Option<&'static st
 }
 
 /// The Python of an environment, with the packages installed.
-fn python([folder, modules, packages]: [&str; 3]) -> Result<PathBuf> {
+pub fn python([folder, modules, packages]: [&str; 3]) -> Result<PathBuf> {
     let folder = toolchain::at("target").join(folder);
     let python = folder.join("bin/python");
     let import = format!("import {modules}");
@@ -64,7 +64,7 @@ fn python([folder, modules, packages]: [&str; 3]) -> Result<PathBuf> {
 }
 
 /// The quiet command `pip install`.
-fn pip(python: &Path) -> Command {
+pub fn pip(python: &Path) -> Command {
     let mut command = Command::new(python);
     command.args("-m pip install --quiet --disable-pip-version-check".split(' '));
     command

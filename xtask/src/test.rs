@@ -32,7 +32,7 @@ type Work = fn(&Shared, &mut Tally) -> Result<()>;
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
 /// the microcontroller come first, in their own folder, while the lints hold the common one. Long
 /// steps follow; those after them fill the time until both threads end.
-static STEPS: [Step; 14] = [
+static STEPS: [Step; 15] = [
     ("format", |_, _| format(), None),
     (
         "lints: microcontroller",
@@ -62,6 +62,11 @@ static STEPS: [Step; 14] = [
     ),
     ("benchmark", |shared, _| shared.benchmark(), None),
     ("build: board benchmark", |_, _| bench::board::lint(), None),
+    (
+        "build: other systems",
+        |_, _| other_systems(),
+        Some(no_other_systems),
+    ),
     ("licences", |_, _| licences(), Some(no_cargo_deny)),
 ];
 
@@ -233,6 +238,23 @@ fn rig_tests_at_half_speed(shared: &Shared, tally: &mut Tally) -> Result<()> {
     command.env("HIVTAC_BUSY_BUS", "1");
     command.args(["--", "camera::", "faults::", "firmware::", "threshold::"]);
     run_tests(&mut command, tally)
+}
+
+/// Systems on which the host tool is not tested, but compiles.
+const OTHER_SYSTEMS: [&str; 2] = ["x86_64-pc-windows-gnu", "aarch64-apple-darwin"];
+
+fn no_other_systems() -> Option<&'static str> {
+    let mut add = process::command("rustup target add");
+    let added = process::succeeds(add.args(OTHER_SYSTEMS).env("RUSTUP_AUTO_INSTALL", "0"));
+    (!added).then_some("rustup cannot add the targets of Windows and macOS")
+}
+
+fn other_systems() -> Result<()> {
+    for system in OTHER_SYSTEMS {
+        let words = "check --profile tools --package hivtac --bin hivtac --target";
+        process::run(cargo(words, "").arg(system))?;
+    }
+    Ok(())
 }
 
 fn no_cargo_deny() -> Option<&'static str> {

@@ -1,0 +1,256 @@
+//! `cargo xtask release`: makes and checks the files of a release.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use anyhow::{Context, Result, anyhow, ensure};
+use clap::Args;
+use object::Endianness;
+use object::elf::PT_LOAD;
+use object::read::elf::{ElfFile32, ProgramHeader};
+use serde_json::Value;
+
+use crate::artifacts::{self, Board};
+use crate::{process, python, toolchain};
+
+/// Options of `cargo xtask release`.
+#[derive(Args)]
+pub struct Release {
+    /// Linux computers for which to build, by Rust's names. By default x86-64 and ARM, with glibc
+    /// 2.17 and with musl.
+    #[arg(long, value_name = "TARGET")]
+    target: Vec<String>,
+}
+
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+const LINUX: [&str; 4] = [
+    "x86_64-unknown-linux-gnu",
+    "x86_64-unknown-linux-musl",
+    "aarch64-unknown-linux-gnu",
+    "aarch64-unknown-linux-musl",
+];
+/// What builds programs and wheels for other computers: the environment's folder below `target/`,
+/// imported modules, and packages of PyPI.
+const BUILDERS: [&str; 3] = [
+    "python-release",
+    "maturin, ziglang",
+    "maturin>=1.9,<2 cargo-zigbuild>=0.20,<1 ziglang",
+];
+/// Programs without symbols are a third as large.
+const STRIP: [&str; 2] = ["CARGO_PROFILE_RELEASE_STRIP", "symbols"];
+/// Files beside the program in each archive.
+const BESIDE: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];
+
+impl Release {
+    /// Writes the files to `target/xtask/release/VERSION/`, then installs those that this computer
+    /// runs.
+    pub fn run(&self) -> Result<()> {
+        let folder = toolchain::work_folder("release")?.join(VERSION);
+        if folder.exists() {
+            std::fs::remove_dir_all(&folder)?;
+        }
+        std::fs::create_dir_all(&folder)?;
+        let changes = process::read(&toolchain::at("CHANGELOG.md"))?;
+        std::fs::write(folder.join("notes.md"), notes(&changes, VERSION)?)?;
+        let python = python::python(BUILDERS)?;
+        let mut names: Vec<&str> = self.target.iter().map(String::as_str).collect();
+        if names.is_empty() {
+            names.extend(LINUX);
+        }
+        for name in names {
+            let target = Target {
+                name,
+                python: &python,
+                folder: &folder,
+            };
+            let program = target.build()?;
+            target.archive(&program)?;
+            target.wheel(&program)?;
+        }
+        images(&folder)?;
+        bill_of_materials(&folder)?;
+        install(&folder)?;
+        let sums = process::output(
+            Command::new("sh")
+                .arg("-c")
+                .arg("sha256sum -- *")
+                .current_dir(&folder),
+        )?;
+        std::fs::write(folder.join("SHA256SUMS"), &sums)?;
+        process::print(&sums);
+        Ok(())
+    }
+}
+
+/// The newest section of the changelog `text`, which must be that of `version`.
+fn notes(text: &str, version: &str) -> Result<String> {
+    let newest = text.split("\n## ").nth(1);
+    let newest = newest.context("CHANGELOG.md has no section")?;
+    let of = newest.split([',', ' ', '\n']).next().unwrap_or_default();
+    ensure!(
+        of == version,
+        "the newest section of CHANGELOG.md is of {of}, Cargo.toml says {version}"
+    );
+    Ok(format!("# {newest}"))
+}
+
+/// A computer for which files are made.
+struct Target<'a> {
+    name: &'a str,
+    /// With maturin and zig.
+    python: &'a Path,
+    folder: &'a Path,
+}
+
+impl Target<'_> {
+    /// A command with the environment's programs first in its path.
+    fn with_builders(&self, mut command: Command) -> Result<Command> {
+        let path = std::env::var_os("PATH").unwrap_or_default();
+        let programs = self.python.with_file_name("");
+        let folders = std::iter::once(programs).chain(std::env::split_paths(&path));
+        command.env("PATH", std::env::join_paths(folders)?);
+        Ok(command)
+    }
+
+    /// Builds the host tool against the oldest C library that wheels allow.
+    fn build(&self) -> Result<PathBuf> {
+        process::run(process::command("rustup target add").arg(self.name))?;
+        let glibc = self.name.ends_with("-gnu").then_some(".2.17");
+        let mut build = toolchain::cargo("zigbuild --release --package hivtac --bin hivtac", "");
+        build.env(STRIP[0], STRIP[1]).arg("--target");
+        build.arg(format!("{}{}", self.name, glibc.unwrap_or_default()));
+        process::run(&mut self.with_builders(build)?)?;
+        let built = toolchain::at("target").join(self.name);
+        Ok(built.join("release/hivtac"))
+    }
+
+    fn archive(&self, program: &Path) -> Result<()> {
+        let name = format!("hivtac-{VERSION}-{}.tar.gz", self.name);
+        let mut tar = Command::new("tar");
+        tar.arg("-czf").arg(self.folder.join(name)).arg("-C");
+        tar.arg(program.with_file_name("")).arg("hivtac").arg("-C");
+        process::run(tar.arg(toolchain::at("")).args(BESIDE))
+    }
+
+    /// Builds Python's package, with the program in it.
+    fn wheel(&self, program: &Path) -> Result<()> {
+        let package = toolchain::at("host-tool/python");
+        // The folder's other files are the project's own.
+        let scripts = package.join("hivtac.data/scripts");
+        std::fs::create_dir_all(&scripts)?;
+        std::fs::copy(program, scripts.join("hivtac"))?;
+        let is_musl = self.name.ends_with("-musl");
+        let system = if is_musl {
+            "musllinux_1_2"
+        } else {
+            "manylinux2014"
+        };
+        let mut maturin = Command::new(self.python);
+        maturin.env(STRIP[0], STRIP[1]).current_dir(&package);
+        maturin.args("-m maturin build --release --zig --compatibility".split(' '));
+        maturin
+            .args([system, "--target", self.name, "--out"])
+            .arg(self.folder);
+        let built = process::run(&mut self.with_builders(maturin)?);
+        std::fs::remove_dir_all(scripts)?;
+        built
+    }
+}
+
+/// Writes both boards' firmware as it lies in flash.
+fn images(folder: &Path) -> Result<()> {
+    for (board, name) in [(Board::Weact, "weact-h743"), (Board::OpenmvH7, "openmv-h7")] {
+        let elf = std::fs::read(artifacts::firmware(board)?)?;
+        let file = folder.join(format!("hivtac-firmware-{VERSION}-{name}.bin"));
+        std::fs::write(file, image(&elf)?)?;
+    }
+    Ok(())
+}
+
+/// What an ELF loads into flash, from the first address on; gaps are blank flash.
+fn image(elf: &[u8]) -> Result<Vec<u8>> {
+    let file = ElfFile32::<Endianness>::parse(elf).context("not an ELF file")?;
+    let (endian, mut image) = (file.endian(), Vec::new());
+    let segments = file.elf_program_headers().iter();
+    let loaded = segments.filter(|segment| segment.p_filesz(endian) > 0);
+    let mut loaded: Vec<_> = loaded
+        .filter(|segment| segment.p_type(endian) == PT_LOAD)
+        .collect();
+    loaded.sort_by_key(|segment| segment.p_paddr(endian));
+    let start = loaded
+        .first()
+        .context("an ELF that loads nothing")?
+        .p_paddr(endian);
+    for segment in loaded {
+        image.resize((segment.p_paddr(endian) - start) as usize, 0xFF);
+        let bytes = segment.data(endian, elf);
+        image.extend(bytes.map_err(|()| anyhow!("an ELF that is cut"))?);
+    }
+    Ok(image)
+}
+
+/// Writes what the host tool is made of, as CycloneDX. Each wheel has its own list.
+fn bill_of_materials(folder: &Path) -> Result<()> {
+    if !toolchain::has("cyclonedx") {
+        process::run(&mut toolchain::cargo(
+            "install --locked cargo-cyclonedx",
+            "",
+        ))?;
+    }
+    let name = format!("hivtac-{VERSION}.cdx");
+    let mut list = toolchain::cargo("cyclonedx --format json", "");
+    list.args(["--override-filename", &name]);
+    list.arg("--manifest-path")
+        .arg(toolchain::at("host-tool/Cargo.toml"));
+    process::run(&mut list)?;
+    // It writes one beside each manifest of the workspace.
+    let metadata = process::output(&mut toolchain::cargo(
+        "metadata --no-deps --format-version 1",
+        "",
+    ))?;
+    let metadata: Value = serde_json::from_str(&metadata)?;
+    for package in metadata["packages"].as_array().into_iter().flatten() {
+        let manifest = Path::new(package["manifest_path"].as_str().unwrap_or_default());
+        let written = manifest.with_file_name(format!("{name}.json"));
+        if package["name"] == "hivtac" {
+            std::fs::copy(&written, folder.join(format!("{name}.json")))?;
+        }
+        std::fs::remove_file(written)?;
+    }
+    Ok(())
+}
+
+/// Installs the wheel that runs here into an environment of its own, and asks the program and the
+/// package for forces of a simulated sensor.
+fn install(folder: &Path) -> Result<()> {
+    let environment = toolchain::work_folder("release")?.join("installed");
+    process::run(process::command("python3 -m venv --clear").arg(&environment))?;
+    let programs = environment.join("bin");
+    let mut pip = python::pip(&programs.join("python"));
+    process::run(
+        pip.arg("--find-links")
+            .arg(folder)
+            .arg(format!("hivtac=={VERSION}")),
+    )?;
+    let version = process::output(Command::new(programs.join("hivtac")).arg("--version"))?;
+    ensure!(
+        version.trim() == format!("hivtac {VERSION}"),
+        "installed: {version}"
+    );
+    let mut import = Command::new(programs.join("python"));
+    process::run(import.args(["-I", "-c", "import hivtac; print(hivtac.open)"]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_are_the_newest_section() {
+        let of = |text: &str| notes(text, "0.2.0").ok();
+        let text = "# Changelog\n\n## 0.2.0, the first\n\n- New.\n\n## 0.1.0\n\n- Old.\n";
+        assert_eq!(of(text).as_deref(), Some("# 0.2.0, the first\n\n- New.\n"));
+        assert_eq!(of("# Changelog\n\n## 0.1.0\n\n- Old.\n"), None);
+        assert_eq!(of("# Changelog\n"), None);
+    }
+}
