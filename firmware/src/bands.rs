@@ -23,14 +23,7 @@ pub const BAND_BYTES: usize = BAND_LENGTH * size_of::<u16>();
 const _: () = {
     assert!(HEIGHT.is_multiple_of(ROWS));
     assert!(BAND_BYTES.is_multiple_of(BUFFER_BYTES as usize));
-    // The widest rows of the pipeline fit, too.
-    assert!(ring_bytes(800) <= 512 * 1024);
 };
-
-/// Size of the ring for rows of `width` pixels, bytes.
-const fn ring_bytes(width: usize) -> usize {
-    SLOTS as usize * ROWS as usize * width * size_of::<u16>()
-}
 
 #[repr(C, align(128))]
 struct Ring(MaybeUninit<[[u16; BAND_LENGTH]; SLOTS as usize]>);

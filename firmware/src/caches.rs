@@ -1,9 +1,9 @@
 //! Sets up the caches and the memory protection unit (MPU).
 //!
 //! Both caches are on, because code and model are in flash, which is slow without them. Memory that
-//! the DMA writes and the core reads is in AXI SRAM, which one MPU region makes normal,
-//! non-cacheable memory. So no cache line can hold a stale pixel, and no code has to invalidate
-//! one. DTCM is never cached.
+//! the DMA writes and the core reads is in AXI SRAM, whose lower five eighths one MPU region makes
+//! normal, non-cacheable memory. So no cache line can hold a stale pixel, and no code has to
+//! invalidate one. DTCM is never cached.
 
 use crate::flash;
 use cortex_m::Peripherals;
@@ -57,11 +57,11 @@ const DATA: Region = Region {
     execute: false,
 };
 
-/// AXI SRAM: the DMA buffers.
+/// AXI SRAM: the DMA buffers. Its upper three eighths have a model and no DMA buffer (`memory.x`).
 const DMA_BUFFERS: Region = Region {
     base: 0x2400_0000,
     size_log2: 19,
-    disabled_eighths: 0,
+    disabled_eighths: 0b1110_0000,
     access: FULL_ACCESS,
     memory_type: NORMAL_NON_CACHEABLE,
     execute: false,

@@ -121,7 +121,7 @@ fn start() -> Foreground {
     settings::set_name(memory.record().name.clone());
     let chosen = memory.model();
     let model = InUse::of(&chosen);
-    let format = configure(sensor, chosen, memory.record());
+    let format = configure(sensor, &chosen, memory.record());
     set_camera(memory.record().camera);
     self_test::at_start(&memory.of_flash(), sensor);
 
@@ -146,8 +146,8 @@ fn start() -> Foreground {
 
 /// Configures the pipeline for the camera's frames and the kept settings; returns the pixel format
 /// that it needs.
-fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
-    let Chosen { model, source, .. } = chosen;
+fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
+    let model = chosen.model();
     let settings = model::fitting().settings(model.as_ref(), kept.threshold);
     if sensor.configure(settings, model).is_err() {
         defmt::panic!("the built-in settings are out of range");
@@ -165,7 +165,7 @@ fn configure(sensor: &mut Sensor, chosen: Chosen, kept: &Record) -> Format {
             defmt::Debug2Format(&unusable)
         );
     });
-    settings::follow(sensor, source);
+    settings::follow(sensor, chosen.source);
     // Always a format that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }

@@ -4,8 +4,8 @@
 //! # Design
 //! The first two sectors of the flash's second bank hold a log of one record ([`Log`]). After a
 //! power cut at any moment the device has the old record or the new one. A record of a different
-//! version is not read, and not overwritten until something is kept. The next two sectors hold one
-//! model each; the record names the kept one, after it was read back.
+//! version is not read, and not overwritten until something is kept. The next four sectors hold two
+//! models; the record names the kept one, after it was read back.
 
 use crate::flash::SecondBank;
 use crate::model::{self, Chosen};
@@ -220,23 +220,18 @@ impl Memory {
         Whole { slot, bytes }: Whole,
         file: &'static [u8],
     ) -> Result<Chosen, Outcome> {
-        let model = model::fitting().check(file).map_err(|refusal| {
+        let crc = model::checked(file).map_err(|refusal| {
             log::say(LogLevel::Error, format_args!("{refusal}"));
             refusal.outcome()
         })?;
-        let written = self.log.write_blob(model::sector(slot), file).await;
+        let written = self.log.write_blob(model::sectors(slot), file).await;
         written.map_err(|_| {
             say_worn();
             Outcome::Worn
         })?;
-        let crc = model.crc();
         let kept = Some(KeptModel { slot, bytes, crc });
         self.name_model(kept).await?;
-        Ok(Chosen {
-            model: Some(model),
-            source: ModelSource::Kept,
-            slot: Some(slot),
-        })
+        Ok(Chosen::kept(file, slot))
     }
 
     async fn forget_model(&mut self) -> Result<Chosen, Outcome> {

@@ -4,12 +4,14 @@ use crate::camera;
 use crate::dtcm_table::Sensor;
 use crate::flash::SecondBank;
 use crate::model_slots;
-use hivtac_device::model::Fitting;
+use core::ops::Range;
+use hivtac_device::model::{Fitting, Refusal};
 use hivtac_sensor::force::model::{AlignedFile, Model};
 use hivtac_sensor::known_answer::Answer;
 use hivtac_storage::blob;
+use hivtac_storage::flash::{Flash, WORD_BYTES};
 use hivtac_wire::kept::KeptModel;
-use hivtac_wire::message::ModelSource;
+use hivtac_wire::message::{MODEL_BYTES, ModelSource};
 
 /// The model file, the default one or that of `HIVTAC_MODEL` (`build.rs`); aligned, so that kernels
 /// can run it.
@@ -28,6 +30,10 @@ const NEAR: usize = if FILE.0.len() <= NEAR_LIMIT {
     0
 };
 
+/// Number of flash sectors for a model, enough for [`MODEL_BYTES`].
+const SECTORS: u32 = 2;
+const _: () = assert!(MODEL_BYTES <= (SECTORS * SecondBank::SECTOR_WORDS) as usize * WORD_BYTES);
+
 #[unsafe(link_section = ".data.model")]
 static COPY: AlignedFile<[u8; NEAR]> = AlignedFile(beginning(&FILE.0));
 
@@ -41,10 +47,10 @@ const fn beginning<const N: usize>(bytes: &[u8]) -> [u8; N] {
     copy
 }
 
-/// A model, and its source.
+/// A model file, and its source. The file is read where it is used: a model that was read is two
+/// kilobytes long.
 pub struct Chosen {
-    /// `None` if there is no usable model: samples then report that and have no force.
-    pub model: Option<Model<'static>>,
+    file: &'static [u8],
     /// Its source.
     pub source: ModelSource,
     /// The slot that holds it, which is lent; `None` for a built-in model.
@@ -55,20 +61,30 @@ impl Chosen {
     /// The built-in model, with the reason as its source.
     pub fn built_in(source: ModelSource) -> Self {
         Self {
-            model: built_in(),
+            file: built_in_file(),
             source,
             slot: None,
         }
     }
-}
 
-/// Returns `None`, with a log line, if the file is not usable.
-fn built_in() -> Option<Model<'static>> {
-    match Model::parse(built_in_file()) {
-        Ok(model) => Some(model),
-        Err(error) => {
-            defmt::error!("the built-in model: {}", defmt::Display2Format(&error));
-            None
+    /// A kept model: a checked file, in a slot that is lent.
+    pub fn kept(file: &'static [u8], slot: u8) -> Self {
+        Self {
+            file,
+            source: ModelSource::Kept,
+            slot: Some(slot),
+        }
+    }
+
+    /// Returns the model; `None`, with a log line, if the file is not usable: samples then report
+    /// that and have no force.
+    pub fn model(&self) -> Option<Model<'static>> {
+        match Model::parse(self.file) {
+            Ok(model) => Some(model),
+            Err(error) => {
+                defmt::error!("the model: {}", defmt::Display2Format(&error));
+                None
+            }
         }
     }
 }
@@ -86,20 +102,17 @@ pub fn answers_right(sensor: &mut Sensor) -> bool {
     }
 }
 
-/// The sector of the flash's second bank that keeps the model of a slot, after those of the log.
-pub fn sector(slot: u8) -> u32 {
-    2 + u32::from(slot)
+/// The sectors of the flash's second bank that keep the model of a slot, after those of the log.
+pub fn sectors(slot: u8) -> Range<u32> {
+    let first = 2 + SECTORS * u32::from(slot);
+    first..first + SECTORS
 }
 
 /// Returns the kept model, read from the flash; the built-in one if the kept one is unreadable, or
 /// does not fit this sensor.
 pub fn kept(flash: &mut SecondBank, kept: &KeptModel) -> Chosen {
     match read(flash, kept) {
-        Some(model) => Chosen {
-            model: Some(model),
-            source: ModelSource::Kept,
-            slot: Some(kept.slot),
-        },
+        Some(file) => Chosen::kept(file, kept.slot),
         None => {
             defmt::error!("the kept model cannot be used");
             Chosen::built_in(ModelSource::Fallback)
@@ -107,21 +120,28 @@ pub fn kept(flash: &mut SecondBank, kept: &KeptModel) -> Chosen {
     }
 }
 
-fn read(flash: &mut SecondBank, kept: &KeptModel) -> Option<Model<'static>> {
+fn read(flash: &mut SecondBank, kept: &KeptModel) -> Option<&'static [u8]> {
     let read = model_slots::fill(kept.slot, |file| {
         let file = file.get_mut(..kept.bytes as usize)?;
-        blob::read(flash, sector(kept.slot), file).ok()
+        blob::read(flash, sectors(kept.slot), file).ok()
     });
     read??;
     let file = model_slots::lend(kept.slot, kept.bytes)?;
-    let model = fitting()
-        .check(file)
-        .ok()
-        .filter(|model| model.crc() == kept.crc);
-    if model.is_none() {
-        model_slots::give_back(kept.slot);
+    if checked(file).is_ok_and(|crc| crc == kept.crc) {
+        return Some(file);
     }
-    model
+    model_slots::give_back(kept.slot);
+    None
+}
+
+/// Returns the checksum of a model file that is sound and fits this sensor. Not inlined: the model
+/// is on the stack during the check only.
+///
+/// # Errors
+/// Why it is refused.
+#[inline(never)]
+pub fn checked(file: &[u8]) -> Result<u32, Refusal> {
+    fitting().check(file).map(|model| model.crc())
 }
 
 /// What a model must fit.

@@ -17,12 +17,15 @@ const COUNT: usize = 2;
 /// pipeline.
 static LENT: [AtomicBool; COUNT] = [const { AtomicBool::new(false) }; _];
 
-/// Files begin at a multiple of four, so that kernels can run them, and of a data cache line.
+/// A file begins at a multiple of four, so that kernels can run it, and of a data cache line.
 #[repr(C, align(32))]
-struct Files([[u8; MODEL_BYTES]; COUNT]);
+struct File([u8; MODEL_BYTES]);
 
-#[unsafe(link_section = ".sram_zero.models")]
-static mut FILES: Files = Files([[0; MODEL_BYTES]; COUNT]);
+/// The slots, one in each of two memories: neither has room for both.
+#[unsafe(link_section = ".sram_zero.model")]
+static mut FIRST: File = File([0; MODEL_BYTES]);
+#[unsafe(link_section = ".axisram_cached.model")]
+static mut SECOND: File = File([0; MODEL_BYTES]);
 
 /// Returns a slot that is not lent; `None` if both are.
 pub fn free() -> Option<u8> {
@@ -38,9 +41,9 @@ pub fn fill<T>(slot: u8, fill: impl FnOnce(&mut [u8; MODEL_BYTES]) -> T) -> Opti
     if lent.load(Ordering::Acquire) {
         return None;
     }
-    // SAFETY: the slot is one of `FILES`. It is not lent, so that there is no other reference to
-    // it: those of `fill` end with it, and none runs beside another.
-    let file = unsafe { &mut *file(slot) };
+    // SAFETY: the slot exists. It is not lent, so that there is no other reference to it: those of
+    // `fill` end with it, and none runs beside another.
+    let file = unsafe { &mut *file(slot)? };
     Some(fill(file))
 }
 
@@ -51,8 +54,8 @@ pub fn lend(slot: u8, bytes: u32) -> Option<&'static [u8]> {
     if lent.swap(true, Ordering::AcqRel) {
         return None;
     }
-    // SAFETY: the slot is one of `FILES`, and is not written while it is lent.
-    let file = unsafe { &*file(slot) };
+    // SAFETY: the slot exists, and is not written while it is lent.
+    let file = unsafe { &*file(slot)? };
     file.get(..bytes as usize)
 }
 
@@ -63,9 +66,12 @@ pub fn give_back(slot: u8) {
     }
 }
 
-/// Returns the address of a slot that exists.
-fn file(slot: u8) -> *mut [u8; MODEL_BYTES] {
-    (&raw mut FILES)
-        .cast::<[u8; MODEL_BYTES]>()
-        .wrapping_add(usize::from(slot))
+/// Returns the address of a slot; `None` if it does not exist.
+fn file(slot: u8) -> Option<*mut [u8; MODEL_BYTES]> {
+    let file = match slot {
+        0 => &raw mut FIRST,
+        1 => &raw mut SECOND,
+        _ => return None,
+    };
+    Some(file.cast())
 }

@@ -33,7 +33,7 @@ pub fn bring_into_use(
     in_use: &mut InUse,
 ) -> Option<Threshold> {
     let now = InUse::of(&next);
-    let Ok(wanted) = model::fitting().replace(sensor, next.model, afresh) else {
+    let Ok(wanted) = model::fitting().replace(sensor, next.model(), afresh) else {
         // Never happens: the settings were checked with the model.
         now.slot.into_iter().for_each(model_slots::give_back);
         return None;

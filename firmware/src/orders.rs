@@ -9,16 +9,11 @@ use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::Outcome;
 use hivtac_wire::settings::RestPosition;
 
-/// Orders that wait. From the USB tasks and the memory task to the pipeline. A model in one makes
-/// each two kilobytes long: too much for DTCM.
+/// Orders that wait. From the USB tasks and the memory task to the pipeline.
 #[unsafe(link_section = ".sram.orders")]
 pub static ORDERS: Channel<CriticalSectionRawMutex, Order, 3> = Channel::new();
 
 /// An order for the pipeline, carried out between two frames. Each is answered with its `id`.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "nothing is allocated: what is large lies in the queue"
-)]
 pub enum Order {
     /// Use this threshold and its pixel format as soon as possible.
     SetThreshold {

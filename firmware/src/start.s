@@ -1,7 +1,7 @@
 // Runs right after a reset, before any memory is initialized, and so uses registers only. Starts
 // the microcontroller's own loader if the program requested it (loader.rs), and switches on the
 // clocks of SRAM1 to SRAM3. Loads .itcm and .sram (memory.x) from flash in double words, the unit
-// of ITCM's error correction, and clears .sram_zero.
+// of error correction, and clears .sram_zero and .axisram_cached.
 
     .syntax unified
     .section .text.__pre_init, "ax", %progbits
@@ -71,7 +71,14 @@ __pre_init:
     strd    r3, r12, [r0], #8
     b       5b
 
-6:  dsb
+6:  ldr     r0, =__saxisram_cached
+    ldr     r1, =__eaxisram_cached
+8:  cmp     r0, r1
+    bhs     9f
+    strd    r3, r12, [r0], #8
+    b       8b
+
+9:  dsb
     isb
     bx      lr
     .ltorg

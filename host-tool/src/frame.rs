@@ -205,6 +205,7 @@ impl Collected {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_terms::threshold::Yuv422;
 
@@ -229,7 +230,7 @@ mod tests {
             time_us: 0,
             status: Status(0),
             force: None,
-            markers: None,
+            markers: MarkerList::default(),
         }
     }
 

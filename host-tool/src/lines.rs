@@ -250,6 +250,7 @@ fn csv_truth(truth: Option<Truth>) -> Vec<String> {
 mod tests {
     use super::*;
     use hivtac_terms::force::Place;
+    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::units::{
         MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
         UnsignedMilliDegrees,
@@ -262,7 +263,7 @@ mod tests {
             time_us: 1_400_000,
             status,
             force,
-            markers: None,
+            markers: MarkerList::default(),
         }
     }
 

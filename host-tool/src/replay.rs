@@ -5,6 +5,7 @@ use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::recording::Recording;
 use hivtac_host::stop;
+use hivtac_terms::marker::MarkerList;
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{
@@ -131,7 +132,9 @@ impl Player {
     fn tell(&mut self, mut message: DeviceMessage) {
         match &mut message {
             DeviceMessage::Stats(stats) => self.stats = *stats,
-            DeviceMessage::Sample(sample) if self.streaming != Some(true) => sample.markers = None,
+            DeviceMessage::Sample(sample) if self.streaming != Some(true) => {
+                sample.markers = MarkerList::default();
+            }
             _ => (),
         }
         if self.streaming.is_some() {

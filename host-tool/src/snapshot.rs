@@ -13,7 +13,7 @@ use hivtac_host::look;
 use hivtac_host::picture::{Channels, encode};
 use hivtac_host::raw;
 use hivtac_host::threshold;
-use hivtac_wire::message::Request;
+use hivtac_wire::message::{Request, Sample};
 use serde::Serialize;
 use serde_json::Value;
 use std::time::Duration;
@@ -121,7 +121,7 @@ struct Report<'f> {
 impl<'f> Report<'f> {
     fn new(taken: &Taken, files: &'f SnapshotFiles) -> Report<'f> {
         let Taken { frame, sample } = taken;
-        let markers = sample.as_ref().and_then(|sample| sample.markers);
+        let markers = sample.as_ref().and_then(Sample::found);
         Report {
             frame: frame.number,
             time_us: frame.time_us,
@@ -131,7 +131,7 @@ impl<'f> Report<'f> {
             picture: files.picture.as_deref(),
             raw: files.raw.as_deref(),
             mask: files.mask.as_deref(),
-            markers: markers.map(|four| MarkerJson::all(&four)),
+            markers: markers.map(MarkerJson::all),
             status: sample
                 .as_ref()
                 .map(|sample| sample.status.names().collect()),

@@ -52,7 +52,7 @@ pub struct TareArguments {
 struct Tared {
     frames: u16,
     kept: bool,
-    markers: [[f64; 2]; 4],
+    markers: Vec<[f64; 2]>,
     spread_px: f64,
     moved: Option<MovedPx>,
 }
@@ -113,7 +113,9 @@ impl Tared {
         Tared {
             frames: tare.frames,
             kept: tare.keep,
-            markers: (report.rest.markers).map(|marker| [marker.x.to_f64(), marker.y.to_f64()]),
+            markers: (report.rest.markers.iter())
+                .map(|marker| [marker.x.to_f64(), marker.y.to_f64()])
+                .collect(),
             spread_px: report.spread.to_f64(),
             moved: report.moved.as_ref().map(MovedPx::of),
         }
@@ -121,7 +123,8 @@ impl Tared {
 
     fn line(&self) -> String {
         let kept = if self.kept { " and kept" } else { "" };
-        let markers = self.markers.map(|[x, y]| format!("({x:.2}, {y:.2})"));
+        let markers = self.markers.iter();
+        let markers: Vec<String> = markers.map(|[x, y]| format!("({x:.2}, {y:.2})")).collect();
         let moved = match &self.moved {
             Some(moved) => moved.text(),
             None => "the first one".to_owned(),

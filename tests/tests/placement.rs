@@ -11,7 +11,8 @@ const ITCM: Range<u64> = 0..0x1_0000;
 const STACK: Range<u64> = 0x2000_0000..0x2000_A000;
 const DTCM: Range<u64> = 0x2000_A000..0x2002_0000;
 const SRAM: Range<u64> = 0x3000_0000..0x3004_8000;
-const AXI_SRAM: Range<u64> = 0x2400_0000..0x2408_0000;
+const AXI_SRAM: Range<u64> = 0x2400_0000..0x2405_0000;
+const AXI_CACHED: Range<u64> = 0x2405_0000..0x2408_0000;
 
 struct Symbol {
     name: String,
@@ -154,12 +155,25 @@ fn axi_sram_has_the_ring_of_bands_and_a_snapshot_and_nothing_else() {
 }
 
 #[test]
+fn a_place_for_a_model_lies_in_each_of_two_cached_memories() {
+    let symbols = symbols();
+    for (words, memory) in [
+        (["model_slots", "FIRST"], SRAM),
+        (["model_slots", "SECOND"], AXI_CACHED),
+    ] {
+        for symbol in variables(&symbols, &words) {
+            assert!(symbol.lies_in(&memory), "{}", symbol.name);
+        }
+    }
+}
+
+#[test]
 fn nothing_lies_below_the_stack_and_every_variable_in_a_memory() {
     let symbols = symbols();
     let is_variable = |symbol: &&Symbol| !symbol.is_code && symbol.address >= STACK.start;
     for symbol in symbols.iter().filter(is_variable) {
         let Symbol { name, address, .. } = symbol;
-        let memories = [DTCM, SRAM, AXI_SRAM];
+        let memories = [DTCM, SRAM, AXI_SRAM, AXI_CACHED];
         let known = memories.iter().any(|memory| symbol.lies_in(memory));
         let is_peripheral = (0x4000_0000..0x6000_0000).contains(address);
         assert!(known || is_peripheral, "{name} lies at {address:#x}");

@@ -8,7 +8,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Creep, Filter, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
@@ -102,6 +102,7 @@ fn model(threshold: Threshold) -> ModelIdentity {
     ModelIdentity {
         crc: 0xcafe_f00d,
         name: "11-64-64-3 ov7725".try_into().unwrap(),
+        markers: 4,
         simulated: true,
         threshold,
         source: ModelSource::Kept,
@@ -109,6 +110,10 @@ fn model(threshold: Threshold) -> ModelIdentity {
 }
 
 fn sample(status: Status, place: Option<Place>) -> DeviceMessage {
+    sample_of(status, place, MarkerList::default())
+}
+
+fn sample_of(status: Status, place: Option<Place>, markers: MarkerList) -> DeviceMessage {
     let force = Force {
         alpha: MilliDegrees(-5000),
         beta: MilliDegrees(2500),
@@ -124,7 +129,7 @@ fn sample(status: Status, place: Option<Place>) -> DeviceMessage {
         time_us: 1_400_000,
         status,
         force: Some(force),
-        markers: None,
+        markers,
     })
 }
 
@@ -141,7 +146,7 @@ fn sample_without_force(frame: u32, status: Status) -> DeviceMessage {
         time_us: 10_000_000,
         status,
         force: None,
-        markers: None,
+        markers: MarkerList::default(),
     })
 }
 
@@ -157,13 +162,32 @@ fn sample_with_markers() -> DeviceMessage {
         time_us: 300_000,
         status: Status::MODEL_MISSING,
         force: None,
-        markers: Some([
+        markers: MarkerList::from([
             marker(6_553_600, 3_932_160, 190),
             marker(14_417_921, 3_932_159, 191),
             marker(14_417_920, 11_796_480, 189),
             marker(6_553_600, 11_796_480, 190),
         ]),
     })
+}
+
+fn eight_markers() -> MarkerList {
+    let marker = |(x, y, area)| Marker {
+        x: Px(x),
+        y: Px(y),
+        area,
+    };
+    let seen = [
+        (2_621_440, 2_949_120, 160),
+        (18_350_081, 2_949_119, 161),
+        (18_350_080, 12_779_520, 159),
+        (2_621_440, 12_779_520, 160),
+        (7_208_960, 7_864_320, 172),
+        (13_762_560, 7_864_321, 173),
+        (10_485_760, 4_718_592, 171),
+        (10_485_759, 11_010_048, 172),
+    ];
+    MarkerList::from(seen.map(marker))
 }
 
 fn stats() -> DeviceMessage {
@@ -243,12 +267,12 @@ fn rest() -> RestPosition {
         format: PixelFormat::Rgb565,
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
-        markers: [
+        markers: MarkerList::from([
             marker(6_553_600, 3_932_160),
             marker(14_417_920, 3_932_160),
             marker(14_417_920, 11_796_480),
             marker(6_553_600, 11_796_480),
-        ],
+        ]),
         rect_center: (Px(10_485_760), Px(7_864_320)),
         rect_area: Q::from_int(14_400),
         down: Some(DOWN),
@@ -380,6 +404,14 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
             sample_without_force(305, Status::MARKERS_MISSING | Status::FRAME_DROPPED),
         ),
         ("sample-with-markers", sample_with_markers()),
+        (
+            "sample-with-eight-markers",
+            sample_of(
+                Status::NOT_CALIBRATED | Status::CONTACT,
+                Some(PLACE),
+                eight_markers(),
+            ),
+        ),
         ("stats", stats()),
         ("log", log()),
         ("reply-done", reply(7, Outcome::Done)),

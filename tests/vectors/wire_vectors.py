@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x1D09520C05A29EFE
+SCHEMA = 0x3F03FBB3CE5B85CF
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -124,6 +124,7 @@ REST = [
     raw("format: Rgb565", [0]),
     raw("dilations 1", [1]),
     raw("centroid: RednessWeighted", [1]),
+    raw("markers: 4", [4]),
     *(field for x, y in [(6_553_600, 3_932_160), (14_417_920, 3_932_160), (14_417_920, 11_796_480),
                          (6_553_600, 11_796_480)]
       for field in (signed("x_q16", x), signed("y_q16", y), unsigned("area_px", 190))),
@@ -173,6 +174,7 @@ MODEL = [
     raw("model: Some", [1]),
     (varint(0xCAFEF00D), "model.crc 0xcafef00d"),
     string("model.name", "11-64-64-3 ov7725"),
+    raw("model.markers 4", [4]),
     raw("model.simulated: true", [1]),
 ]
 KEPT_MODEL = [raw("model.source: Kept", [1])]
@@ -209,17 +211,27 @@ PLACE = [
 ]
 NO_PLACE = [raw("place: None", [0])]
 NO_FORCE = [raw("force: None", [0])]
-NO_MARKERS = [raw("markers: None", [0])]
-MARKERS = [raw("markers: Some", [1])] + [
-    field
-    for marker, (x, y, area) in enumerate(
-        [(6_553_600, 3_932_160, 190), (14_417_921, 3_932_159, 191),
-         (14_417_920, 11_796_480, 189), (6_553_600, 11_796_480, 190)]
+NO_MARKERS = [raw("markers: 0", [0])]
+
+
+def markers(seen):
+    fields = (
+        [signed(f"marker {marker}: x_q16", x), signed("y_q16", y), unsigned("area_px", area)]
+        for marker, (x, y, area) in enumerate(seen)
     )
-    for field in [
-        signed(f"marker {marker}: x_q16", x), signed("y_q16", y), unsigned("area_px", area),
-    ]
-]
+    return [raw(f"markers: {len(seen)}", [len(seen)])] + [field for one in fields for field in one]
+
+
+FOUR = markers([
+    (6_553_600, 3_932_160, 190), (14_417_921, 3_932_159, 191),
+    (14_417_920, 11_796_480, 189), (6_553_600, 11_796_480, 190),
+])
+EIGHT = markers([
+    (2_621_440, 2_949_120, 160), (18_350_081, 2_949_119, 161),
+    (18_350_080, 12_779_520, 159), (2_621_440, 12_779_520, 160),
+    (7_208_960, 7_864_320, 172), (13_762_560, 7_864_321, 173),
+    (10_485_760, 4_718_592, 171), (10_485_759, 11_010_048, 172),
+])
 
 STATS = [
     ("frames_exposed", 1000),
@@ -258,7 +270,9 @@ DEVICE = {
     + NO_FORCE + NO_MARKERS,
     "sample-without-force": sample(300, 305, 10_000_000, 0x201, "markers_missing, frame_dropped")
     + NO_FORCE + NO_MARKERS,
-    "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing") + NO_FORCE + MARKERS,
+    "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing") + NO_FORCE + FOUR,
+    "sample-with-eight-markers": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact")
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + EIGHT,
     "stats": [raw("Stats", [2])] + [unsigned(name, value) for name, value in STATS],
     "log": [
         raw("Log", [3]),
@@ -449,7 +463,7 @@ def rejects():
         "string-too-long": ("body", frame(b"\3\0\0" + varint(97) + b"x" * 97)),
         "cut-body": ("body", frame(reply[:-1])),
         "trailing-byte": ("trailing", frame(reply + b"\0")),
-        "overlong": ("overlong", b"\1" * 289 + b"\0"),
+        "overlong": ("overlong", b"\1" * 513 + b"\0"),
     }
 
 

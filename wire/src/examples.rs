@@ -11,7 +11,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{MOST_MARKERS, Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
@@ -61,6 +61,7 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             model: Some(ModelIdentity {
                 crc: u32::MAX,
                 name: full(),
+                markers: u8::MAX,
                 simulated: true,
                 threshold: RED,
                 source: ModelSource::Fallback,
@@ -154,12 +155,13 @@ pub fn longest_sample() -> Sample {
                 sigma: Micrometres(u32::MAX),
             }),
         }),
-        markers: Some(
-            [Marker {
+        markers: MarkerList::filled(
+            MOST_MARKERS,
+            Marker {
                 x: Px(i32::MIN),
                 y: Px(i32::MIN),
                 area: u32::MAX,
-            }; 4],
+            },
         ),
     }
 }
@@ -170,7 +172,7 @@ pub fn longest_rest() -> RestPosition {
         format: PixelFormat::Mono,
         dilations: u8::MAX,
         centroid: CentroidEstimator::RednessWeighted,
-        markers: longest_sample().markers.unwrap(),
+        markers: longest_sample().markers,
         rect_center: (Px(i32::MIN), Px(i32::MIN)),
         rect_area: Q::from_bits(i64::MIN),
         down: LONGEST_DOWN.direction(),
@@ -385,7 +387,7 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
     ];
     let model = (
         any::<u32>(),
-        any_string(),
+        (any_string(), any::<u8>()),
         any::<bool>(),
         any_threshold(),
         source,
@@ -401,12 +403,15 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
                 firmware,
                 width,
                 height,
-                model: model.map(|(crc, name, simulated, threshold, source)| ModelIdentity {
-                    crc,
-                    name,
-                    simulated,
-                    threshold,
-                    source,
+                model: model.map(|(crc, (name, markers), simulated, threshold, source)| {
+                    ModelIdentity {
+                        crc,
+                        name,
+                        markers,
+                        simulated,
+                        threshold,
+                        source,
+                    }
                 }),
                 threshold: seen.0,
                 preset,
@@ -421,8 +426,7 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
 
 fn any_sample() -> impl Strategy<Value = Sample> {
     let force = proptest::option::of(any_force());
-    let markers = proptest::option::of([any_marker(), any_marker(), any_marker(), any_marker()]);
-    (any::<(u32, u32, u64, u32)>(), force, markers).prop_map(
+    (any::<(u32, u32, u64, u32)>(), force, any_markers()).prop_map(
         |((sequence, frame, time_us, status), force, markers)| Sample {
             sequence,
             frame,
@@ -432,6 +436,10 @@ fn any_sample() -> impl Strategy<Value = Sample> {
             markers,
         },
     )
+}
+
+fn any_markers() -> impl Strategy<Value = MarkerList> {
+    proptest::collection::vec(any_marker(), 0..=MOST_MARKERS).prop_map(MarkerList::of)
 }
 
 fn any_marker() -> impl Strategy<Value = Marker> {
@@ -748,9 +756,8 @@ pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
 pub fn any_rest() -> impl Strategy<Value = RestPosition> {
     let formats = [PixelFormat::Rgb565, PixelFormat::Yuv422, PixelFormat::Mono];
     let format = any::<prop::sample::Index>().prop_map(move |nth| *nth.get(&formats));
-    let markers = [any_marker(), any_marker(), any_marker(), any_marker()];
     let seen = (format, any_down());
-    (seen, any::<(u8, bool, i32, i32, i64)>(), markers).prop_map(
+    (seen, any::<(u8, bool, i32, i32, i64)>(), any_markers()).prop_map(
         |((format, down), (dilations, weighted, x, y, rect_area), markers)| RestPosition {
             format,
             dilations,

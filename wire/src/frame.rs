@@ -13,13 +13,13 @@ pub(crate) const CRC_BYTES: usize = 4;
 
 /// Longest body of a device in this protocol version: all its settings, each number with its
 /// longest encoding.
-pub const MAX_DEVICE_BODY: usize = 277;
+pub const MAX_DEVICE_BODY: usize = 458;
 
 /// Longest body of a sample in this protocol version: one with force, place and markers.
-pub const MAX_SAMPLE_BODY: usize = 144;
+pub const MAX_SAMPLE_BODY: usize = 324;
 
-/// Longest body of a host in this protocol version: a full part of a model file.
-pub const MAX_HOST_BODY: usize = 236;
+/// Longest body of a host in this protocol version: a rest position.
+pub const MAX_HOST_BODY: usize = 280;
 
 /// Longest frame from the device in this protocol version, closing zero included.
 pub const MAX_DEVICE_FRAME: usize = frame_length(MAX_DEVICE_BODY);
@@ -32,10 +32,10 @@ pub const MAX_HOST_FRAME: usize = frame_length(MAX_HOST_BODY);
 
 /// Longest frame from the device in any protocol version. A host's decoder holds this much, so that
 /// it can name the version of any device.
-pub const DEVICE_FRAME_LIMIT: usize = 288;
+pub const DEVICE_FRAME_LIMIT: usize = 512;
 
 /// Longest frame from the host in any protocol version. A device's decoder holds this much.
-pub const HOST_FRAME_LIMIT: usize = 256;
+pub const HOST_FRAME_LIMIT: usize = 320;
 
 /// Length of the frame of a body: with checksum, one COBS byte for each 254 bytes begun, and
 /// closing zero.

@@ -9,7 +9,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::Force;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::Threshold;
@@ -111,8 +111,10 @@ pub struct DeviceHello {
 pub struct ModelIdentity {
     /// CRC-32 of the model file.
     pub crc: u32,
-    /// Layer widths and preset, e.g. `11-64-64-3 ov7725`.
+    /// Layer widths, or the number of markers without layers, and preset, e.g. `11-64-64-3 ov7725`.
     pub name: String<32>,
+    /// Number of markers of the film that it is for.
+    pub markers: u8,
     /// True when it was trained on a simulated sensor.
     pub simulated: bool,
     /// The threshold that it was made for: with a different one there is no force.
@@ -148,8 +150,16 @@ pub struct Sample {
     pub status: Status,
     /// The force; `None` exactly if `status` has a bit that means "no force".
     pub force: Option<Force>,
-    /// The four markers, if they were requested ([`Request::StartWithMarkers`]) and found.
-    pub markers: Option<[Marker; 4]>,
+    /// The markers, if they were requested ([`Request::StartWithMarkers`]) and all were found;
+    /// otherwise empty.
+    pub markers: MarkerList,
+}
+
+impl Sample {
+    /// The markers; `None` if they were not requested, or not all found.
+    pub fn found(&self) -> Option<&[Marker]> {
+        Some(&self.markers[..]).filter(|markers| !markers.is_empty())
+    }
 }
 
 /// Counters since boot. They saturate instead of wrapping, which takes 49 days at 1 kHz (32 bits).
@@ -350,7 +360,7 @@ pub enum Request {
 }
 
 /// Most bytes of an uploaded model file.
-pub const MODEL_BYTES: usize = 96 << 10;
+pub const MODEL_BYTES: usize = 160 << 10;
 
 /// Most bytes of a model file in one [`ModelPart`].
 pub const MODEL_PART_BYTES: usize = 224;

@@ -6,7 +6,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::MarkerList;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
 use hivtac_terms::units::{Microseconds, MilliDegrees, MilliPx, Px, Sixteenths};
@@ -29,8 +29,8 @@ pub struct RestPosition {
     pub dilations: u8,
     /// How a marker's position is computed from its pixels.
     pub centroid: CentroidEstimator,
-    /// The four markers at rest.
-    pub markers: [Marker; 4],
+    /// The markers at rest.
+    pub markers: MarkerList,
     /// The mean centre of their bounding rectangle, (x, y).
     pub rect_center: (Px, Px),
     /// Mean area of that rectangle, px².

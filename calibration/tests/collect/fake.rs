@@ -194,7 +194,7 @@ fn tared() -> TareReport {
             format: PixelFormat::Rgb565,
             dilations: 1,
             centroid: CentroidEstimator::BinaryMask,
-            markers: markers([0.0; 3]),
+            markers: markers([0.0; 3]).into(),
             rect_center: (Px(160 << 16), Px(120 << 16)),
             rect_area: Q::from_bits((88 * 88) << 16),
             down: Some(Direction([0, 0, -1000])),
@@ -221,7 +221,7 @@ fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
             (true, false) => Status::MODEL_MISSING,
         },
         force: None,
-        markers: found.then_some(seen),
+        markers: found.then_some(seen.into()).unwrap_or_default(),
     }
 }
 
@@ -247,7 +247,7 @@ pub fn pressed(
             magnitude_sigma: UnsignedMicroNewtons(20_000),
             place,
         }),
-        markers: Some(markers(force_n(size_n, [0.0; 2]))),
+        markers: markers(force_n(size_n, [0.0; 2])).into(),
     }
 }
 

@@ -90,7 +90,7 @@ fn film(pressed: Pressed) -> Film {
             time_us: (time_s * 1e6) as u64,
             status: Status::NOT_CALIBRATED,
             force: Some(felt(force_n)),
-            markers: Some([0, 1, 2, 3].map(marker)),
+            markers: [0, 1, 2, 3].map(marker).into(),
         }
     })
 }

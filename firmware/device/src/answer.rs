@@ -3,6 +3,7 @@
 use crate::settings::OfPipeline;
 use core::fmt::{self, Write};
 use heapless::String;
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::{Refusal, TareBuilder};
@@ -115,9 +116,8 @@ pub fn sample(
         time_us: moment.time_us,
         status: followed.status | on_the_way,
         force: followed.force,
-        // A sample has room for four.
         markers: (measurement.markers)
-            .and_then(|markers| markers.exactly())
-            .filter(|_| with_markers),
+            .filter(|_| with_markers && measurement.lost == Lost::NONE)
+            .unwrap_or_default(),
     }
 }

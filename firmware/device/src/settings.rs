@@ -44,6 +44,7 @@ impl OfPipeline {
         let model = sensor.model().map(|model| ModelIdentity {
             crc: model.crc(),
             name: model.name(),
+            markers: model.rest.areas.len() as u8,
             simulated: model.is_simulated(),
             threshold: model.conditions.threshold,
             source,
@@ -124,7 +125,7 @@ pub fn position(rest: &Rest, down: Option<Direction>, settings: &Settings) -> Re
         format: settings.threshold.format(),
         dilations: settings.dilations,
         centroid: settings.centroid,
-        markers: rest.markers().array(),
+        markers: rest.markers(),
         rect_center: rest.features.rect_center,
         rect_area: rest.features.rect_area,
         down,

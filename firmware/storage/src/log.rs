@@ -19,6 +19,7 @@
 use crate::blob;
 use crate::flash::{self, BLANK, Failed, Flash, Place};
 use crate::record::{self, Header};
+use core::ops::Range;
 
 pub use crate::record::PAYLOAD_LIMIT;
 
@@ -52,7 +53,7 @@ pub struct Log<F> {
 #[derive(Clone, Copy, Debug)]
 struct Newest {
     sector: u32,
-    length: u8,
+    length: u16,
 }
 
 impl<F: Flash> Log<F> {
@@ -92,12 +93,13 @@ impl<F: Flash> Log<F> {
         self.generation
     }
 
-    /// Erases a sector that is not the log's, writes a [`blob`] into it, and reads it back.
+    /// Erases those of some sectors that a [`blob`] needs, writes it into them, and reads it back.
+    /// They must not be the log's.
     ///
     /// # Errors
-    /// [`Failed`]: the bytes do not fit the sector, or do not read back.
-    pub async fn write_blob(&mut self, sector: u32, bytes: &[u8]) -> Result<(), Failed> {
-        let written = blob::write(&mut self.flash, sector, bytes).await;
+    /// [`Failed`]: the bytes do not fit the sectors, or do not read back.
+    pub async fn write_blob(&mut self, sectors: Range<u32>, bytes: &[u8]) -> Result<(), Failed> {
+        let written = blob::write(&mut self.flash, sectors, bytes).await;
         if written.is_err() {
             self.count_failure();
         }
@@ -114,7 +116,10 @@ impl<F: Flash> Log<F> {
     /// # Errors
     /// [`SaveError`]; the previous record is still kept.
     pub async fn save(&mut self, payload: &[u8]) -> Result<(), SaveError> {
-        let length = u8::try_from(payload.len()).map_err(|_| SaveError::TooLong)?;
+        let length = u16::try_from(payload.len()).map_err(|_| SaveError::TooLong)?;
+        if payload.len() > PAYLOAD_LIMIT {
+            return Err(SaveError::TooLong);
+        }
         for _ in 0..ATTEMPTS {
             match self.append(payload).await {
                 Ok(sector) => {

@@ -9,17 +9,17 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// First byte of a record's first word. A different layout of records uses a different byte.
-const BEGIN: u8 = 0x48;
+const BEGIN: u8 = 0x49;
 /// First byte of a seal, which states that the record before it is whole.
 const SEAL: u8 = 0x5A;
 /// Bytes of a record's first word before the payload: [`BEGIN`], length, generation, checksum.
-const HEADER_BYTES: usize = 10;
+const HEADER_BYTES: usize = 11;
 /// Bytes of the payload in each further word.
 const CONTINUED_BYTES: usize = WORD_BYTES - 1;
 const FIRST_BYTES: usize = WORD_BYTES - HEADER_BYTES;
 
-/// Longest payload: its length is one byte.
-pub const PAYLOAD_LIMIT: usize = 255;
+/// Longest payload.
+pub const PAYLOAD_LIMIT: usize = 400;
 
 /// The content of a record's first word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,14 +27,15 @@ pub struct Header {
     /// Higher than the generation of all older records in the other sector.
     pub generation: u32,
     /// Bytes of the payload.
-    pub length: u8,
+    pub length: u16,
     checksum: u32,
 }
 
 impl Header {
     /// Returns the header for this payload; `None` if it is longer than [`PAYLOAD_LIMIT`].
     pub fn new(generation: u32, payload: &[u8]) -> Option<Self> {
-        let length = u8::try_from(payload.len()).ok()?;
+        let length = u16::try_from(payload.len()).ok();
+        let length = length.filter(|length| usize::from(*length) <= PAYLOAD_LIMIT)?;
         let checksum = checksum(generation, payload);
         Some(Self {
             generation,
@@ -45,12 +46,12 @@ impl Header {
 
     /// Returns the header in a record's first word; `None` for any other word.
     pub fn of(word: &Word) -> Option<Self> {
-        let [BEGIN, length, n0, n1, n2, n3, c0, c1, c2, c3, ..] = *word else {
+        let [BEGIN, l0, l1, n0, n1, n2, n3, c0, c1, c2, c3, ..] = *word else {
             return None;
         };
         Some(Self {
             generation: u32::from_le_bytes([n0, n1, n2, n3]),
-            length,
+            length: u16::from_le_bytes([l0, l1]),
             checksum: u32::from_le_bytes([c0, c1, c2, c3]),
         })
     }
@@ -106,8 +107,9 @@ pub fn word(header: &Header, payload: &[u8], nth: u32) -> Word {
 
 fn first_word(header: &Header) -> Word {
     let mut word = [0; WORD_BYTES];
-    let fields = [BEGIN, header.length]
+    let fields = [BEGIN]
         .into_iter()
+        .chain(header.length.to_le_bytes())
         .chain(header.generation.to_le_bytes())
         .chain(header.checksum.to_le_bytes());
     for (byte, value) in word.iter_mut().zip(fields) {
@@ -142,7 +144,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_payload_comes_back(
-            payload in proptest::collection::vec(any::<u8>(), 0..=255),
+            payload in proptest::collection::vec(any::<u8>(), 0..=PAYLOAD_LIMIT),
             generation: u32,
         ) {
             let header = Header::new(generation, &payload).unwrap();
@@ -164,7 +166,7 @@ mod tests {
     fn a_payload_that_is_too_long_has_no_header() {
         assert_eq!(Header::new(0, &[0; PAYLOAD_LIMIT + 1]), None);
         let longest = Header::new(0, &[0; PAYLOAD_LIMIT]).unwrap();
-        assert_eq!(longest.words(), 9);
+        assert_eq!(longest.words(), 14);
         assert_eq!(words(FIRST_BYTES), 1);
         assert_eq!(words(FIRST_BYTES + 1), 2);
     }

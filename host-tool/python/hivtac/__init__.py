@@ -112,9 +112,9 @@ class Sample:
     place_sigma: float | None
     """Standard uncertainty of each coordinate of the place, m."""
     markers: Floats | None
-    """(4, 2): column and row of the markers 0–3, px; `None` if they were not found."""
+    """(N, 2): column and row of each marker, px; `None` if not all were found."""
     marker_areas: npt.NDArray[np.int64] | None
-    """(4,): area of each marker, px."""
+    """(N,): area of each marker, px."""
 
     @property
     def contact(self) -> bool:
@@ -164,7 +164,7 @@ class Tare:
     """The result of a tare."""
 
     markers: Floats
-    """(4, 2): column and row of the markers at rest, px."""
+    """(N, 2): column and row of the markers at rest, px."""
     spread: float
     """Motion of the markers during the tare, px."""
     moved: Moved | None

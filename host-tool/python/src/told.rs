@@ -3,6 +3,7 @@
 use hivtac_host::force_fields::{FORCE, PLACE};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::force::Force;
+use hivtac_terms::marker::Marker;
 use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{DeviceHello, Sample};
 use hivtac_wire::settings::{Moved, SettingsReport, TareReport};
@@ -23,14 +24,15 @@ pub type SampleNumbers = (
     u32,
     Vec<&'static str>,
     Option<ForceNumbers>,
-    Option<[(f64, f64, u32); 4]>,
+    Option<Vec<(f64, f64, u32)>>,
 );
 
 /// A sample that was received at `came_ns`, ns since 1970.
 pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
-    let markers = sample
-        .markers
-        .map(|four| four.map(|marker| (px(marker.x), px(marker.y), marker.area)));
+    let markers = sample.found().map(|markers| {
+        let numbers = |marker: &Marker| (px(marker.x), px(marker.y), marker.area);
+        markers.iter().map(numbers).collect()
+    });
     (
         sample.sequence,
         sample.frame,
@@ -72,7 +74,7 @@ pub fn hello<'py>(py: Python<'py>, hello: &DeviceHello) -> PyResult<Bound<'py, P
 type MovedNumbers = (f64, (f64, f64), f64, f64, f64);
 
 /// Markers at rest, px; their motion during the tare, px; motion from the rest position before.
-pub type TareNumbers = ([(f64, f64); 4], f64, Option<MovedNumbers>);
+pub type TareNumbers = (Vec<(f64, f64)>, f64, Option<MovedNumbers>);
 
 /// Whether a rest position was taken, and whether it is kept. Then distances in px: by re-zeroing,
 /// last one of the untouched film, from the kept position.
@@ -81,10 +83,9 @@ pub type RestNumbers = (bool, bool, f64, Option<f64>, Option<f64>);
 /// The result of a tare.
 pub fn tare(report: &TareReport) -> TareNumbers {
     (
-        report
-            .rest
-            .markers
-            .map(|marker| (px(marker.x), px(marker.y))),
+        (report.rest.markers.iter())
+            .map(|marker| (px(marker.x), px(marker.y)))
+            .collect(),
         px(report.spread),
         report.moved.as_ref().map(moved),
     )

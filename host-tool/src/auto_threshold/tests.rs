@@ -11,6 +11,7 @@ use hivtac_wire::message::{ModelIdentity, ModelSource};
 /// A device whose model was made for this threshold.
 fn device_for(threshold: Threshold) -> DeviceHello {
     let model = ModelIdentity {
+        markers: 4,
         crc: 0,
         name: "model".try_into().unwrap(),
         simulated: true,

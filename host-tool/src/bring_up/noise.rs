@@ -7,8 +7,9 @@ use super::samples::{Wanted, collect};
 use crate::tare::TARE_PATIENCE;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::MarkerList;
 use hivtac_terms::threshold::PixelFormat;
+use hivtac_terms::units::Px;
 use hivtac_wire::message::Request;
 use serde_json::json;
 use std::time::Duration;
@@ -47,20 +48,26 @@ pub fn step(link: &mut Link, patience: Duration, format: PixelFormat) -> Result<
         patience,
     };
     let samples = collect(link, Request::StartWithMarkers, &wanted, &mut complaints)?;
-    let frames: Vec<_> = samples.iter().filter_map(|sample| sample.markers).collect();
+    let frames: Vec<_> = samples.iter().map(|sample| sample.markers).collect();
     Ok(judge(&frames, format))
 }
 
-/// Judges the markers of frames at rest.
-pub fn judge(frames: &[[Marker; 4]], format: PixelFormat) -> Step {
+/// Judges the markers of frames at rest; those of frames without all markers are empty.
+pub fn judge(frames: &[MarkerList], format: PixelFormat) -> Step {
+    let markers = frames.iter().map(|seen| seen.len()).max().unwrap_or(0);
+    let frames = frames
+        .iter()
+        .filter(|seen| markers > 0 && seen.len() == markers);
+    let frames: Vec<&MarkerList> = frames.collect();
     let simulated_px = simulated_px(format);
-    let deviations = deviations_px(frames);
-    let square = deviations.iter().map(|px| px * px).sum::<f64>() / 8.0;
+    let deviations = deviations_px(&frames, markers);
+    let squares = deviations.iter().flatten().map(|px| px * px).sum::<f64>();
+    let square = squares / (2 * markers.max(1)) as f64;
     let (noise_px, times) = (square.sqrt(), square.sqrt() / simulated_px);
     let mut wrong = Vec::new();
     if frames.len() < LEAST_FRAMES {
         wrong.push(format!(
-            "only {} frames showed the four markers; `hivtac monitor` says why",
+            "only {} frames showed all markers; `hivtac monitor` says why",
             frames.len()
         ));
     } else if times > MOST_TIMES {
@@ -83,7 +90,7 @@ pub fn judge(frames: &[[Marker; 4]], format: PixelFormat) -> Step {
 }
 
 /// Standard deviation of a resting marker's coordinates on the simulated sensor, px. It is the root
-/// mean square of the eight, measured by this command on the emulated board.
+/// mean square of the eight of four markers, measured by this command on the emulated board.
 fn simulated_px(format: PixelFormat) -> f64 {
     match format {
         PixelFormat::Rgb565 => 0.009,
@@ -92,16 +99,21 @@ fn simulated_px(format: PixelFormat) -> f64 {
     }
 }
 
-/// Standard deviations of the eight coordinates, px.
-fn deviations_px(frames: &[[Marker; 4]]) -> [f64; 8] {
+/// Standard deviations of each marker's coordinates, px.
+fn deviations_px(frames: &[&MarkerList], markers: usize) -> Vec<[f64; 2]> {
     let count = frames.len().max(1) as f64;
-    std::array::from_fn(|index| {
-        let of = |four: &[Marker; 4]| match four[index / 2] {
-            Marker { x, .. } if index % 2 == 0 => x.to_f64(),
-            Marker { y, .. } => y.to_f64(),
-        };
-        let mean = frames.iter().map(of).sum::<f64>() / count;
-        let square = frames.iter().map(|four| (of(four) - mean).powi(2));
-        (square.sum::<f64>() / count).sqrt()
-    })
+    let deviation = |of: &dyn Fn(&MarkerList) -> Px| {
+        let px = || frames.iter().map(|seen| of(seen).to_f64());
+        let mean = px().sum::<f64>() / count;
+        let squares = px().map(|px| (px - mean).powi(2));
+        (squares.sum::<f64>() / count).sqrt()
+    };
+    (0..markers)
+        .map(|id| {
+            [
+                deviation(&|seen| seen.at(id).x),
+                deviation(&|seen| seen.at(id).y),
+            ]
+        })
+        .collect()
 }

@@ -4,7 +4,7 @@ use super::report::{Report, Step};
 use super::{camera, clocks, colours, noise, press};
 use hivtac_host::frame::Frame;
 use hivtac_terms::fixed::Q;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_terms::units::Px;
@@ -72,7 +72,7 @@ fn samples(frame_us: u64) -> Vec<Sample> {
         time_us: 1_000_000 + u64::from(frame) * frame_us,
         status: Status::MARKERS_MISSING,
         force: None,
-        markers: None,
+        markers: MarkerList::default(),
     };
     (0..100).map(sample).collect()
 }
@@ -113,7 +113,7 @@ fn white_is_neutral_and_neither_dark_nor_saturated() {
 }
 
 /// Frames whose first marker jumps by `jump_px`.
-fn jumping(jump_px: f64) -> Vec<[Marker; 4]> {
+fn jumping(jump_px: f64) -> Vec<MarkerList> {
     let marker = |x: f64| Marker {
         x: Px((x * 65_536.0) as i32),
         y: Px(100 << 16),
@@ -121,7 +121,7 @@ fn jumping(jump_px: f64) -> Vec<[Marker; 4]> {
     };
     let four = |index: u32| {
         let x = 100.0 + f64::from(index % 2) * jump_px;
-        [marker(x), marker(200.0), marker(200.0), marker(100.0)]
+        [marker(x), marker(200.0), marker(200.0), marker(100.0)].into()
     };
     (0..32).map(four).collect()
 }
@@ -129,7 +129,7 @@ fn jumping(jump_px: f64) -> Vec<[Marker; 4]> {
 #[test]
 fn markers_that_do_not_lie_still_are_pointed_out() {
     // One of eight coordinates by 0.1 px: 0.05 / √8 px.
-    let judge = |frames: &[[Marker; 4]]| noise::judge(frames, PixelFormat::Rgb565);
+    let judge = |frames: &[MarkerList]| noise::judge(frames, PixelFormat::Rgb565);
     says(&judge(&jumping(0.1)), &[]);
     says(&judge(&jumping(0.2)), &["3.9 times", "flickers"]);
     says(&judge(&jumping(0.0)[..4]), &["only 4 frames"]);

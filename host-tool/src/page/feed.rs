@@ -136,6 +136,7 @@ impl Feed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
 
     fn sample(number: u32, time_us: u64) -> Sample {
@@ -145,7 +146,7 @@ mod tests {
             time_us,
             status: Status::OK,
             force: None,
-            markers: None,
+            markers: MarkerList::default(),
         }
     }
 

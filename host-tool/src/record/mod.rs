@@ -15,6 +15,7 @@ use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::{Link, log_text};
 use hivtac_host::shown::{shown, unit_number};
+use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use listen::{Until, listen};
 use serde_json::{Value, json};
@@ -229,7 +230,12 @@ impl Recording {
         let begun_ns = now_ns();
         let sink = match kind {
             Format::Mcap => Bag::create(open, hellos, begun_ns).map(|bag| Sink::Bag(Box::new(bag))),
-            Format::Csv => Table::create(open).map(Sink::Table).map_err(Into::into),
+            Format::Csv => {
+                let model = hellos.first().and_then(|hello| hello.model.as_ref());
+                let markers = model.map_or(LEAST_MARKERS, |model| model.markers.into());
+                let table = Table::create(open, markers);
+                table.map(Sink::Table).map_err(Into::into)
+            }
         };
         Ok(Recording {
             sink: sink.map_err(|error| input(&partial, error))?,

@@ -10,18 +10,22 @@ pub struct Table {
     file: File,
     /// Whole rows that are not on the disk yet.
     rows: String,
+    /// Number of markers that have columns.
+    markers: usize,
 }
 
-/// Column, row and area of each marker.
-const MARKERS: &str = "x0_px,y0_px,area0_px,x1_px,y1_px,area1_px,\
-                       x2_px,y2_px,area2_px,x3_px,y3_px,area3_px";
-
 impl Table {
-    /// Begins a file with its header.
-    pub fn create(file: File) -> io::Result<Table> {
+    /// Begins a file with its header, which has column, row and area of each of the markers.
+    pub fn create(file: File, markers: usize) -> io::Result<Table> {
         let header = Format::Csv.header(false).unwrap_or_default();
-        let rows = format!("host_time_s,{header},{MARKERS}\n");
-        let mut table = Table { file, rows };
+        let columns = (0..markers).map(|id| format!("x{id}_px,y{id}_px,area{id}_px"));
+        let columns = columns.collect::<Vec<_>>().join(",");
+        let rows = format!("host_time_s,{header},{columns}\n");
+        let mut table = Table {
+            file,
+            rows,
+            markers,
+        };
         table.flush()?;
         Ok(table)
     }
@@ -34,7 +38,7 @@ impl Table {
                 sample,
                 truth: None,
             });
-            self.rows += &format!("{s}.{us:06},{row},{}\n", markers(sample));
+            self.rows += &format!("{s}.{us:06},{row},{}\n", self.columns(sample));
         }
         Ok(())
     }
@@ -51,15 +55,16 @@ impl Table {
         self.flush()?;
         Ok(self.file)
     }
-}
 
-fn markers(sample: &Sample) -> String {
-    let Some(markers) = &sample.markers else {
-        return ",".repeat(11);
-    };
-    let numbers = markers.map(|marker| {
-        let [x, y] = [marker.x, marker.y].map(|px| px.to_f64());
-        format!("{x:.5},{y:.5},{}", marker.area)
-    });
-    numbers.join(",")
+    /// The columns of the markers; empty ones if the sample has none, or those of another film.
+    fn columns(&self, sample: &Sample) -> String {
+        if sample.markers.len() != self.markers {
+            return ",".repeat(3 * self.markers.max(1) - 1);
+        }
+        let numbers = sample.markers.iter().map(|marker| {
+            let [x, y] = [marker.x, marker.y].map(|px| px.to_f64());
+            format!("{x:.5},{y:.5},{}", marker.area)
+        });
+        numbers.collect::<Vec<_>>().join(",")
+    }
 }

@@ -11,7 +11,7 @@ pub enum Channel {
     Wrench,
     /// The place where the tip touches.
     Place,
-    /// The four markers.
+    /// The markers.
     Markers,
     /// Whether something touches the film.
     Contact,
@@ -89,12 +89,7 @@ impl Frames {
 /// The messages of a sample, each as CDR. `stamp_ns` is the time of the frame's exposure, ns since
 /// 1970. Wrench, contact and slip need a force; place and markers must be known.
 pub fn messages(sample: &Sample, stamp_ns: u64, frames: &Frames) -> Vec<(Channel, Vec<u8>)> {
-    let Sample {
-        force,
-        markers,
-        status,
-        ..
-    } = sample;
+    let Sample { force, status, .. } = sample;
     let mut messages = Vec::with_capacity(Channel::ALL.len());
     if let Some(force) = force {
         messages.push((Channel::Wrench, wrench(stamp_ns, &frames.film, force)));
@@ -107,7 +102,7 @@ pub fn messages(sample: &Sample, stamp_ns: u64, frames: &Frames) -> Vec<(Channel
             messages.push((channel, bool(status.contains(bit))));
         }
     }
-    if let Some(markers) = markers {
+    if let Some(markers) = sample.found() {
         messages.push((Channel::Markers, polygon(stamp_ns, &frames.image, markers)));
     }
     let names: Vec<_> = status.names().collect();

@@ -244,10 +244,10 @@ fn place_m(place: Place) -> [f64; 2] {
 }
 
 /// A [`POLYGON`].
-pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker; 4]) -> Vec<u8> {
+pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker]) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, frame);
-    cdr.number(4u32.to_le_bytes());
+    cdr.number((markers.len() as u32).to_le_bytes());
     for marker in markers {
         let numbers = [
             marker.x.to_f64() as f32,

@@ -11,7 +11,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{Micrometres, MilliPx, Px};
@@ -90,13 +90,13 @@ enum Limits {
 }
 
 /// A rest position: coordinates in 1/65,536 px, areas in px.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Rest {
     format: PixelFormat,
     dilations: u8,
     centroid: CentroidEstimator,
-    markers: [Seen; 4],
+    markers: Vec<Seen>,
     rect_center_q16: [Px; 2],
     rect_area_q16: Q<16, i64>,
     /// The direction of gravity at that time, in thousandths.
@@ -110,6 +110,24 @@ struct Seen {
     x_q16: Px,
     y_q16: Px,
     area_px: u32,
+}
+
+impl Seen {
+    fn of(marker: &Marker) -> Seen {
+        Seen {
+            x_q16: marker.x,
+            y_q16: marker.y,
+            area_px: marker.area,
+        }
+    }
+
+    fn marker(&self) -> Marker {
+        Marker {
+            x: self.x_q16,
+            y: self.y_q16,
+            area: self.area_px,
+        }
+    }
 }
 
 /// The settings in use, and which of them are kept: `settings get --json`.
@@ -313,11 +331,7 @@ impl Rest {
             format: position.format,
             dilations: position.dilations,
             centroid: position.centroid,
-            markers: position.markers.map(|marker| Seen {
-                x_q16: marker.x,
-                y_q16: marker.y,
-                area_px: marker.area,
-            }),
+            markers: position.markers.iter().map(Seen::of).collect(),
             rect_center_q16: position.rect_center.into(),
             rect_area_q16: position.rect_area,
             down: position.down.map(|Direction(parts)| parts),
@@ -329,11 +343,7 @@ impl Rest {
             format: self.format,
             dilations: self.dilations,
             centroid: self.centroid,
-            markers: self.markers.map(|marker| Marker {
-                x: marker.x_q16,
-                y: marker.y_q16,
-                area: marker.area_px,
-            }),
+            markers: MarkerList::of(self.markers.iter().map(Seen::marker)),
             rect_center: self.rect_center_q16.into(),
             rect_area: self.rect_area_q16,
             down: self.down.map(Direction),
@@ -370,7 +380,7 @@ fn parse(bytes: &[u8]) -> Result<File, String> {
     file.temporal()
         .check()
         .map_err(|error| format!("a limit is out of range: {error}"))?;
-    let taken = file.tare.and_then(|rest| rest.down).map(Direction);
+    let taken = file.tare.as_ref().and_then(|rest| rest.down).map(Direction);
     if !taken
         .into_iter()
         .chain(file.down().direction())
@@ -427,7 +437,7 @@ mod tests {
                 format: threshold.format(),
                 dilations: 1,
                 centroid: CentroidEstimator::RednessWeighted,
-                markers: [0, 1, 2, 3].map(marker),
+                markers: [0, 1, 2, 3].map(marker).into(),
                 rect_center: (Px(7), Px(8)),
                 rect_area: Q::from_bits(1 << 40),
                 down: Some(Direction([0, 0, -1000])),

@@ -7,7 +7,7 @@ use hivtac_host::look::{self, PASSED};
 use hivtac_host::page::Limits;
 use hivtac_host::shown::to_json;
 use hivtac_terms::status::Status;
-use hivtac_wire::message::DeviceHello;
+use hivtac_wire::message::{DeviceHello, Sample};
 use serde::Serialize;
 
 /// The data about a frame in the line of JSON.
@@ -34,14 +34,14 @@ pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
     let mask = look::mask(frame, device.dilations).unwrap_or_else(|| vec![0; pixels]);
     let sample = taken.sample.as_ref();
     let is_pressed = sample.is_some_and(|sample| sample.status.contains(Status::CONTACT));
-    let markers = sample.and_then(|sample| sample.markers);
+    let markers = sample.and_then(Sample::found);
     let told = Told {
         frame: frame.number,
         width: frame.width,
         height: frame.height,
         threshold: Limits::of(&frame.threshold),
         passed: mask.iter().filter(|&&level| level == PASSED).count(),
-        markers: markers.map(|four| MarkerJson::all(&four)),
+        markers: markers.map(MarkerJson::all),
         wrong: match is_pressed {
             true => Vec::new(),
             false => Focus::of(frame, device).wrong,

@@ -116,6 +116,7 @@ impl State {
 mod tests {
     use super::*;
     use hivtac_terms::conditions::CentroidEstimator;
+    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_terms::threshold::HsvBox;
 
@@ -146,7 +147,7 @@ mod tests {
             time_us,
             status: Status::OK,
             force: None,
-            markers: None,
+            markers: MarkerList::default(),
         })
     }
 

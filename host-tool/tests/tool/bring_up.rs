@@ -43,7 +43,7 @@ fn felt(frame: u32, place: Option<[i32; 2]>) -> DeviceMessage {
             sigma: Micrometres(5),
         });
     }
-    sample.markers = Some(at_rest());
+    sample.markers = at_rest().into();
     DeviceMessage::Sample(sample)
 }
 

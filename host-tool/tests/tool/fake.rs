@@ -6,7 +6,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
@@ -213,6 +213,7 @@ pub fn hello() -> DeviceHello {
         board: "fake board".try_into().unwrap(),
         firmware: "fake 1.0".try_into().unwrap(),
         model: Some(ModelIdentity {
+            markers: 4,
             crc: 0xcafe,
             name: "11-64-64-3 ov7725".try_into().unwrap(),
             simulated: true,
@@ -253,12 +254,12 @@ pub fn settings() -> SettingsReport {
             format: PixelFormat::Rgb565,
             dilations: 1,
             centroid: CentroidEstimator::RednessWeighted,
-            markers: [
+            markers: MarkerList::from([
                 marker(100, 60),
                 marker(220, 60),
                 marker(220, 180),
                 marker(100, 180),
-            ],
+            ]),
             rect_center: (Px(160 << 16), Px(120 << 16)),
             rect_area: Q::from_int(14_400),
             down: None,
@@ -318,7 +319,7 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
                 sigma: Micrometres(85),
             }),
         }),
-        markers: None,
+        markers: MarkerList::default(),
     })
 }
 

@@ -2,6 +2,7 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_terms::marker::MarkerList;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::*;
 use std::io::Write;
@@ -15,7 +16,7 @@ fn without_force(sequence: u32, frame: u32) -> DeviceMessage {
         time_us: 7,
         status: Status::MARKERS_MISSING | Status::FRAME_DROPPED,
         force: None,
-        markers: None,
+        markers: MarkerList::default(),
     })
 }
 

@@ -80,7 +80,7 @@ fn sample_with_markers(frame: u32) -> DeviceMessage {
         time_us: 332_135,
         status: Status::TARE_MISSING,
         force: None,
-        markers: Some(at_rest()),
+        markers: at_rest().into(),
     })
 }
 

@@ -181,6 +181,64 @@ impl<T: fmt::Debug, const MOST: usize> fmt::Debug for List<T, MOST> {
     }
 }
 
+/// Carries a list in messages: its length, then its items. More than `MOST` are an error.
+#[cfg(feature = "wire")]
+mod wire {
+    use super::List;
+    use core::fmt;
+    use core::marker::PhantomData;
+    use postcard_schema::Schema;
+    use postcard_schema::schema::{DataModelType, NamedType};
+    use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+    use serde::ser::{Serialize, Serializer};
+
+    impl<T: Serialize, const MOST: usize> Serialize for List<T, MOST> {
+        fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+            serializer.collect_seq(self)
+        }
+    }
+
+    impl<'de, T, const MOST: usize> Deserialize<'de> for List<T, MOST>
+    where
+        T: Deserialize<'de> + Copy + Default,
+    {
+        fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+            deserializer.deserialize_seq(Items(PhantomData))
+        }
+    }
+
+    impl<T: Schema, const MOST: usize> Schema for List<T, MOST> {
+        const SCHEMA: &'static NamedType = &NamedType {
+            name: "List",
+            ty: &DataModelType::Seq(T::SCHEMA),
+        };
+    }
+
+    struct Items<T, const MOST: usize>(PhantomData<T>);
+
+    impl<'de, T, const MOST: usize> Visitor<'de> for Items<T, MOST>
+    where
+        T: Deserialize<'de> + Copy + Default,
+    {
+        type Value = List<T, MOST>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            write!(f, "at most {MOST} items")
+        }
+
+        fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self::Value, A::Error> {
+            let mut list = List::default();
+            while let Some(item) = items.next_element()? {
+                if list.len() == MOST {
+                    return Err(A::Error::invalid_length(MOST + 1, &self));
+                }
+                list.push(item);
+            }
+            Ok(list)
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -80,17 +80,18 @@ pub fn start_each<T>(
     started.len()
 }
 
-/// Returns whether the flash holds these bytes at the beginning of one of the sectors for models.
+/// Returns whether the flash holds these bytes at the beginning of one of the places for models, of
+/// two sectors each.
 pub fn holds_model(contents: &Contents, file: &[u8]) -> bool {
-    let sectors = (BANK.start..BANK.end).step_by(SECTOR_BYTES as usize);
-    let is_here = |sector: u32| {
-        let words = (sector..).step_by(WORD_BYTES as usize);
+    let places = (BANK.start..BANK.end).step_by(2 * SECTOR_BYTES as usize);
+    let is_here = |place: u32| {
+        let words = (place..).step_by(WORD_BYTES as usize);
         (words.zip(file.chunks(WORD_BYTES as usize))).all(|(word, part)| {
             let read = contents.word(word);
             read.is_some_and(|read| read.starts_with(part))
         })
     };
-    sectors.skip(2).take(2).any(is_here)
+    places.skip(1).take(2).any(is_here)
 }
 
 /// Returns the flash of a device whose settings were saved until its log's first sector was full.

@@ -51,7 +51,7 @@ fn no_frame_is_read_in_the_wrong_format() {
             assert!(sample.force.is_some(), "{ms} ms: {sample:?}");
         }
         for sample in &samples[old..] {
-            assert!(sample.markers.is_some(), "{ms} ms: {sample:?}");
+            assert!(sample.found().is_some(), "{ms} ms: {sample:?}");
             let bits = Status::MODEL_MISMATCH | Status::TARE_MISSING | Status::NOT_CALIBRATED;
             let status = Status(sample.status.0 & !Status::FRAME_DROPPED.0);
             assert_eq!(status, bits, "{ms} ms: {sample:?}");

@@ -269,7 +269,7 @@ fn parts_that_do_not_follow_each_other_are_refused() {
         (Request::UseModel, Outcome::InvalidArgument),
         (Request::BeginModel { bytes: 0 }, Outcome::InvalidArgument),
         (
-            Request::BeginModel { bytes: 98_305 },
+            Request::BeginModel { bytes: 163_841 },
             Outcome::InvalidArgument,
         ),
         (Request::BeginModel { bytes: 4 }, Outcome::Done),

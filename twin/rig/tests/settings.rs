@@ -303,22 +303,22 @@ fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
 pub fn of_another_version(flash: &Path) {
     let mut contents = Contents::load(flash).unwrap();
     let sector = &mut contents.array[..SECTOR_BYTES];
-    // By the storage's layout: 10 bytes before the record, with a checksum over generation and
+    // By the storage's layout: 11 bytes before the record, with a checksum over generation and
     // record in the last four.
-    let length = usize::from(sector[1]);
+    let length = usize::from(u16::from_le_bytes([sector[1], sector[2]]));
     let words = sector.chunks(32);
-    let mut record: Vec<u8> = words.clone().next().unwrap()[10..].to_vec();
+    let mut record: Vec<u8> = words.clone().next().unwrap()[11..].to_vec();
     for word in words.skip(1) {
         record.extend(&word[1..]);
     }
     record.truncate(length);
-    assert_eq!(record[0], 5, "the version");
-    sector[10] = 200;
+    assert_eq!(record[0], 6, "the version");
+    sector[11] = 200;
     record[0] = 200;
-    let mut checked = sector[2..6].to_vec();
+    let mut checked = sector[3..7].to_vec();
     checked.extend(&record);
     let checksum = hivtac_wire::frame::CRC32.checksum(&checked);
-    sector[6..10].copy_from_slice(&checksum.to_le_bytes());
+    sector[7..11].copy_from_slice(&checksum.to_le_bytes());
     contents.save(flash).unwrap();
 }
 

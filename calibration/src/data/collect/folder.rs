@@ -153,7 +153,7 @@ impl Folder {
             pair(pose.map(|pose| pose.angles_deg)),
             reasons(sample)
         );
-        match &sample.markers {
+        match sample.markers.exactly::<4>() {
             Some(markers) => markers.iter().for_each(|m| {
                 line += &format!(",{},{},{}", m.x.0, m.y.0, m.area);
             }),
@@ -220,7 +220,7 @@ fn reasons(sample: &Sample) -> String {
     let bad = Status::NO_FORCE.0 & !OF_THE_MODEL.0 | Status::FRAME_DISTURBED.0;
     let frame = Status(bad & sample.status.0);
     let names: Vec<_> = frame.names().collect();
-    if names.is_empty() && sample.markers.is_none() {
+    if names.is_empty() && sample.found().is_none() {
         // A sensor that sends no markers although it found them has a bug in its firmware.
         return "markers_not_sent".to_owned();
     }
@@ -548,6 +548,7 @@ pub fn done(folder: &Path) -> Result<Vec<Pose>> {
 mod tests {
     use super::*;
     use hivtac_terms::conditions::CentroidEstimator;
+    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::threshold::PixelFormat;
     use hivtac_terms::threshold::Yuv422;
     use hivtac_terms::threshold::{HsvBox, Threshold};
@@ -580,7 +581,7 @@ mod tests {
                 Status::MARKERS_MISSING | Status::TARE_MISSING
             },
             force: None,
-            markers: found.then(|| [1, 2, 3, 4].map(marker)),
+            markers: MarkerList::of((1..5).filter(|_| found).map(marker)),
         }
     }
 

@@ -152,7 +152,7 @@ impl FreeTake {
             Some(([x, y], force_n)) => {
                 format!("{:4.0} mN at x {x:+.1}, y {y:+.1} mm", 1e3 * force_n)
             }
-            None if sample.markers.is_some() => "nothing presses the film".to_owned(),
+            None if sample.found().is_some() => "nothing presses the film".to_owned(),
             None => "NO four markers are seen".to_owned(),
         }
     }
@@ -190,6 +190,7 @@ impl FreeTake {
 #[cfg(test)]
 mod tests {
     use hivtac_terms::force::{Force, Place};
+    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_terms::units::{
         MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
@@ -219,7 +220,7 @@ mod tests {
             time_us: (time_s * 1e6) as u64,
             status: Status::NOT_CALIBRATED,
             force: Some(force),
-            markers: None,
+            markers: MarkerList::default(),
         }
     }
 

@@ -420,7 +420,7 @@ fn live(gauge_n: Option<f64>, sample: &Sample) -> String {
     let gauge = gauge_n.map_or(String::new(), |n| format!("gauge {:7.1} mN, ", 1e3 * n));
     let sensor = match &sample.force {
         Some(force) => format!("sensor about {:5.0} mN", f64::from(force.magnitude.0) / 1e3),
-        None if sample.markers.is_some() => "sensor sees four markers".to_owned(),
+        None if sample.found().is_some() => "sensor sees four markers".to_owned(),
         None => "sensor sees NO four markers".to_owned(),
     };
     format!("{:<60}", gauge + &sensor)

@@ -33,7 +33,7 @@ impl Take {
         }
         self.samples += 1;
         let implausible = Status::MARKERS_IMPLAUSIBLE;
-        self.good += usize::from(sample.markers.is_some() && !sample.status.contains(implausible));
+        self.good += usize::from(sample.found().is_some() && !sample.status.contains(implausible));
         self.first_us.get_or_insert(sample.time_us);
         self.last_us = sample.time_us;
         if let Some(force) = &sample.force {

@@ -2,7 +2,8 @@
 //! every operation of the next start.
 
 use crate::device::{Action, Device, Kept};
-use crate::mock::{Cells, Cut, EVERY_WAY, Leaves};
+use crate::mock::{Cells, Cut, EVERY_WAY, Leaves, SECTOR_WORDS};
+use hivtac_storage::flash::WORD_BYTES;
 
 /// A device with a history: settings saved `saves` times, and two models.
 fn used(saves: u8) -> (Cells, Kept) {
@@ -93,6 +94,23 @@ fn settings_are_the_old_or_the_new() {
 fn a_model_is_the_old_or_the_new() {
     let cuts = every_cut_keeps_the_old_or_the_new(&Action::Update(vec![3; 500]));
     assert!(cuts >= 1000, "{cuts}");
+}
+
+/// The second sector of a slot holds the end of a model of eight dots.
+#[test]
+fn a_model_of_two_sectors_is_the_old_or_the_new() {
+    let bytes = (0..40 * WORD_BYTES).map(|byte| byte as u8);
+    let cuts = every_cut_keeps_the_old_or_the_new(&Action::Update(bytes.collect()));
+    assert!(cuts >= 2000, "{cuts}");
+}
+
+#[test]
+fn a_model_longer_than_its_sectors_is_refused_and_the_one_before_stays() {
+    let (mut cells, kept) = used(1);
+    let bytes = vec![3; 2 * SECTOR_WORDS as usize * WORD_BYTES + 1];
+    let mut device = Device::start(&mut cells, None).unwrap();
+    assert!(device.act(&Action::Update(bytes)).unwrap().is_err());
+    assert_eq!(Device::start(&mut cells, None).unwrap().kept(), kept);
 }
 
 #[test]

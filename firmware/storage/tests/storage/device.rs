@@ -1,12 +1,14 @@
 //! Simulates a device like the firmware: a record with its settings and with the blob in use, and
-//! two sectors for blobs.
+//! sectors for two blobs.
+
+use core::ops::Range;
 
 use hivtac_storage::{Log, PAYLOAD_LIMIT, SaveError, blob};
 
 use crate::mock::{Cells, Cut, Mock, powered};
 
 /// The sectors of blobs.
-const SLOTS: [u32; 2] = [2, 3];
+const SLOTS: [Range<u32>; 2] = [2..4, 4..6];
 
 /// The data of a device.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -94,8 +96,8 @@ impl<'c> Device<'c> {
     pub fn kept(&mut self) -> Kept {
         let model = self.record.blob.map(|(slot, length, expected)| {
             let mut bytes = vec![0; usize::from(length)];
-            let sector = SLOTS[usize::from(slot)];
-            blob::read(self.log.flash(), sector, &mut bytes).expect("a blob that is named reads");
+            let sectors = SLOTS[usize::from(slot)].clone();
+            blob::read(self.log.flash(), sectors, &mut bytes).expect("a blob that is named reads");
             assert_eq!(sum(&bytes), expected, "a blob that is named is whole");
             bytes
         });
@@ -114,8 +116,8 @@ impl<'c> Device<'c> {
                 Action::Reset => record = Record::default(),
                 Action::Update(model) => {
                     let slot = 1 - record.blob.map_or(1, |(slot, ..)| slot);
-                    let sector = SLOTS[usize::from(slot)];
-                    let written = self.log.write_blob(sector, model).await;
+                    let sectors = SLOTS[usize::from(slot)].clone();
+                    let written = self.log.write_blob(sectors, model).await;
                     written.map_err(|_| SaveError::Worn)?;
                     record.blob = Some((slot, model.len() as u16, sum(model)));
                 }

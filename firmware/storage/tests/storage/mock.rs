@@ -11,8 +11,8 @@ use hivtac_storage::flash::{BLANK, Failed, Flash, Place, Unreadable, Word};
 
 /// Few, so that sectors fill up.
 pub const SECTOR_WORDS: u32 = 24;
-/// Two of the log, two for blobs.
-pub const SECTORS: u32 = 4;
+/// Two of the log, and two for each of two blobs.
+pub const SECTORS: u32 = 6;
 
 /// The state of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

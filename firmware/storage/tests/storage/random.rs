@@ -9,13 +9,13 @@ fn any_action() -> impl Strategy<Value = Action> {
     let bytes = |longest| proptest::collection::vec(any::<u8>(), 0..longest);
     prop_oneof![
         4 => bytes(240).prop_map(Action::Set),
-        1 => bytes(768).prop_map(Action::Update),
+        1 => bytes(1_537).prop_map(Action::Update),
         1 => Just(Action::Reset),
     ]
 }
 
 fn any_cut() -> impl Strategy<Value = Option<Cut>> {
-    let cut = (0_u64..30, proptest::sample::select(&EVERY_WAY[..]))
+    let cut = (0_u64..60, proptest::sample::select(&EVERY_WAY[..]))
         .prop_map(|(operation, leaves)| Cut { operation, leaves });
     proptest::option::of(cut)
 }

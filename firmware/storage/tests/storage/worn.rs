@@ -62,7 +62,7 @@ fn a_model_in_worn_flash_is_refused_and_the_one_before_stays() {
     device.act(&Action::Update(vec![7; 100])).unwrap().unwrap();
     let kept = device.kept();
     // The last word of the other slot that the next one needs.
-    cells.worn = vec![3 * SECTOR_WORDS + 3];
+    cells.worn = vec![4 * SECTOR_WORDS + 3];
     let mut device = Device::start(&mut cells, None).unwrap();
     assert!(device.act(&Action::Update(vec![8; 128])).unwrap().is_err());
     assert_eq!(device.failures(), 1);

@@ -112,7 +112,7 @@ fn samples_come_of_frames_once_they_are_asked_for() {
     };
     assert_eq!(sample.frame, frame.number);
     assert!(
-        sample.markers.is_some() && sample.force.is_some(),
+        sample.found().is_some() && sample.force.is_some(),
         "{sample:?}"
     );
     tested.ask(2, Request::Stop);
