@@ -52,7 +52,9 @@ mod stats;
 mod tare;
 mod thermometer;
 mod usb;
+mod usb_core;
 mod usb_guard;
+mod usb_watch;
 mod vsync;
 
 use band_copy::BandCopy;

@@ -6,9 +6,13 @@
 //! sender through bounded queues (`outbox`).
 //!
 //! # Note
-//! The sender waits at most [`WRITE_TIMEOUT`] for a packet. If the host does not read, messages are
-//! dropped whole or cut. After a cut the next frame begins with a zero byte, so that the host
-//! resynchronizes at once.
+//! If the host does not read, messages are dropped whole or cut: a sample as soon as it is older
+//! than [`OLDEST`], another message after [`WRITE_TIMEOUT`]. The packet that waits in the core is
+//! taken back then. So what a host reads after a pause is new. After a cut the next frame begins
+//! with a zero byte, so that the host resynchronizes at once.
+//!
+//! If USB is dead for another reason (`usb_watch::rescue_needed`), the device disconnects and
+//! connects again.
 //!
 //! # Limitations
 //! Without VBUS sensing an unplugged cable looks like a sleeping host: the conversation ends when
@@ -17,14 +21,15 @@
 use crate::board::UsbPort;
 use crate::snapshot::Outgoing;
 use crate::usb_guard::Guarded;
-use crate::{commands, outbox, session, stats};
+use crate::usb_watch::{self, Watch};
+use crate::{commands, outbox, session, stats, usb_core};
 use embassy_futures::join::join5;
 use embassy_futures::select::{Either, select};
 use embassy_stm32::usb::{self, Driver};
 use embassy_stm32::{bind_interrupts, peripherals};
-use embassy_time::{Duration, Ticker, with_timeout};
+use embassy_time::{Duration, Instant, Ticker, Timer, with_deadline};
 use embassy_usb::class::cdc_acm::{CdcAcmClass, ControlChanged, Receiver, Sender, State};
-use embassy_usb::{Builder, Config};
+use embassy_usb::{Builder, Config, UsbDevice};
 use hivtac_wire::decoder::Decoder;
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::DeviceMessage;
@@ -34,13 +39,17 @@ use hivtac_wire::usb::{MANUFACTURER, PRODUCT, PRODUCT_ID, VENDOR_ID};
 const PACKET: usize = 64;
 /// A reading host fetches a packet within a millisecond or two.
 const WRITE_TIMEOUT: Duration = Duration::from_millis(100);
+/// Largest age of a sample that is sent, from the middle of its exposure.
+const OLDEST: Duration = Duration::from_millis(180);
+/// Time without a connection after which a host has noticed it.
+const DISCONNECTED: Duration = Duration::from_millis(20);
 /// Period of the stats while streaming.
 const STATS_PERIOD: Duration = Duration::from_secs(1);
 /// Largest current of the board, its LED and the camera, mA.
 const CURRENT: u16 = 300;
 
 bind_interrupts!(struct Irqs {
-    OTG_FS => usb::InterruptHandler<peripherals::USB_OTG_FS>;
+    OTG_FS => Watch, usb::InterruptHandler<peripherals::USB_OTG_FS>;
 });
 
 type Port<'d> = Guarded<Driver<'d, peripherals::USB_OTG_FS>>;
@@ -75,7 +84,7 @@ pub async fn run(port: UsbPort) {
     let (sender, receiver, control) = class.split_with_control();
     let mut device = builder.build();
     join5(
-        device.run(),
+        serve(&mut device),
         receive(receiver),
         send(sender),
         watch_dtr(control),
@@ -91,6 +100,20 @@ fn identity() -> Config<'static> {
     config.serial_number = Some(embassy_stm32::uid::uid_hex());
     config.max_power = CURRENT;
     config
+}
+
+/// Serves bus and control pipe for ever.
+async fn serve<'d>(device: &mut UsbDevice<'d, Port<'d>>) {
+    loop {
+        select(device.run(), usb_watch::rescue_needed()).await;
+        defmt::warn!("USB is dead: connects again");
+        session::end();
+        device.disable().await;
+        usb_core::connect(false);
+        Timer::after(DISCONNECTED).await;
+        usb_core::abort_all();
+        usb_core::connect(true);
+    }
 }
 
 async fn receive<'d>(mut receiver: Receiver<'d, Port<'d>>) {
@@ -114,6 +137,7 @@ async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
     // A zero byte precedes the first frame, and each frame after a cut one.
     let mut buffer = [0; 1 + MAX_DEVICE_FRAME];
     let mut cut = true;
+    let mut after_sample = false;
     let mut snapshot = Outgoing::NONE;
     loop {
         // Messages in the outbox go before a snapshot's parts.
@@ -128,28 +152,54 @@ async fn send<'d>(mut sender: Sender<'d, Port<'d>>) {
         };
         let length = 1 + frame.len();
         let bytes = buffer.get(usize::from(!cut)..length).unwrap_or(&[]);
-        cut = !send_bytes(&mut sender, bytes).await;
-        match message {
-            DeviceMessage::Sample(_) if cut => stats::USB_DROPPED.count(),
-            DeviceMessage::Snapshot(_) | DeviceMessage::SnapshotPart(_) if cut => {
-                snapshot.give_up();
+        let sent = send_bytes(&mut sender, bytes, last_moment(&message)).await;
+        cut = sent.is_err();
+        let is_sample = matches!(message, DeviceMessage::Sample(_));
+        if let Err(Cut { packets }) = sent {
+            let waited = usb_core::abort_data();
+            if waited && packets == 0 && after_sample {
+                // It was the last packet of the sample before.
+                stats::USB_DROPPED.count();
             }
-            _ => {}
+            match message {
+                DeviceMessage::Sample(_) => stats::USB_DROPPED.count(),
+                DeviceMessage::Snapshot(_) | DeviceMessage::SnapshotPart(_) => snapshot.give_up(),
+                _ => {}
+            }
         }
+        after_sample = is_sample && !cut;
     }
 }
 
-/// Sends one frame; returns false if it was cut or not begun.
-async fn send_bytes<'d>(sender: &mut Sender<'d, Port<'d>>, bytes: &[u8]) -> bool {
+/// The time at which a message is given up.
+fn last_moment(message: &DeviceMessage) -> Instant {
+    match message {
+        DeviceMessage::Sample(sample) => Instant::from_micros(sample.time_us) + OLDEST,
+        _ => Instant::now() + WRITE_TIMEOUT,
+    }
+}
+
+/// A frame that was not sent whole.
+struct Cut {
+    /// Its packets that the core took.
+    packets: usize,
+}
+
+/// Sends one frame, or as much of it as the host takes in time.
+async fn send_bytes<'d>(
+    sender: &mut Sender<'d, Port<'d>>,
+    bytes: &[u8],
+    until: Instant,
+) -> Result<(), Cut> {
     // A transfer ends with a short packet, which is empty when the bytes fill the last one.
     let end = bytes.len().is_multiple_of(PACKET).then_some(&[][..]);
-    for packet in bytes.chunks(PACKET).chain(end) {
-        match with_timeout(WRITE_TIMEOUT, sender.write_packet(packet)).await {
+    for (packets, packet) in bytes.chunks(PACKET).chain(end).enumerate() {
+        match with_deadline(until, sender.write_packet(packet)).await {
             Ok(Ok(())) => {}
-            _ => return false,
+            _ => return Err(Cut { packets }),
         }
     }
-    true
+    Ok(())
 }
 
 /// A host that closes the port drops DTR.

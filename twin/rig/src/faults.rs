@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// The kinds of fault. All are outside the microcontroller, except the DMA stall.
+/// The kinds of fault. All are outside the microcontroller, except the DMA
+/// stall and those of the USB core.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// No camera on the connector: no acknowledge, no signals.
@@ -39,9 +40,13 @@ pub enum Kind {
     HostNotReading,
     /// The USB data lines are disconnected; the device stays powered.
     CablePulled,
+    /// The USB core latches a suspend that is over together with the end of a bus reset.
+    UsbStaleSuspend,
+    /// The USB core sends no bulk or interrupt packet any more until it disconnects.
+    UsbStuck,
 }
 
-const NAMES: [(&str, Kind); 15] = [
+const NAMES: [(&str, Kind); 17] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),
@@ -57,6 +62,8 @@ const NAMES: [(&str, Kind); 15] = [
     ("bus-busy", Kind::BusBusy),
     ("host-not-reading", Kind::HostNotReading),
     ("cable-pulled", Kind::CablePulled),
+    ("usb-stale-suspend", Kind::UsbStaleSuspend),
+    ("usb-stuck", Kind::UsbStuck),
 ];
 
 /// Longest time, ms: a thousand days.

@@ -12,6 +12,8 @@
 //! 800   unplug
 //! 900   plug
 //! 950   request 82 00 00 00 0f 00 02 00   a control transfer, by its SETUP; written data are zeros
+//! 960   cancel           the control transfer under way is given up, wherever it is
+//! 1000  reset            the host resets the bus and enumerates the device again
 //! 1200  close
 //! ```
 
@@ -38,6 +40,10 @@ pub enum Action {
     Plug,
     /// Pull the cable.
     Unplug,
+    /// Reset the bus.
+    Reset,
+    /// Give the control transfer under way up.
+    Cancel,
     /// A control transfer, by its SETUP packet.
     Request([u8; 8]),
 }
@@ -95,6 +101,8 @@ impl Script {
                 Action::StopReading => host.set_reading(false),
                 Action::Plug => host.set_cable(true),
                 Action::Unplug => host.set_cable(false),
+                Action::Reset => host.reset(),
+                Action::Cancel => host.cancel(),
                 Action::Request(setup) => host.request(setup),
             }
         }
@@ -122,13 +130,15 @@ fn action(line: &str) -> anyhow::Result<(u64, Action)> {
         "stop-reading" => Action::StopReading,
         "plug" => Action::Plug,
         "unplug" => Action::Unplug,
+        "reset" => Action::Reset,
+        "cancel" => Action::Cancel,
         "request" => {
             let bytes = hexadecimal(argument)?;
             Action::Request(bytes.try_into().ok().context("a SETUP has eight bytes")?)
         }
         _ => bail!(
             "no action is called `{word}`: use open, close, send, read, stop-reading, plug, \
-             unplug, request"
+             unplug, reset, cancel, request"
         ),
     };
     if !argument.is_empty() && word != "send" && word != "request" {

@@ -25,3 +25,4 @@ mod snapshot;
 mod tare;
 mod threshold;
 mod usb;
+mod usb_dead;

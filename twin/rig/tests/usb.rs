@@ -1,4 +1,5 @@
 //! Tests of control transfers of any kind: the device answers, stalls unknown ones, and goes on.
+//! `usb_dead.rs` has what may end USB.
 
 use crate::common::{Run, Setup, firmware};
 use hivtac_rig::script::Action;
@@ -46,6 +47,21 @@ fn requests_about_endpoints_that_do_not_exist_are_stalled() {
     for setup in setups {
         assert_eq!(outcome(&run, setup), "stalled");
     }
+    goes_on(&run);
+}
+
+/// A device without high speed stalls a request for its qualifier (USB 2.0, section 9.6.2); Linux
+/// warns of a slow port otherwise. What precedes a stall is none of the next transfer's: 64 bytes
+/// of a request that is too long are not the line coding.
+#[test]
+fn a_refused_request_leaves_nothing_behind() {
+    let qualifier = [0x80, 6, 0, 6, 0, 0, 10, 0];
+    let too_long = [0x21, 0x20, 0, 0, 0, 0, 0xFF, 0];
+    let line_coding = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
+    let run = with_requests(&[qualifier, too_long, line_coding]);
+    assert_eq!(outcome(&run, qualifier), "stalled");
+    assert_eq!(outcome(&run, too_long), "stalled");
+    assert_eq!(outcome(&run, line_coding), "0 bytes");
     goes_on(&run);
 }
 

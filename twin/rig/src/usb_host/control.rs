@@ -41,6 +41,8 @@ pub enum Begins {
     None,
     /// The endpoint with this address.
     Endpoint(u8),
+    /// The endpoints of the interface with this number.
+    Interface(u8),
     /// All endpoints.
     All,
 }
@@ -98,10 +100,11 @@ impl Transfer {
     }
 
     /// Returns the endpoint whose halt it clears: the endpoint's toggle restarts on both sides. A
-    /// transfer that sets a configuration restarts all endpoints.
+    /// transfer that sets an interface restarts its endpoints, one that sets a configuration all.
     pub fn begins_anew(&self) -> Begins {
         match self.setup {
             [2, 1, 0, 0, endpoint, ..] => Begins::Endpoint(endpoint),
+            [1, 11, _, _, interface, ..] => Begins::Interface(interface),
             [0, 9, ..] => Begins::All,
             _ => Begins::None,
         }

@@ -5,6 +5,8 @@
 pub struct Function {
     /// Number of the communications interface.
     pub control_interface: u8,
+    /// Number of the data interface.
+    pub data_interface: u8,
     /// Bulk IN endpoint.
     pub bulk_in: usize,
     /// Bulk OUT endpoint.
@@ -37,6 +39,9 @@ impl Function {
             match (kind, descriptor) {
                 (INTERFACE, [_, _, number, _, _, class, subclass, ..]) => {
                     in_data = *class == DATA;
+                    if in_data {
+                        function.data_interface = *number;
+                    }
                     if [*class, *subclass] == COMMUNICATIONS {
                         (has_control, function.control_interface) = (true, *number);
                     }
@@ -87,6 +92,7 @@ mod tests {
         .concat();
         let function = Function {
             control_interface: 3,
+            data_interface: 4,
             bulk_in: 2,
             bulk_out: 1,
         };

@@ -76,6 +76,9 @@ pub struct Host {
     port: Port,
     faults: Faults,
     cable: bool,
+    reset_wanted: bool,
+    /// The device was made to send no packet any more.
+    stuck: bool,
     idle_since: Option<u64>,
     attempts: u32,
     address: u8,
@@ -124,6 +127,8 @@ impl Host {
             port: Port::Empty,
             faults,
             cable: true,
+            reset_wanted: false,
+            stuck: false,
             idle_since: None,
             attempts: 0,
             address: 0,
@@ -183,6 +188,17 @@ impl Host {
         self.queue.push_back(Transfer::any(setup));
     }
 
+    /// Gives the control transfer up that is under way, wherever it is, and those that wait.
+    pub fn cancel(&mut self) {
+        self.transfer = None;
+        self.queue.clear();
+    }
+
+    /// Resets the bus of a device that is plugged in, and enumerates it again.
+    pub fn reset(&mut self) {
+        self.reset_wanted = true;
+    }
+
     /// Plugs the cable in, or pulls it.
     pub fn set_cable(&mut self, plugged: bool) {
         self.cable = plugged;
@@ -196,12 +212,24 @@ impl Host {
             return self.disconnected(now, device);
         }
         self.idle_since = None;
+        if std::mem::take(&mut self.reset_wanted) {
+            self.note(now, "port reset");
+            self.forget_device();
+            self.attempts = 0;
+            self.reset_bus(now, device);
+        }
         self.start_of_frame(now, device);
+        if self.faults.on(Kind::UsbStuck, now) && !std::mem::replace(&mut self.stuck, true) {
+            device.get_stuck();
+        }
         match self.port {
             Port::Empty => self.wait(now, "device attached", Port::Debounce(now + DEBOUNCE_NS)),
             Port::Debounce(until) if now >= until => self.reset_bus(now, device),
             Port::Reset(until) if now >= until => {
                 device.enumerated();
+                if self.faults.on(Kind::UsbStaleSuspend, now) {
+                    device.latch_stale_suspend();
+                }
                 self.port = Port::Recovery(now + RECOVERY_NS);
             }
             Port::Recovery(until) if now >= until => self.enumerate(now),
@@ -299,7 +327,12 @@ impl Host {
         };
         let endpoints = [function.bulk_in as u8 | 0x80, function.bulk_out as u8];
         for (data1, endpoint) in self.data1.iter_mut().zip(endpoints) {
-            *data1 &= which != Begins::All && which != Begins::Endpoint(endpoint);
+            *data1 &= match which {
+                Begins::None => true,
+                Begins::Endpoint(number) => number != endpoint,
+                Begins::Interface(number) => number != function.data_interface,
+                Begins::All => false,
+            };
         }
     }
 

@@ -168,8 +168,12 @@ impl Setup {
         self
     }
 
-    pub fn at(mut self, ms: u64, action: Action) -> Self {
-        self.actions.push((ms * 1_000_000, action));
+    pub fn at(self, ms: u64, action: Action) -> Self {
+        self.at_us(ms * 1000, action)
+    }
+
+    pub fn at_us(mut self, us: u64, action: Action) -> Self {
+        self.actions.push((us * 1000, action));
         self
     }
 

@@ -67,8 +67,16 @@ impl Core {
     /// Handles a write by the firmware.
     pub(super) fn write_device(&mut self, offset: u32, value: u32) {
         match offset {
-            0x00 => self.dcfg = value,
-            0x04 => self.dctl = value,
+            0x00 => {
+                self.dcfg = value;
+                if self.dcfg_address() == 0 {
+                    self.address = 0;
+                }
+            }
+            0x04 => {
+                self.dctl = value;
+                self.stuck &= value & SOFT_DISCONNECT == 0;
+            }
             0x10 => self.diepmsk = value,
             0x14 => self.doepmsk = value,
             0x1C => self.daintmsk = value,
@@ -179,8 +187,12 @@ mod tests {
         assert_eq!(core.transmit(0, 0), Answer::Ack(Packet::default()));
         assert_eq!(core.setup(0, [0; 8]), Answer::Silence);
         assert_eq!(core.setup(5, [0; 8]), Answer::Ack(()));
+        core.bus_reset();
+        assert_eq!(core.setup(0, [0; 8]), Answer::Silence, "not cleared yet");
+        core.write_device(0x00, 0);
+        assert_eq!(core.setup(0, [0; 8]), Answer::Ack(()));
         core.suspend();
-        assert_eq!(core.setup(5, [0; 8]), Answer::Silence);
+        assert_eq!(core.setup(0, [0; 8]), Answer::Silence);
     }
 
     #[test]

@@ -29,16 +29,23 @@ fn controlled(old: u32, written: u32) -> u32 {
     let toggles = bit::NEXT_IS_DATA0 | bit::NEXT_IS_DATA1;
     let commands = bit::CLEAR_NAK | bit::SET_NAK | toggles | bit::DISABLE;
     let mut now = written & !(commands | bit::NAK_STATUS) | old & (bit::NAK_STATUS | bit::ENABLE);
+    if disables(old, written) {
+        now &= !bit::ENABLE;
+    }
     if written & bit::CLEAR_NAK != 0 {
         now &= !bit::NAK_STATUS;
     }
     if written & bit::SET_NAK != 0 {
         now |= bit::NAK_STATUS;
     }
-    if written & bit::DISABLE != 0 {
-        now &= !bit::ENABLE;
-    }
     now
+}
+
+/// Returns whether a write ends a transfer. The core disables an endpoint only once its NAK is in
+/// effect, so one write cannot set both.
+fn disables(old: u32, written: u32) -> bool {
+    written & bit::DISABLE != 0
+        && old & (bit::ENABLE | bit::NAK_STATUS) == bit::ENABLE | bit::NAK_STATUS
 }
 
 /// Returns the data toggle (whether the next packet is DATA1) after a write of the control
@@ -68,7 +75,7 @@ impl In {
 
     /// Handles a write of DIEPCTL.
     pub fn write_control(&mut self, value: u32) {
-        if value & bit::DISABLE != 0 && self.control & bit::ENABLE != 0 {
+        if disables(self.control, value) {
             self.interrupts |= event::DISABLED;
         }
         self.control = controlled(self.control, value);
@@ -102,11 +109,10 @@ impl In {
         self.fifo.clear();
     }
 
-    /// Handles a bus reset: no transfer, and no longer active.
+    /// Handles a bus reset: it is no longer active. A transfer, its size and its FIFO stay until
+    /// the firmware takes them back.
     pub fn stop(&mut self) {
-        self.control &= !(bit::ENABLE | bit::STALL | bit::ACTIVE);
-        self.size = 0;
-        self.fifo.clear();
+        self.control &= !(bit::STALL | bit::ACTIVE);
     }
 
     /// Handles a SETUP packet: ends a stall and sets NAK.
@@ -160,7 +166,7 @@ impl Out {
 
     /// Handles a write of DOEPCTL.
     pub fn write_control(&mut self, value: u32) {
-        if value & bit::DISABLE != 0 && self.control & bit::ENABLE != 0 {
+        if disables(self.control, value) {
             self.interrupts |= event::DISABLED;
         }
         self.control = controlled(self.control, value);
@@ -254,6 +260,22 @@ mod tests {
         assert!(out.is_next(false) && !out.is_next(false) && out.is_next(true));
         out.write_control(bit::NEXT_IS_DATA1);
         assert!(!out.is_next(false) && out.is_next(true));
+    }
+
+    #[test]
+    fn a_packet_outlives_a_reset_until_it_is_disabled_under_nak() {
+        let mut endpoint = In::default();
+        endpoint.size = 1 << 19 | 4;
+        endpoint.write_control(bit::ACTIVE | bit::ENABLE | bit::CLEAR_NAK);
+        assert!(endpoint.push(1, 16));
+        endpoint.stop();
+        assert_eq!(endpoint.control(1) & bit::ENABLE, bit::ENABLE);
+        assert_eq!((endpoint.size, endpoint.fifo_empty()), (1 << 19 | 4, false));
+        endpoint.write_control(bit::SET_NAK | bit::DISABLE);
+        assert_eq!(endpoint.control(1) & bit::ENABLE, bit::ENABLE, "too early");
+        endpoint.write_control(bit::SET_NAK | bit::DISABLE);
+        assert_eq!(endpoint.control(1) & bit::ENABLE, 0);
+        assert_eq!(endpoint.interrupts & event::DISABLED, event::DISABLED);
     }
 
     #[test]

@@ -6,9 +6,10 @@
 //!
 //! Simulated: soft connect, bus reset, enumeration at full speed, suspend, resume, address, stall,
 //! NAK, FIFO depths, data toggles. Not simulated: isochronous transfers, remote wake-up, host mode,
-//! and timing below a transaction. An OUT endpoint counts as armed if it is active, its NAK status
-//! is clear and its packet count is not zero. EPENA must have been set once since it became active.
-//! Drivers for this core rely on that.
+//! and timing below a transaction. A bus reset leaves an IN endpoint's transfer and the device's
+//! address as they are: the firmware has to clear them. An OUT endpoint counts as armed if it is
+//! active, its NAK status is clear and its packet count is not zero. EPENA must have been set once
+//! since it became active. Drivers for this core rely on that.
 
 mod blocks;
 mod device_registers;
@@ -111,6 +112,8 @@ pub struct Core {
     reading: VecDeque<u32>,
     suspended: bool,
     address: u32,
+    /// No packet leaves, whatever is done to the endpoints, until the device disconnects.
+    stuck: bool,
     /// The clock of the transceiver, Hz.
     pub clock_hz: u64,
     /// The transceiver has its supply and its pins.
@@ -169,6 +172,7 @@ impl Default for Core {
             reading: VecDeque::new(),
             suspended: false,
             address: 0,
+            stuck: false,
             clock_hz: 0,
             wired: false,
             lost_words: 0,
@@ -219,13 +223,21 @@ impl Core {
         self.latched |= interrupt::USBRST;
         self.ins.iter_mut().for_each(In::stop);
         self.outs.iter_mut().for_each(Out::stop);
-        self.dcfg &= !(0x7F << 4);
-        self.address = 0;
     }
 
     /// Handles the end of the reset: full speed.
     pub fn enumerated(&mut self) {
         self.latched |= interrupt::ENUMDNE;
+    }
+
+    /// Latches a suspend that is over, as a core does that is late.
+    pub fn latch_stale_suspend(&mut self) {
+        self.latched |= interrupt::ESUSP | interrupt::USBSUSP;
+    }
+
+    /// Stops all packets of bulk and interrupt endpoints until the device disconnects.
+    pub fn get_stuck(&mut self) {
+        self.stuck = true;
     }
 
     /// Handles three milliseconds without activity on the bus.
@@ -296,6 +308,9 @@ impl Core {
         let sender = &mut self.ins[endpoint];
         if sender.stalled() {
             return Answer::Stall;
+        }
+        if self.stuck && endpoint != 0 {
+            return Answer::Nak;
         }
         let packet = sender.packet(endpoint);
         if endpoint == 0 && packet.is_some() {
