@@ -115,3 +115,15 @@ fn the_films_tables_agree_with_its_solver() {
         }
     }
 }
+
+/// The kit's mechanics take their lengths from this file, `hardware/` has no other.
+#[test]
+fn the_kit_has_the_dimensions_of_the_simulated_sensor() {
+    let directory = tempfile::tempdir().unwrap();
+    let printed: Value = serde_json::from_str(&stdout(directory.path(), &["dimensions"])).unwrap();
+    let kept = Path::new(env!("CARGO_MANIFEST_DIR")).join("../hardware/kit/dimensions.json");
+    let kept: Value = serde_json::from_str(&fs::read_to_string(kept).unwrap()).unwrap();
+    let to_do = "write it anew: hivtac-studies scene dimensions > hardware/kit/dimensions.json";
+    assert_eq!(printed, kept, "{to_do}");
+    assert_eq!(printed["marker_centres_mm"].as_array().unwrap().len(), 4);
+}

@@ -5,6 +5,7 @@ mod bench;
 mod debian;
 mod demo;
 mod fuzz;
+mod kit;
 mod packages;
 mod process;
 mod python;
@@ -34,6 +35,8 @@ enum Task {
     Size,
     /// Make the files of a release: programs, Python wheels and firmware, and install them.
     Release(release::Release),
+    /// Write the sensor's printed parts: STL, STEP, drawings and pictures (docs/kit.md).
+    Kit(kit::Kit),
 }
 
 fn main() -> ExitCode {
@@ -49,12 +52,15 @@ fn main() -> ExitCode {
 }
 
 fn run(task: Task) -> Result<()> {
-    toolchain::ensure_target()?;
+    if !matches!(task, Task::Kit(_)) {
+        toolchain::ensure_target()?;
+    }
     match task {
         Task::Demo(demo) => demo.run(),
         Task::Test(test) => test.run(),
         Task::Bench(bench) => bench.run(),
         Task::Release(release) => release.run(),
         Task::Size => size::memories().map(|table| println!("{table}")),
+        Task::Kit(kit) => kit.run(),
     }
 }

@@ -25,6 +25,9 @@ const SERVE: [&str; 3] = [
     "cyclonedds mcap-ros2-support websockets",
 ];
 
+/// The same for the kit's mechanics, `hardware/`.
+const KIT: [&str; 3] = ["python-kit", "build123d", "build123d>=0.13,<0.14"];
+
 /// Makes the package's environment if missing; returns the obstacle, if there is one.
 pub fn no_package() -> Option<&'static str> {
     obstacle(
@@ -41,6 +44,16 @@ pub fn no_serve() -> Option<&'static str> {
         "pip cannot install cyclonedds, mcap-ros2-support and websockets for Python 3.10 or \
          newer: is there python3 with venv (package python3-venv), and PyPI within reach, and \
          does it have cyclonedds for this Python and computer?",
+    )
+}
+
+/// Makes the kit's environment if missing; returns the obstacle, if there is one.
+pub fn no_kit() -> Option<&'static str> {
+    obstacle(
+        KIT,
+        "pip cannot install build123d (1 GB) for Python 3.10 or newer: is there python3 with venv \
+         (package python3-venv), and PyPI within reach, and does it have build123d's solid \
+         modeller for this computer?",
     )
 }
 
@@ -97,6 +110,22 @@ pub fn test_package(tally: &mut Tally) -> Result<()> {
 pub fn test_serve(tally: &mut Tally) -> Result<()> {
     let (python, tool) = (python(SERVE)?, artifacts::serving_tool()?);
     test(&python, "tests/python/test_serve.py", &tool, tally)
+}
+
+/// Checks the kit's solids, alone and assembled.
+pub fn test_kit(tally: &mut Tally) -> Result<()> {
+    let mut command = Command::new(python(KIT)?);
+    command.args(["-W", "error::UserWarning", "tests/python/test_kit.py"]);
+    command.env("HIVTAC_TOOL", artifacts::host_tool()?);
+    run_tests(command.current_dir(toolchain::at("")), tally)
+}
+
+/// Writes the kit's solids, drawings and pictures into a folder.
+pub fn write_kit(out: &Path, options: &[String]) -> Result<()> {
+    let out = std::path::absolute(out)?;
+    let mut command = Command::new(python(KIT)?);
+    command.args(["-m", "kit"]).arg(out).args(options);
+    process::run(command.current_dir(toolchain::at("hardware")))
 }
 
 fn test(python: &Path, file: &str, tool: &Path, tally: &mut Tally) -> Result<()> {

@@ -60,6 +60,11 @@ static STEPS: [Step; 15] = [
         |_, tally| python::test_serve(tally),
         Some(python::no_serve),
     ),
+    (
+        "tests: kit",
+        |_, tally| python::test_kit(tally),
+        Some(python::no_kit),
+    ),
     ("benchmark", |shared, _| shared.benchmark(), None),
     ("build: board benchmark", |_, _| bench::board::lint(), None),
     (

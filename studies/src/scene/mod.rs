@@ -1,6 +1,7 @@
 //! `hivtac-studies scene …`: pictures and figures of the simulated sensor (`docs/scene.md`).
 
 mod canvas;
+mod dimensions;
 mod figures;
 mod film;
 mod render;
@@ -15,6 +16,8 @@ pub enum SceneCommand {
     Render(render::RenderArgs),
     /// Press the film once: where tip and markers go, and where the markers are seen.
     Film(film::FilmArgs),
+    /// Print the lengths that `hardware/` shares with the simulated sensor, as JSON.
+    Dimensions(dimensions::DimensionsArgs),
     /// Draw the pictures of the documentation: frames, hard cases, and the guide's.
     Figures(figures::FiguresArgs),
 }
@@ -25,6 +28,7 @@ impl SceneCommand {
         match self {
             SceneCommand::Render(args) => args.run(),
             SceneCommand::Film(args) => args.run(),
+            SceneCommand::Dimensions(args) => args.run(),
             SceneCommand::Figures(args) => args.run(),
         }
     }
