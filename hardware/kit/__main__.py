@@ -55,7 +55,7 @@ def sheet(printed: dict[str, Part]):
     for number, (name, part) in enumerate(printed.items()):
         size = part.bounding_box().size
         if number % 4 == 0 and number:
-            x, y, deepest = 0.0, y - deepest - 8, 0.0
+            x, y, deepest = 0.0, y - deepest - 20, 0.0
         box = part.bounding_box()
         moved = Pos(x - box.min.X, y - box.max.Y, 0) * part
         shown.append((Mesh.of(moved, 0.02), (150, 170, 200)))

@@ -163,7 +163,7 @@ def mirrored(kit: Kit, meshes: dict[str, Mesh]) -> float:
 
 
 def illuminance(kit: Kit, lumens: float) -> list[float]:
-    """Illuminance, lx, in the film's middle, above a dot and at 12 mm, for the light of the windows.
+    """Illuminance, lx, in the film's middle, above a dot and at 12 mm, for this light.
 
     The diffuser's lit parts shine as Lambert's law says; walls add nothing.
     """

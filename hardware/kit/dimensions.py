@@ -41,7 +41,7 @@ class Bought:
 
 @dataclass(frozen=True)
 class Kit:
-    """The kit for these bought parts. Lengths in mm; the plate's top is z = 0, the film is above."""
+    """The kit for these bought parts, in mm; the plate's top is z = 0, the film is above."""
 
     bought: Bought = field(default_factory=Bought)
 
@@ -183,9 +183,8 @@ class Kit:
             return seen < (camera[side] - 1) / 2 + 2.5 * SCENE["shift_tolerance_px"]
 
         tenths = range(10, 150)
-        return next(
-            t / 10 for t in tenths if not any(is_seen(t / 10, camera) for camera in SCENE["cameras"])
-        )
+        hidden = [t / 10 for t in tenths if not any(is_seen(t / 10, c) for c in SCENE["cameras"])]
+        return hidden[0]
 
     def corners(self, at: float) -> list[tuple[float, float]]:
         """From the upper left clockwise, as the camera sees them."""

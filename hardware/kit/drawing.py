@@ -30,7 +30,8 @@ def page(width: float, height: float, body: str) -> str:
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width:.0f}mm" height="{height:.0f}mm" '
         f'viewBox="0 0 {width:.1f} {height:.1f}" {STYLE}>\n'
-        f'<rect width="{width:.1f}" height="{height:.1f}" fill="#fff" stroke="none"/>\n{body}</svg>\n'
+        f'<rect width="{width:.1f}" height="{height:.1f}" fill="#fff" stroke="none"/>\n'
+        f"{body}</svg>\n"
     )
 
 
@@ -109,7 +110,8 @@ def sections(kit: Kit, placed: dict[str, Part]) -> str:
     body += text(left, 7, "through the windows of the lamp", "middle")
     body += text(right, 7, "along the diagonal, through two posts", "middle")
     x = left + 28
-    body += upright_span(x, floor - kit.film, floor - kit.pupil, f"{kit.film_distance:g}: film to pupil")
+    words = f"{kit.film_distance:g}: film to pupil"
+    body += upright_span(x, floor - kit.film, floor - kit.pupil, words)
     x += 3
     body += upright_span(
         x - 3, floor - kit.pupil, floor, f"{kit.pupil:.2f}: pupil to plate"

@@ -100,9 +100,8 @@ def perfboard(half: float, corner: float, hole: float) -> str:
             x, y = 2.54 * (column - 5.5), 2.54 * (row - 5.5)
             on_board = abs(x) + abs(y) < half + inner - 0.8 and x * x + y * y > (hole + 0.8) ** 2
             if on_board:
-                body += '<circle cx="{:.1f}" cy="{:.1f}" r="1.9" fill="#fff" stroke="#999"/>\n'.format(
-                    *at(x, y)
-                )
+                circle = '<circle cx="{:.1f}" cy="{:.1f}" r="1.9" fill="#fff" stroke="#999"/>\n'
+                body += circle.format(*at(x, y))
     for x, y in ((-8.89, -8.89), (8.89, -8.89), (8.89, 8.89), (-8.89, 8.89)):
         body += '<circle cx="{:.1f}" cy="{:.1f}" r="4.4" stroke="#00c"/>\n'.format(*at(x, y))
     for turn in range(4):

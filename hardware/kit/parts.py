@@ -87,7 +87,7 @@ def post(kit: Kit, at: tuple[float, float] = (0, 0)) -> Part:
 
 
 def stop(kit: Kit) -> Part:
-    """A tube around the lens: it keeps the LEDs' light off, its teeth stop a film pressed too far."""
+    """A tube around the lens: it keeps the LEDs' light off, its teeth stop a pressed film."""
     inner, outer = kit.tube_inner, kit.tube_outer
     # The tube is higher than the lens only below its teeth.
     top = kit.stop_top

@@ -39,9 +39,9 @@ def draw(
             fill(picture, depth, triangle, light * np.array(colour))
     # Lines where the depth jumps.
     far = np.where(np.isfinite(depth), depth, low[2] - 50 * scale)
-    jump = np.maximum(
-        np.abs(np.diff(far, axis=0, prepend=far[:1])), np.abs(np.diff(far, axis=1, prepend=far[:, :1]))
-    )
+    down = np.abs(np.diff(far, axis=0, prepend=far[:1]))
+    along = np.abs(np.diff(far, axis=1, prepend=far[:, :1]))
+    jump = np.maximum(down, along)
     picture[jump > 0.9 * scale] *= 0.35
     image = Image.fromarray(picture.clip(0, 255).astype(np.uint8))
     return image.resize((width // smooth, height // smooth), Image.Resampling.LANCZOS)
