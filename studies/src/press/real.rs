@@ -18,6 +18,8 @@ const FINENESS: f64 = 0.7;
 /// A film on its posts.
 pub struct RealFilm {
     film: Film,
+    /// How far it is lifted off its place, mm in the middle, and mm per mm along x and y.
+    lift: [f64; 3],
     rest: Equilibrium,
     /// The newest states, with the film's shape for a scene.
     states: Mutex<Vec<(Load, Equilibrium, Pressed)>>,
@@ -27,10 +29,17 @@ impl RealFilm {
     /// The film with this number, with the posts and dots of these options, under a tip with a
     /// radius in mm.
     pub fn random(number: u64, options: &Options, tip_radius_mm: f64) -> Result<Self> {
-        let film = Film::new(&random_design(number, options, tip_radius_mm))?;
+        Self::lifted(&random_design(number, options, tip_radius_mm), [0.0; 3])
+    }
+
+    /// The film of a design, farther from the camera than it should be: in mm in its middle, and in
+    /// mm per mm along x and y.
+    pub fn lifted(design: &Design, lift: [f64; 3]) -> Result<Self> {
+        let film = Film::new(design)?;
         Ok(Self {
             rest: film.rest(),
             film,
+            lift,
             states: Mutex::default(),
         })
     }
@@ -53,12 +62,18 @@ impl RealFilm {
             }
         };
         let discs = self.film.design().dots_mm.iter().copied().map(Disc::marker);
-        let pressed = Pressed {
+        let mut pressed = Pressed {
             tip_mm: state.tip_mm,
             force_n: load.vector_n(),
             touches_mm: load.offset_mm(),
             ..pressed(&self.film, &state, discs)?
         };
+        let [middle, along_x, along_y] = self.lift;
+        for (disc, [x, y]) in pressed.discs.iter_mut().zip(pressed.centres_mm) {
+            disc.moved_mm[2] += middle + along_x * x + along_y * y;
+            disc.along_x[2] += along_x;
+            disc.along_y[2] += along_y;
+        }
         if states.len() >= MOST_STATES {
             states.remove(0);
         }

@@ -79,10 +79,15 @@ impl TestedUnit {
         let unit = Self::random(conditions, number)?;
         let options = unit.scene.options();
         let film = RealFilm::random(number, options, unit.tip_radius_mm)?;
-        Ok(Self {
+        Ok(unit.on_film(film))
+    }
+
+    /// The same unit with this film.
+    pub fn on_film(self, film: RealFilm) -> Self {
+        Self {
             real: Some(film),
-            ..unit
-        })
+            ..self
+        }
     }
 
     /// A frame under a press; `number` selects its noise.

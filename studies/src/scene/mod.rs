@@ -5,6 +5,7 @@ mod dimensions;
 mod figures;
 mod film;
 mod render;
+mod tolerances;
 
 use anyhow::Result;
 use clap::Subcommand;
@@ -18,6 +19,8 @@ pub enum SceneCommand {
     Film(film::FilmArgs),
     /// Print the lengths that `hardware/` shares with the simulated sensor, as JSON.
     Dimensions(dimensions::DimensionsArgs),
+    /// Build units with one dimension of the kit off by its tolerance; measure them after ten loads.
+    Tolerances(tolerances::Tolerances),
     /// Draw the pictures of the documentation: frames, hard cases, and the guide's.
     Figures(figures::FiguresArgs),
 }
@@ -29,6 +32,7 @@ impl SceneCommand {
             SceneCommand::Render(args) => args.run(),
             SceneCommand::Film(args) => args.run(),
             SceneCommand::Dimensions(args) => args.run(),
+            SceneCommand::Tolerances(study) => study.run(),
             SceneCommand::Figures(args) => args.run(),
         }
     }

@@ -53,6 +53,17 @@ pub enum Bench {
     ByHand,
 }
 
+/// How far the loads of ten are from what the jig is taken to give.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Jig {
+    /// Distance of each bore from its place, mm, in a direction drawn for each.
+    pub place_mm: f64,
+    /// Excess of the wedge's angle, degrees.
+    pub tilt_deg: f64,
+    /// Excess of each weight, as a part of it.
+    pub weight: f64,
+}
+
 impl Bench {
     /// All methods, with their names.
     pub const ALL: [(Bench, &'static str); 3] = [
@@ -64,6 +75,18 @@ impl Bench {
     /// The weights for a unit after these loads; `number` selects the errors of gauge and stage.
     pub fn calibrate(
         self,
+        weights: &Weights,
+        unit: &TestedUnit,
+        tared: &mut Tared<'_>,
+        number: u64,
+    ) -> Result<Weights> {
+        self.calibrate_with(Jig::default(), weights, unit, tared, number)
+    }
+
+    /// The same with a jig that is not as drawn.
+    pub fn calibrate_with(
+        self,
+        jig: Jig,
         weights: &Weights,
         unit: &TestedUnit,
         tared: &mut Tared<'_>,
@@ -81,13 +104,14 @@ impl Bench {
             from: None,
         };
         let mut random = seeded(7_000 + number);
-        let loads = self.loads(weights, &rest, unit, tared, &mut random)?;
+        let loads = self.loads(jig, weights, &rest, unit, tared, &mut random)?;
         let (own, _) = weights.clone().fitted(rest, &loads, None, known)?;
         Ok(own)
     }
 
     fn loads(
         self,
+        jig: Jig,
         weights: &Weights,
         rest: &Rest,
         unit: &TestedUnit,
@@ -100,10 +124,13 @@ impl Bench {
         let mut loads = Vec::new();
         if self == Bench::Ten {
             for (number, (force_n, alpha, beta, place_mm)) in (0..).zip(TEN) {
-                let load = Load::from_angles(force_n, alpha, beta)?;
-                let load = load.with_offset_mm(there(place_mm))?;
+                let meant = Load::from_angles(force_n, alpha, beta)?;
+                let load = jig.load(meant, there(place_mm), [alpha, beta], number)?;
                 let seen = tared.seen_px(unit, load, FRAMES, 50_000 + 10 * number)?;
-                loads.push(with_gauge_error(seen, load.vector_n(), place_mm, random));
+                loads.push(SeenLoad {
+                    each_place_mm: jig.place_mm,
+                    ..with_gauge_error(seen, meant.vector_n(), place_mm, random)
+                });
             }
             return Ok(loads);
         }
@@ -146,6 +173,23 @@ impl Bench {
             }
         }
         Ok(loads)
+    }
+}
+
+impl Jig {
+    /// The load that the jig really gives for load `number`, which is meant to be `meant`.
+    fn load(self, meant: Load, place_mm: [f64; 2], angles: [f64; 2], number: u64) -> Result<Load> {
+        // The golden angle: directions that differ.
+        let (sin, cos) = (2.4 * number as f64).sin_cos();
+        let [x, y] = place_mm;
+        let place_mm = [x + self.place_mm * cos, y + self.place_mm * sin];
+        let tilted = |angle: f64| match angle {
+            0.0 => 0.0,
+            _ => angle + angle.signum() * self.tilt_deg,
+        };
+        let [alpha, beta] = angles.map(tilted);
+        let load = Load::from_angles((1.0 + self.weight) * meant.magnitude_n(), alpha, beta)?;
+        Ok(load.with_offset_mm(place_mm)?)
     }
 }
 

@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::anywhere::WEIGHTS;
 use crate::page;
 use crate::press::{Errors, REACH_MM, Tared, TestedUnit, press};
-pub use bench::Bench;
+pub use bench::{Bench, Jig};
 pub use stretched::Stretched;
 
 /// Draw units as people build them; measure them with a tare alone, and after they were calibrated.
