@@ -110,7 +110,9 @@ impl Link {
         while !bytes.is_empty() {
             stop::check()?;
             match self.port.write(bytes) {
-                Ok(0) => return Err(self.lost("the port is closed")),
+                // Windows tells a write that timed out like this.
+                Ok(0) if Instant::now() < end => (),
+                Ok(0) => return Err(self.lost("it takes no bytes")),
                 Ok(written) => {
                     bytes = &bytes[written..];
                     end = Instant::now() + WRITE_PATIENCE;
@@ -351,4 +353,54 @@ pub fn log_text(line: &LogLine) -> String {
     };
     let seconds = line.time_us as f64 / 1e6;
     format!("device, {seconds:.3} s, {level}: {}", shown(&line.text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Read, Write};
+
+    /// A port that takes no byte at first, and then as many as it shall at a time.
+    struct Slow {
+        refusals: usize,
+        taken: std::sync::mpsc::Sender<u8>,
+    }
+
+    impl Write for Slow {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            if self.refusals > 0 {
+                self.refusals -= 1;
+                return Ok(0);
+            }
+            self.taken.send(bytes[0]).map_err(io::Error::other)?;
+            Ok(1)
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Read for Slow {
+        fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
+            Err(ErrorKind::TimedOut.into())
+        }
+    }
+
+    /// On Windows a write that timed out returns 0.
+    #[test]
+    fn a_port_that_takes_nothing_for_a_moment_is_not_lost() {
+        let (taken, bytes) = std::sync::mpsc::channel();
+        let mut link = Link {
+            port: Box::new(Slow { refusals: 3, taken }),
+            name: "slow".to_owned(),
+            decoder: Decoder::new(),
+            inbox: Vec::new(),
+            decoded: 0,
+            last_id: 0,
+        };
+        link.write(&[1, 2, 3]).unwrap();
+        drop(link);
+        assert_eq!(bytes.iter().collect::<Vec<_>>(), [1, 2, 3]);
+    }
 }

@@ -1,8 +1,8 @@
 //! Opens the device's port: a serial port found by USB id or name, or a TCP address.
 
 use crate::failure::{Failure, Kind};
-use hivtac_wire::usb::{PRODUCT_ID, VENDOR_ID};
-use serialport::{ErrorKind, SerialPortInfo, SerialPortType};
+use hivtac_wire::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
+use serialport::{ErrorKind, SerialPortInfo, SerialPortType, UsbPortInfo};
 use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
@@ -20,7 +20,7 @@ impl<T: Read + Write + Send> Port for T {}
 /// The address of a device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// The one serial port with the sensor's USB id.
+    /// The one serial port with the sensor's USB id and product.
     Find,
     /// The serial port with the sensor's USB id and this serial number, lower case.
     Serial(String),
@@ -127,7 +127,7 @@ fn is_sensor(port: &SerialPortInfo) -> bool {
 
 fn sensor(port: &SerialPortInfo) -> Option<Attached> {
     match &port.port_type {
-        SerialPortType::UsbPort(usb) if (usb.vid, usb.pid) == (VENDOR_ID, PRODUCT_ID) => {
+        SerialPortType::UsbPort(usb) if is_ours(usb) => {
             let serial = usb.serial_number.as_deref().unwrap_or_default();
             Some(Attached {
                 port: port.port_name.clone(),
@@ -136,6 +136,14 @@ fn sensor(port: &SerialPortInfo) -> Option<Attached> {
         }
         _ => None,
     }
+}
+
+/// Anybody's device for tests has the same id, so its product counts, too. Linux may replace its
+/// spaces. Windows tells its driver's name instead, and nothing else that helps.
+fn is_ours(usb: &UsbPortInfo) -> bool {
+    let same_product = |product: &String| product.replace('_', " ") == PRODUCT;
+    let product = (usb.product.as_ref()).filter(|_| !cfg!(windows));
+    (usb.vid, usb.pid) == (VENDOR_ID, PRODUCT_ID) && product.is_none_or(same_product)
 }
 
 /// "ports seen: …" for a message.
@@ -151,8 +159,10 @@ fn describe(port: &SerialPortInfo) -> String {
     match &port.port_type {
         SerialPortType::UsbPort(usb) => {
             let serial = usb.serial_number.as_deref().unwrap_or("no serial number");
+            let product = usb.product.as_ref().filter(|_| !is_ours(usb));
+            let product = product.map_or_else(String::new, |product| format!(", {product}"));
             format!(
-                "{} (USB {:04x}:{:04x}, {serial})",
+                "{} (USB {:04x}:{:04x}{product}, {serial})",
                 port.port_name, usb.vid, usb.pid
             )
         }
@@ -264,6 +274,24 @@ mod tests {
             usb("ttyACM1", 0x1209, 1, "b"),
         ];
         assert_eq!(find(&ports).unwrap(), "ttyACM1");
+    }
+
+    /// On Windows a port's product is the name of its driver.
+    #[test]
+    #[cfg(not(windows))]
+    fn another_device_of_the_same_id_is_no_sensor() {
+        let named = |name: &str, product: &str| {
+            let mut port = usb(name, 0x1209, 1, "a");
+            if let SerialPortType::UsbPort(usb) = &mut port.port_type {
+                usb.product = Some(product.to_owned());
+            }
+            port
+        };
+        let blinker = named("A", "Blinker");
+        let ports = [blinker.clone(), named("B", "HiVTac_force_sensor")];
+        assert_eq!(find(&ports).unwrap(), "B");
+        let error = find(&[blinker]).unwrap_err().to_string();
+        assert!(error.contains("A (USB 1209:0001, Blinker, a)"), "{error}");
     }
 
     #[test]
