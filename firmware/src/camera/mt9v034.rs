@@ -20,8 +20,9 @@ use hivtac_terms::units::{Microseconds, Sixteenths};
 pub const IDENTITY: Identity = identity::MT9V034;
 /// Its pixel format.
 pub const USUAL_FORMAT: Format = Format::Mono;
-/// PIXCLK edge on which data is stable.
-pub const SAMPLE_ON_RISING_EDGE: bool = true;
+/// PIXCLK edge on which data is stable. While columns are binned, data change with PIXCLK's rising
+/// edge (onsemi MT9V032, pixel data format).
+pub const SAMPLE_ON_RISING_EDGE: bool = false;
 /// Level of VSYNC (FRAME_VALID) that means "no data": it is high with the rows.
 pub const VSYNC_BLANKING_IS_HIGH: bool = false;
 /// Level of HSYNC (LINE_VALID) that means "no data": it is high with the data.

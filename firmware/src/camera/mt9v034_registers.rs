@@ -115,8 +115,8 @@ const fn with_read_mode(read_mode: u16) -> [(u8, u16); 15] {
         (0x1C, 0x0202),
         // Row noise correction on, in both contexts, as in OpenMV's table.
         (0x70, 0x0101),
-        // Pixel clock: LINE_VALID and FRAME_VALID high with data, PIXCLK rising in the middle of
-        // each datum. `mt9v034.rs` sets DCMI to match.
+        // Pixel clock: LINE_VALID and FRAME_VALID high with data, PIXCLK falling in the middle of
+        // each datum of binned columns. `mt9v034.rs` sets DCMI to match.
         (0x72, 0x0000),
         // Target brightness of the automatic control, in 64ths of white: a bright film that is not
         // saturated, as with the OV7725.

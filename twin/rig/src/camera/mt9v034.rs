@@ -205,7 +205,9 @@ impl Part for Mt9v034 {
             // FRAME_VALID is high with the rows; blanking is its other level.
             vsync_active_high: polarity & reg::INVERT_FRAME != 0,
             href_active_high: polarity & reg::INVERT_LINE == 0,
-            stable_at_rising: polarity & reg::INVERT_CLOCK == 0,
+            // PIXCLK rises in the middle of each datum. While columns are binned it is high in the
+            // first clock of a datum and low afterwards (onsemi MT9V032, pixel data format).
+            stable_at_rising: (polarity & reg::INVERT_CLOCK == 0) == (columns == 1),
             clock_between_rows: true,
             inverted: false,
             fault,
@@ -315,6 +317,7 @@ mod tests {
         assert_eq!(output.window.start, [108, 44]);
         assert_eq!(output.window.array, [376, 240]);
         assert_eq!(output.fault, None);
+        assert!(!output.stable_at_rising, "columns are binned");
         let rate = 1e9 / output.clocks_ns(output.frame_clocks()) as f64;
         assert!((rate - 244.6).abs() < 0.1, "{rate}");
     }

@@ -50,7 +50,7 @@ pub const PARALLEL_OUTPUT: u16 = 1 << 7;
 pub const INVERT_LINE: u16 = 1;
 /// [`PIXEL_CLOCK`]: FRAME_VALID is low with rows.
 pub const INVERT_FRAME: u16 = 1 << 1;
-/// [`PIXEL_CLOCK`]: data are stable at the falling edge.
+/// [`PIXEL_CLOCK`]: data are stable at the other edge.
 pub const INVERT_CLOCK: u16 = 1 << 4;
 
 /// Power-up values that are not zero.
