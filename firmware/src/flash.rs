@@ -42,8 +42,9 @@ const ERASE_LOOKS: u32 = 400;
 const BLOCK_WORDS: usize = 32;
 const BLOCK_BYTES: usize = BLOCK_WORDS * WORD_BYTES;
 
-/// The MDMA's target, in DTCM, which is not cached.
-#[repr(C, align(32))]
+/// The MDMA's target, in DTCM, which is not cached. It is aligned to the longest burst there, 64
+/// bytes: one that crosses 1 KiB is not allowed on that bus.
+#[repr(C, align(64))]
 struct Buffer([Word; BLOCK_WORDS]);
 
 /// The bank. Ownership proves that no other code uses it.

@@ -1,7 +1,8 @@
 // Runs right after a reset, before any memory is initialized, and so uses registers only. Starts
-// the microcontroller's own loader if the program requested it (loader.rs), and switches on the
-// clocks of SRAM1 to SRAM3. Loads .itcm and .sram (memory.x) from flash in double words, the unit
-// of error correction, and clears .sram_zero and .axisram_cached.
+// the microcontroller's own loader if the program requested it (loader.rs). Waits until the core's
+// supply is valid: no memory may be written before (RM0433, 6.4.1). Switches on the clocks of SRAM1
+// to SRAM3. Loads .itcm and .sram (memory.x) from flash in double words, the unit of error
+// correction, and clears .sram_zero and .axisram_cached.
 
     .syntax unified
     .section .text.__pre_init, "ax", %progbits
@@ -37,6 +38,15 @@ __pre_init:
     bx      r1
 
 7:
+    ldr     r0, =0x5802480C         // PWR_CR3: the supply is the internal regulator. Written once
+    ldr     r1, [r0]                // after power-on; the HAL's later write does nothing
+    orr     r1, #0x00000002         // LDOEN
+    str     r1, [r0]
+    ldr     r0, =0x58024804         // PWR_CSR1
+8:  ldr     r1, [r0]
+    tst     r1, #0x00002000         // ACTVOSRDY
+    beq     8b
+
     ldr     r0, =0x580244DC         // RCC_AHB2ENR
     ldr     r1, [r0]
     orr     r1, r1, #0xE0000000     // SRAM3EN, SRAM2EN, SRAM1EN

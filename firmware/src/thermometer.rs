@@ -15,11 +15,11 @@ use embassy_time::{Duration, Timer};
 
 /// The sensor's channel.
 const CHANNEL: usize = 18;
-/// Factory readings of the sensor at 30 °C and at 110 °C, at 3.3 V in 16 bits (DS12110, TS_CAL1 and
-/// TS_CAL2).
+/// Factory readings of the sensor at 3.3 V in 16 bits (DS12110, TS_CAL1 and TS_CAL2).
 const CALIBRATION: [*const u16; 2] = [0x1FF1_E820 as *const u16, 0x1FF1_E840 as *const u16];
-/// Temperatures of these, hundredths of a degree.
-const CALIBRATED_AT: [i32; 2] = [3_000, 11_000];
+/// Temperatures of these, hundredths of a degree: 30 °C, and 130 °C on the revisions that this
+/// program runs on. On earlier silicon the second is 110 °C (ST's HAL, `TEMPSENSOR_CAL2_TEMP`).
+const CALIBRATED_AT: [i32; 2] = [3_000, 13_000];
 /// Plausible temperatures, hundredths of a degree.
 const SENSIBLE: core::ops::RangeInclusive<i32> = -5_000..=16_000;
 /// Duration of a step of the converter, and interval of checks for its end.
@@ -44,7 +44,7 @@ impl Thermometer {
 fn wake() {
     RCC.d3ccipr().modify(|w| w.set_adcsel(Adcsel::PER));
     RCC.ahb4enr().modify(|w| w.set_adc3en(true));
-    // 64 MHz of the internal oscillator, divided by eight.
+    // 64 MHz of the internal oscillator, divided by eight here and by two in the converter.
     ADC3_COMMON.ccr().modify(|w| {
         w.set_presc(Presc::DIV8);
         w.set_vsenseen(true);
@@ -66,7 +66,7 @@ async fn convert() -> Option<u16> {
     until(|| !ADC3.cr().read().adcal()).await?;
     ADC3.isr().write(|w| w.set_adrdy(true));
     ADC3.cr().modify(|w| w.set_aden(true));
-    until(|| ADC3.isr().read().adrdy()).await?;
+    until(is_ready).await?;
     ADC3.cfgr().modify(|w| w.set_res(Res::BITS16));
     ADC3.pcsel()
         .modify(|w| w.set_pcsel(CHANNEL, Pcsel::PRESELECTED));
@@ -79,6 +79,16 @@ async fn convert() -> Option<u16> {
     ADC3.cr().modify(|w| w.set_adstart(true));
     until(|| ADC3.isr().read().eoc()).await?;
     Some(ADC3.dr().read().rdata())
+}
+
+/// True once the converter is ready. The end of the calibration takes back an enable that comes
+/// within four of its clocks, so that it is enabled again (ST's HAL does the same).
+fn is_ready() -> bool {
+    let ready = ADC3.isr().read().adrdy();
+    if !ready && !ADC3.cr().read().aden() {
+        ADC3.cr().modify(|w| w.set_aden(true));
+    }
+    ready
 }
 
 async fn until(is_done: impl Fn() -> bool) -> Option<()> {

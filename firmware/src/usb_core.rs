@@ -24,7 +24,11 @@ pub fn abort_all() -> bool {
 /// Takes back the packets of all IN endpoints but the control endpoint's; returns whether there was
 /// one.
 pub fn abort_data() -> bool {
-    (1..ENDPOINTS).fold(false, |any, index| abort_in(index) || any)
+    let mut any = false;
+    for index in 1..ENDPOINTS {
+        any |= abort_in(index);
+    }
+    any
 }
 
 /// Takes back the packet of an IN endpoint; returns false if it had none, or if the packet left in

@@ -59,7 +59,7 @@ pub enum Problem {
     WatchdogReset = 6,
     /// The last start followed a fault, or a reset by a debug probe.
     SoftwareReset = 7,
-    /// The temperature is above 85 °C, or its sensor gives no plausible value.
+    /// The temperature is above 105 °C, or its sensor gives no plausible value.
     Temperature = 8,
     /// The camera is not the one that the firmware supports.
     AnotherCamera = 9,

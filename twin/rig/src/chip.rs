@@ -18,6 +18,7 @@ use crate::camera::{Sccb, SharedCamera, TwoWire, part};
 use crate::control_bus::{ControlBus, HeldBus};
 use crate::dma_requests;
 use crate::faults::Faults;
+use crate::late_enable::LateEnable;
 use crate::late_flags::LateFlags;
 use crate::late_line::LateLine;
 use crate::mpu::{Mpu, Protection};
@@ -31,6 +32,8 @@ use crate::usb_host::SharedHost;
 
 /// The board's supply, mV.
 const SUPPLY_MV: u32 = 3300;
+/// Temperature of the part, hundredths of a degree Celsius.
+const TEMPERATURE: i32 = 6_000;
 
 /// Revision of the silicon.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -77,6 +80,7 @@ pub struct Chip {
     held_bus: HeldBus,
     late: LateLine,
     late_flags: LateFlags,
+    late_enable: LateEnable,
     rules: Rules,
     board: board::Kind,
     revision: Revision,
@@ -116,6 +120,7 @@ impl Chip {
         part.rcc.attach_crystals(board.crystal_hz(), 0);
         part.set_supply(SUPPLY_MV);
         part.set_analog_supply(SUPPLY_MV);
+        part.adc[2].set_temperature(TEMPERATURE);
         let mpu = match protection {
             Protection::Enforced => None,
             Protection::Ignored => Some(Mpu::fit(part.bus_mut())?),
@@ -148,6 +153,7 @@ impl Chip {
             led_edges_ns: Vec::new(),
             late: LateLine::default(),
             late_flags,
+            late_enable: LateEnable::new(seed),
             crs: Crs::default(),
             mpu,
             part,
@@ -236,6 +242,7 @@ impl Chip {
     pub fn accessed(&mut self, access: &Access, value: u64) {
         self.late.accessed(access, value);
         self.late_flags.accessed(&mut self.part, access, value);
+        self.late_enable.accessed(&mut self.part, access, value);
     }
 
     /// Sets the pin of VSYNC to the line's level.

@@ -16,7 +16,7 @@
 //! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM and clock recovery |
 //! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`usb_host`], [`link`], [`script`] | the host; who uses its serial port |
-//! | [`faults`], [`rules`], `late_line`, `late_flags`, [`dma_reach`] | what goes wrong on request; what firmware must not do |
+//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], `start_rules` | what goes wrong on request; what firmware must not do |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
 pub mod arrivals;
@@ -30,6 +30,7 @@ pub mod dma_reach;
 mod dma_requests;
 pub mod faults;
 pub mod frame_source;
+mod late_enable;
 mod late_flags;
 mod late_line;
 pub mod link;
@@ -40,6 +41,7 @@ pub mod report;
 pub mod rules;
 pub mod run;
 pub mod script;
+mod start_rules;
 mod translations;
 pub mod truth;
 pub mod usb_host;

@@ -29,6 +29,7 @@ use crate::peripherals::flash::{self, Bank, Contents, Cut};
 use crate::report::Report;
 use crate::rules::Rules;
 use crate::script::Script;
+use crate::start_rules::StartRules;
 use crate::truth::TruthLog;
 use crate::usb_host::{Host, SharedHost};
 
@@ -167,6 +168,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         host: host.clone(),
         camera: camera.clone(),
         rules: rules.clone(),
+        start: StartRules::default(),
         bank: bank.clone(),
         array: Vec::new(),
         program: options.program,
@@ -232,6 +234,7 @@ struct Conductor {
     host: SharedHost,
     camera: SharedCamera,
     rules: Rules,
+    start: StartRules,
     bank: Bank,
     /// The flash's second bank at the end of the run.
     array: Vec<u8>,
@@ -275,6 +278,7 @@ impl Driver<Sensor> for Conductor {
         let now = match settled {
             Settled::Access { access, value } => {
                 if access.kind == AccessKind::Write {
+                    (self.start).written(access.address, value, host, &self.rules);
                     self.written(session, access.address, value, access.virtual_time);
                 }
                 session.board_mut().chip.accessed(&access, value);

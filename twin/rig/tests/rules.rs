@@ -134,6 +134,28 @@ fn a_dma_stream_that_a_timer_drives_ends_the_run() {
     assert!(error.contains("DMAMUX1 channel 0"), "{error}");
 }
 
+#[test]
+fn a_real_time_clock_on_the_internal_oscillator_ends_the_run() {
+    const RCC_BDCR: u32 = 0x5802_4470;
+    // PWR_CR1.DBP: the backup domain takes writes.
+    const UNLOCK: (u32, u32) = (0x5802_4800, 1 << 8);
+    let from = |source: u32| outcome(&[UNLOCK, (RCC_BDCR, 1 << 15 | source << 8)]);
+    assert!(from(1).is_ok(), "LSE");
+    let error = from(2).unwrap_err();
+    assert!(error.contains("LSI"), "{error}");
+}
+
+#[test]
+fn a_memory_that_is_written_before_the_supply_is_valid_ends_the_run() {
+    const PWR_CR3: u32 = 0x5802_480C;
+    assert!(outcome(&[(PWR_CR3, 6), (0x2000_0000, 1)]).is_ok());
+    let error = outcome(&[(0x2000_0000, 1), (PWR_CR3, 6)]).unwrap_err();
+    assert!(
+        error.contains("DTCM") && error.contains("PWR_CR3"),
+        "{error}"
+    );
+}
+
 /// The program makes a region read-only and writes to it; the writes after that would end the run.
 #[test]
 fn a_program_that_breaks_its_own_protection_gets_no_further() {

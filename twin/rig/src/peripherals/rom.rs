@@ -30,13 +30,13 @@ pub fn unique_id() -> Image {
     image("unique-id", b"hivtac-rig-1".to_vec(), 0x1FF1_E800)
 }
 
-/// Returns the temperature sensor's readings at 30 °C and 110 °C, at 3.3 V in 16 bits (TS_CAL1,
+/// Returns the temperature sensor's readings at 30 °C and 130 °C, at 3.3 V in 16 bits (TS_CAL1,
 /// TS_CAL2). They follow DS12110's typical 0.62 V at 30 °C and 2 mV a degree (table 180), as the
-/// emulator's sensor does.
+/// emulator's sensor does. 130 °C is that of revision V (ST's HAL, `TEMPSENSOR_CAL2_TEMP`).
 pub fn temperature_calibration() -> Image {
     let word = |millivolts: u32| (millivolts * 65_535 / 3_300) as u16;
     let mut bytes = vec![0xFF; 0x22];
-    for (at, millivolts) in [(0, 620), (0x20, 780)] {
+    for (at, millivolts) in [(0, 620), (0x20, 820)] {
         bytes[at..at + 2].copy_from_slice(&word(millivolts).to_le_bytes());
     }
     image("temperature-calibration", bytes, 0x1FF1_E820)

@@ -140,6 +140,12 @@ impl Port {
                 "bursts of {burst} bytes at the {name} do not fill buffers of {buffer} (TCR)"
             ));
         }
+        if ahb && !address.is_multiple_of(burst) {
+            return Err(format!(
+                "the {name} {address:#010x} is no multiple of its bursts of {burst} bytes: one \
+                 would cross 1 KiB on the AHB bus"
+            ));
+        }
         Ok(())
     }
 }
@@ -223,6 +229,7 @@ mod tests {
             ((row::TBR, 0), "AXI bus"),
             ((row::TBR, 3 << 16), "0x24000a00 is not on the AHB bus"),
             ((row::SAR, 0x2400_0A04), "no multiple of 8"),
+            ((row::DAR, 0x2000_8020), "bursts of 64 bytes"),
             ((row::BNDTR, 2564), "in eights"),
             ((row::BNDTR, 0), "block of 0 bytes"),
             ((row::BNDTR, 2560 | 1 << 20), "BRC"),
