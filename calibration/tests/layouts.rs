@@ -209,12 +209,42 @@ fn a_tare_is_refused_while_a_dot_is_missing_or_something_presses() {
     assert!(matches!(refused, Err(Refusal::Touched(_))), "{refused:?}");
 }
 
-/// Another layout than the model's is on the film.
+/// The file beside the built-in model, which demo and twin use, is what `hivtac-calibrate layout
+/// 8v` makes.
 #[test]
-fn another_film_than_the_models_gives_no_force() {
+fn the_models_file_is_as_it_is_made() {
+    let file = include_bytes!("../models/8v/default.hvtm");
+    assert!(
+        FILE[..] == file[..],
+        "make it anew: hivtac-calibrate layout"
+    );
+}
+
+/// A sensor with the model of the four dots, without a tare.
+fn of_four() -> Box<Sensor<'static>> {
+    static FILE: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!("../models/default.hvtm"));
+    forward::untared(&Model::parse(&FILE.0).unwrap()).unwrap()
+}
+
+/// Another layout than the model's is on the film: it is named, and there is no force, whatever
+/// presses.
+#[test]
+fn another_film_than_the_models_is_named_and_gives_no_force() {
     let four = layout_scene(Layout::default()).unwrap();
-    let measurement = seen(&mut untared(), &four, &Load::REST, 1);
-    assert!(measurement.force.is_none());
+    for (mut sensor, film) in [(untared(), &four), (of_four(), &nominal())] {
+        for (number, load) in loads().chain([(100, Load::REST)]) {
+            let measurement = seen(&mut sensor, film, &load, number);
+            assert!(measurement.force.is_none(), "{number}: {measurement:?}");
+            let named = measurement.status.contains(Status::ANOTHER_LAYOUT);
+            assert!(named, "{number}: {:?}", measurement.status);
+        }
+    }
+}
+
+/// A rest position of another layout than the model's.
+#[test]
+fn a_tare_of_another_layout_gives_no_force() {
+    let four = layout_scene(Layout::default()).unwrap();
     let mut sensor = untared();
     let mut four_dots: Rest = model().rest;
     four_dots = Rest::of_markers(&four_dots.markers()[..4]);

@@ -236,7 +236,7 @@ impl PipelineTask {
     }
 
     fn set_tare(&mut self, position: Option<RestPosition>) -> Outcome {
-        let rest = position.map(|position| settings::rest(&position, self.sensor.settings()));
+        let rest = position.map(|position| settings::rest(&position, self.sensor));
         match rest.transpose() {
             Ok(rest) => {
                 self.give_up_tare();

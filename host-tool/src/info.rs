@@ -135,6 +135,7 @@ impl Tare {
 pub struct Model<'a> {
     crc: String,
     name: &'a str,
+    markers: u8,
     simulated: bool,
     source: &'static str,
     #[serde(serialize_with = "as_json")]
@@ -147,6 +148,7 @@ impl<'a> Model<'a> {
         Model {
             crc: format!("{:08x}", model.crc),
             name: &model.name,
+            markers: model.markers,
             simulated: model.simulated,
             source: match model.source {
                 ModelSource::BuiltIn => "built-in",

@@ -1,9 +1,10 @@
 //! `hivtac template`: a drawing at true size of where to punch the film and stick the dots.
 
 use crate::output::tell;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use hivtac_host::failure::Failure;
 use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::layout::EIGHT_V;
 use serde_json::json;
 
 /// Distance of each post from the film's middle, along x and y, mm, as on the simulated sensor.
@@ -30,16 +31,53 @@ pub struct TemplateArguments {
     /// Whose markers
     #[arg(long, value_name = "paper|ov7725", default_value = "ov7725")]
     preset: Preset,
+    /// Which dots: four in a square, or the eight of a model for more force and a wider place
+    #[arg(long, value_enum, default_value_t)]
+    layout: Dots,
     /// One JSON object instead of a line
     #[arg(long)]
     json: bool,
 }
 
+/// The dots on a film.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+enum Dots {
+    /// Four, in a square
+    #[default]
+    #[value(name = "4")]
+    Four,
+    /// Eight, wide corners and a narrow middle
+    #[value(name = "8v")]
+    EightV,
+}
+
+impl Dots {
+    /// Their centres from the film's middle, mm.
+    fn centres_mm(self, geometry: &Geometry) -> Vec<[f64; 2]> {
+        match self {
+            Dots::Four => {
+                let rest_mm = f64::from(geometry.marker_radius.0) / 1e3 / std::f64::consts::SQRT_2;
+                CORNERS
+                    .map(|corner| corner.map(|part| part * rest_mm))
+                    .into()
+            }
+            Dots::EightV => EIGHT_V
+                .map(|dot| dot.map(|part| f64::from(part.0) / 1e3))
+                .into(),
+        }
+    }
+}
+
 /// Writes the template for a preset's markers.
 pub fn run(arguments: &TemplateArguments) -> Result<(), Failure> {
-    let TemplateArguments { file, preset, json } = arguments;
+    let TemplateArguments {
+        file,
+        preset,
+        layout,
+        json,
+    } = arguments;
     // Sizes on the film do not depend on the frame's size.
-    let svg = svg(&Geometry::preset(*preset, 320, 240));
+    let svg = svg(&Geometry::preset(*preset, 320, 240), *layout);
     std::fs::write(file, svg).map_err(|error| {
         let message = format!("cannot write the template {file}: {error}");
         Failure::input(message)
@@ -49,9 +87,9 @@ pub fn run(arguments: &TemplateArguments) -> Result<(), Failure> {
 }
 
 /// The drawing as SVG, with all lengths in millimetres, the page's size included.
-fn svg(geometry: &Geometry) -> String {
+fn svg(geometry: &Geometry, dots: Dots) -> String {
     let [width, height] = PAGE_MM;
-    let body = [film(), marks(geometry), ruler()].concat();
+    let body = [film(), marks(geometry, dots), ruler()].concat();
     format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"{height}mm\" \
          viewBox=\"0 0 {width} {height}\" font-family=\"sans-serif\" font-size=\"2.6\" \
@@ -78,17 +116,17 @@ fn film() -> String {
 }
 
 /// Draws the dots, each on a cross that sticks out from under it.
-fn marks(geometry: &Geometry) -> String {
+fn marks(geometry: &Geometry, dots: Dots) -> String {
     let [x, y] = MIDDLE_MM;
-    let rest_mm = f64::from(geometry.marker_radius.0) / 1e3 / std::f64::consts::SQRT_2;
     let diameter_mm = f64::from(geometry.marker_diameter.0) / 1e3;
     let dot = |[across, down]: [f64; 2]| {
-        let [x, y] = [x + across * rest_mm, y + down * rest_mm];
+        let [x, y] = [x + across, y + down];
         let (left, top) = (x - 1.5, y - 1.5);
         let cross = format!("<path d=\"M{left:.3} {y:.3}h3M{x:.3} {top:.3}v3\"/>\n");
         cross + &circle("marker", [x, y], diameter_mm)
     };
-    CORNERS.map(dot).concat()
+    let centres = dots.centres_mm(geometry);
+    centres.into_iter().map(dot).collect()
 }
 
 /// Directions of the four corners, from the upper left clockwise.
@@ -124,7 +162,7 @@ fn ruler() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_twin::{HALF_SIDE_MM, MARKER_RADIUS_MM, MARKER_REST_MM};
+    use hivtac_twin::{HALF_SIDE_MM, Layout, MARKER_RADIUS_MM, MARKER_REST_MM};
 
     /// Centre and diameter of all circles of a class.
     fn circles(svg: &str, class: &str) -> Vec<[f64; 3]> {
@@ -143,7 +181,7 @@ mod tests {
     #[test]
     fn it_is_the_scenes_geometry_to_scale() {
         for preset in Preset::ALL {
-            let svg = svg(&Geometry::preset(preset, 320, 240));
+            let svg = svg(&Geometry::preset(preset, 320, 240), Dots::Four);
             assert!(svg.contains("width=\"70mm\" height=\"76mm\" viewBox=\"0 0 70 76\""));
             let [markers, posts] = ["marker", "post"].map(|class| circles(&svg, class));
             assert_eq!((markers.len(), posts.len()), (4, 4));
@@ -158,6 +196,19 @@ mod tests {
                 assert!((markers[i][2] - MARKER_RADIUS_MM).abs() < 1e-9);
             }
             assert!(svg.contains("class=\"ruler\" d=\"M10 56h50\""), "{svg}");
+        }
+    }
+
+    #[test]
+    fn the_eight_dots_are_those_of_the_simulated_layout() {
+        let svg = svg(&Geometry::preset(Preset::Ov7725, 320, 240), Dots::EightV);
+        let layout: Layout = "8v".parse().unwrap();
+        let markers = circles(&svg, "marker");
+        assert_eq!(markers.len(), layout.count());
+        for (found, [x, y]) in markers.iter().zip(layout.centres_mm()) {
+            let off = (found[0] - 35.0 - x).hypot(found[1] - 26.0 - y);
+            assert!(off < 2e-3, "{markers:?}");
+            assert!((2.0 * found[2] - layout.diameter_mm()).abs() < 1e-9);
         }
     }
 }

@@ -12,7 +12,7 @@ use hivtac_live::device::{Captured, Device};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::HsvBox;
-use hivtac_twin::{Preset, Scene, Shutter};
+use hivtac_twin::{Layout, Preset, Scene, Shutter};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Reply, Request, Sample,
@@ -73,7 +73,7 @@ struct Twin(Device);
 
 impl Twin {
     fn new() -> Twin {
-        let mut twin = Twin(Device::new(Kind::Ov7725, [0; 12], 1.0));
+        let mut twin = Twin(Device::new(Kind::Ov7725, Layout::default(), [0; 12], 1.0));
         twin.send(&HostMessage::Hello(HelloPrefix::OURS.into()));
         twin
     }

@@ -178,7 +178,7 @@ pub fn start<const BLOBS: usize, T: Table>(
     mut warn: impl FnMut(Unusable),
 ) {
     let tare = kept.tare.as_ref();
-    match tare.map(|tare| settings::rest(tare, sensor.settings())) {
+    match tare.map(|tare| settings::rest(tare, sensor)) {
         Some(Ok(rest)) => {
             let down = tare.and_then(|tare| tare.down);
             sensor.set_tare_under(Some(rest), Drift::UNSEEN, down);

@@ -181,18 +181,28 @@ fn farthest(one: &[Marker], other: &[Marker]) -> Px {
     Px(largest.min(i32::MAX as u32) as i32)
 }
 
-/// Returns the rest position for frames with these settings.
+/// Returns the rest position for the frames and the model of a sensor.
 ///
 /// # Errors
 /// Why it is not valid for them.
-pub fn rest(position: &RestPosition, settings: &Settings) -> Result<Rest, Outcome> {
+pub fn rest<const BLOBS: usize, T: Table>(
+    position: &RestPosition,
+    sensor: &Sensor<'_, BLOBS, T>,
+) -> Result<Rest, Outcome> {
+    let settings = sensor.settings();
+    let markers = sensor.model().map(|model| model.rest.areas.len());
+    let is_of_layout = markers.is_none_or(|markers| markers == position.markers.len());
     let seen_so = position.format == settings.threshold.format()
         && position.dilations == settings.dilations
         && position.centroid == settings.centroid;
     let mut rest = Rest::of_markers(&position.markers);
     rest.features.rect_center = position.rect_center;
     rest.features.rect_area = position.rect_area;
-    if !seen_so || !rest.is_sound() || !position.down.is_none_or(Direction::is_sound) {
+    if !seen_so
+        || !is_of_layout
+        || !rest.is_sound()
+        || !position.down.is_none_or(Direction::is_sound)
+    {
         Err(Outcome::InvalidArgument)
     } else if !rest.fits(&settings.geometry) {
         Err(Outcome::NotAtRest)

@@ -7,6 +7,7 @@ mod levels;
 mod tests;
 
 use crate::device::Device;
+use crate::focus::four_dots;
 use crate::output::print;
 use crate::set_threshold::set_threshold;
 use crate::snapshot::snapshot;
@@ -52,6 +53,7 @@ pub struct AutoArguments {
 /// [`Kind::NotRight`] when the pictures do not separate dots from film; when the device refuses.
 pub fn run(arguments: &AutoArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
+    four_dots(&hello)?;
     let mut frames = Vec::new();
     for _ in 0..PICTURES {
         frames.push(snapshot(&mut link, arguments.device.timeout)?.frame);

@@ -14,7 +14,7 @@ mod samples;
 mod tests;
 
 use crate::device::Device;
-use crate::focus::Focus;
+use crate::focus::{Focus, four_dots};
 use crate::output::print;
 use crate::snapshot::snapshot;
 use clap::Args;
@@ -116,6 +116,7 @@ impl<'a> BringUp<'a> {
             return Ok(());
         }
         let patience = self.arguments.device.timeout;
+        four_dots(&self.hello)?;
         let (step, inspection) = camera::step(&mut self.link, patience)?;
         show(self.arguments, report, step);
         let Some(inspection) = inspection.filter(|_| report.is_right()) else {

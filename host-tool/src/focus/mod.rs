@@ -11,8 +11,9 @@ use crate::output::{self, Reader};
 use crate::snapshot::snapshot;
 use checks::{Check, advice, checks};
 use clap::Args;
-use hivtac_host::failure::Failure;
+use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::frame::Frame;
+use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_wire::message::DeviceHello;
 use seen::look;
 use serde::Serialize;
@@ -36,6 +37,7 @@ pub struct FocusArguments {
 /// Shows the checks of each picture, until all are right or the program is interrupted.
 pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
+    four_dots(&hello)?;
     loop {
         let taken = snapshot(&mut link, arguments.device.timeout)?;
         let focus = Focus::of(&taken.frame, &hello);
@@ -43,6 +45,25 @@ pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
         if reader == Reader::Gone || focus.right {
             return Ok(());
         }
+    }
+}
+
+/// Refuses a device whose model is for other dots than four in a square: what looks at pictures
+/// here knows these alone.
+pub fn four_dots(device: &DeviceHello) -> Result<(), Failure> {
+    match device
+        .model
+        .as_ref()
+        .map_or(LEAST_MARKERS, |model| model.markers.into())
+    {
+        LEAST_MARKERS => Ok(()),
+        markers => Err(Failure::new(
+            Kind::NotRight,
+            format!(
+                "this knows films of four dots; the device's model is for {markers}: look at its \
+                 picture with `hivtac view`"
+            ),
+        )),
     }
 }
 

@@ -63,11 +63,11 @@ fn level(bit: Status) -> Level {
 fn words(bit: Status) -> (&'static str, &'static str) {
     match bit {
         Status::MARKERS_MISSING => (
-            "fewer than four markers are seen",
+            "fewer markers are seen than the film has",
             "look at the picture: is one covered, unlit or out of view?",
         ),
         Status::MARKERS_AMBIGUOUS => (
-            "no four things of the markers' colour lie as markers do, or too many",
+            "things of the markers' colour do not lie as markers do, or too many do",
             "look at the picture: take what else has their colour out of view",
         ),
         Status::BLOB_OVERFLOW => (
@@ -115,8 +115,8 @@ fn words(bit: Status) -> (&'static str, &'static str) {
         ),
         Status::MODEL_MISSING => ("the device has no usable model", "flash one"),
         Status::MODEL_MISMATCH => (
-            "the model was made for another threshold or another picture",
-            "go back to the model's threshold",
+            "the model was made for another threshold, another picture or another number of markers",
+            "go back to the model's threshold, or take a new tare",
         ),
         Status::CONTACT => ("something touches the film", ""),
         Status::SLIP => ("what touches the film slips", ""),
@@ -145,8 +145,12 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "press with one tip, or set the shape of what presses: hivtac settings set contact",
         ),
         Status::MARKER_LOST => (
-            "one marker is not seen: the force is that of the other three, unchecked",
+            "a marker is not seen: the force is that of the others; of four, unchecked",
             "look at the picture: is one covered, unlit or out of view?",
+        ),
+        Status::ANOTHER_LAYOUT => (
+            "the picture shows as many dots as another film than the model's has",
+            "send the model of this film's dots: hivtac update model; or uncover its dots",
         ),
         Status::UNEXPLAINED => (
             "no single contact explains where the markers are",

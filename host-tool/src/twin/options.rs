@@ -8,8 +8,8 @@ use hivtac_live::device::Device;
 use hivtac_live::eye::{Disturbances, Eye, Presses};
 use hivtac_live::hand::Hand;
 use hivtac_live::run::device_id;
-use hivtac_twin::Scene;
 use hivtac_twin::units;
+use hivtac_twin::{Layout, Options, Scene};
 use std::ops::RangeInclusive;
 
 /// Number of the nominal unit.
@@ -29,6 +29,9 @@ pub struct Simulated {
     /// with 244
     #[arg(long, value_enum)]
     camera: Option<CameraName>,
+    /// The dots on the film of a scene by name, and the model for them: 4 when not given, or 8v
+    #[arg(long, value_name = "NAME", value_parser = layout)]
+    layout: Option<Layout>,
     /// Unit N of those that are drawn as people build them, 1 to 1000000; without it the nominal
     /// one, that of the built-in model
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
@@ -93,25 +96,51 @@ impl Simulated {
             dim: self.dim.unwrap_or(1.0),
             drift_px: self.drift.unwrap_or(0.0),
         };
+        let layout = scene.options().layout;
+        if kind == Kind::Mt9v034 && layout != Layout::default() {
+            return Err(refused(
+                name,
+                "only the camera ov7725 has models of other dots",
+            ));
+        }
         let eye = Eye::new(kind, scene, presses, disturbances, hand);
         let eye = eye.map_err(|error| refused(name, error))?;
         // Exposure is found in the light as it is before it dims.
-        let device = Device::new(kind, device_id(kind, self.unit.unwrap_or(NOMINAL)), 1.0);
+        let device = Device::new(
+            kind,
+            layout,
+            device_id(kind, self.unit.unwrap_or(NOMINAL)),
+            1.0,
+        );
         Ok((device, eye))
     }
 
     fn scene(&self, name: &str, kind: Kind) -> Result<Scene, Failure> {
+        if self.layout.is_some() && name.ends_with(".toml") {
+            let why = "the file says which dots it has: leave --layout out";
+            return Err(refused(name, why));
+        }
         if name.ends_with(".toml") {
             let text = read(name)?;
             return Scene::from_toml(&text).map_err(|error| refused(name, error));
         }
         let [width, height] = kind.size().map(u32::from);
         let scene = Scene::preset(name, kind.preset(), width, height, self.seed.unwrap_or(1));
-        scene.map_err(|error| {
+        let scene = scene.map_err(|error| {
             Failure::input(format!(
                 "{error}; or a scene file, whose name ends with .toml"
             ))
-        })
+        })?;
+        let Some(layout) = self.layout else {
+            return Ok(scene);
+        };
+        let options = Options {
+            layout,
+            ..scene.options().clone()
+        };
+        scene
+            .with_options(options)
+            .map_err(|error| refused(name, error))
     }
 
     fn as_unit(&self, name: &str, scene: Scene) -> Result<Scene, Failure> {
@@ -123,6 +152,11 @@ impl Simulated {
             .with_options(options)
             .map_err(|error| refused(name, error))
     }
+}
+
+/// Reads a layout's name.
+fn layout(name: &str) -> Result<Layout, String> {
+    name.parse::<Layout>().map_err(|error| error.to_string())
 }
 
 fn course(path: &str) -> Result<Course, Failure> {

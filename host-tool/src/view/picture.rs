@@ -1,7 +1,7 @@
 //! Encodes a frame for the page: a line of JSON, then its pixels, then its mask.
 
 use crate::finding::MarkerJson;
-use crate::focus::Focus;
+use crate::focus::{Focus, four_dots};
 use hivtac_host::frame::Taken;
 use hivtac_host::look::{self, PASSED};
 use hivtac_host::page::Limits;
@@ -23,7 +23,7 @@ struct Told {
     /// The device's markers; `None` if it found none.
     markers: Option<Vec<MarkerJson>>,
     /// Faults of the picture with advice. Empty while something presses the film, which moves and
-    /// changes the markers.
+    /// changes the markers, and for other dots than four in a square.
     wrong: Vec<String>,
 }
 
@@ -42,7 +42,7 @@ pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
         threshold: Limits::of(&frame.threshold),
         passed: mask.iter().filter(|&&level| level == PASSED).count(),
         markers: markers.map(MarkerJson::all),
-        wrong: match is_pressed {
+        wrong: match is_pressed || four_dots(device).is_err() {
             true => Vec::new(),
             false => Focus::of(frame, device).wrong,
         },

@@ -4,7 +4,7 @@ use crate::force::features::Features;
 use crate::markers::rules::pattern::distance;
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::list::List;
-use hivtac_terms::marker::{MOST_MARKERS, Marker, MarkerList};
+use hivtac_terms::marker::{LEAST_MARKERS, MOST_MARKERS, Marker, MarkerList};
 use hivtac_terms::units::Px;
 
 /// The longest side of a picture, px.
@@ -82,8 +82,8 @@ impl Rest {
         }
     }
 
-    /// Returns whether this can be a rest position: inside the largest picture, with markers of at
-    /// least a pixel.
+    /// Returns whether this can be a rest position: of enough markers, inside the largest picture, of
+    /// at least a pixel each.
     pub fn is_sound(&self) -> bool {
         let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
         let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;
@@ -91,6 +91,7 @@ impl Rest {
             .centroids
             .iter()
             .all(|c| inside(c.0) && inside(c.1))
+            && self.areas.len() >= LEAST_MARKERS
             && self.areas.iter().all(|area| (1..=largest).contains(area))
     }
 

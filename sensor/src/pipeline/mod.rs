@@ -365,6 +365,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             return self.measure_placed();
         }
         let found = self.find_markers();
+        let found = found.map_err(|reason| reason | self.another_layout(reason));
         self.measurement(found)
     }
 

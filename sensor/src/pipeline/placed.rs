@@ -14,6 +14,7 @@ use crate::force::{Force, FrameNoise, Resting};
 use crate::markers::lost::Lost;
 use crate::markers::rules::Placed;
 use crate::markers::tables::Table;
+use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
 
@@ -55,13 +56,39 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             .place(blobs, &rest.markers(), may_be_shifted)
     }
 
+    /// Returns [`Status::ANOTHER_LAYOUT`] if the last scanned frame, refused for this reason, shows
+    /// as many whole dots as a film of another layout. Those of the film itself may be up to three
+    /// fewer, or one more by a thing of their colour.
+    #[inline(never)]
+    pub(super) fn another_layout(&self, reason: Status) -> Status {
+        let refused = Status::MARKERS_MISSING | Status::MARKERS_AMBIGUOUS;
+        let prepared = self
+            .prepared
+            .as_ref()
+            .filter(|_| reason.intersects(refused));
+        let parts = prepared.and_then(|prepared| Some((prepared, prepared.rest.as_ref()?)));
+        let Some((prepared, rest)) = parts else {
+            return Status::OK;
+        };
+        let shown = prepared.finder.dots(self.scanner.blobs(), &rest.areas);
+        let is_another = shown >= LEAST_MARKERS
+            && (shown >= rest.areas.len() + 2 || shown + 2 < rest.areas.len());
+        match is_another {
+            true => Status::ANOTHER_LAYOUT,
+            false => Status::OK,
+        }
+    }
+
     /// Returns the measurement of the last scanned frame. Not inlined, so that it stays out of the
     /// near memory.
     #[inline(never)]
     pub(super) fn measure_placed(&mut self) -> Measurement {
         let placed = match self.place_markers() {
             Ok(placed) => placed,
-            Err(reason) => return self.measurement(Err(reason)),
+            Err(reason) => {
+                let reason = reason | self.another_layout(reason);
+                return self.measurement(Err(reason));
+            }
         };
         let prepared = self.prepared.as_ref();
         let mut status = prepared.map_or(Status::OK, |prepared| prepared.standing);

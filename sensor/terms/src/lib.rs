@@ -16,6 +16,7 @@ pub mod down;
 pub mod force;
 pub mod geometry;
 pub mod hsv;
+pub mod layout;
 pub mod list;
 pub mod marker;
 pub mod status;

@@ -20,14 +20,14 @@ macro_rules! bits {
 }
 
 bits! {
-    /// Fewer than four markers were found, and three give no force: no force.
+    /// Fewer markers were found than the film has, and too few for a force: no force.
     MARKERS_MISSING = 0, "markers_missing";
-    /// The blobs can be read as four markers in more than one plausible way, or in none: no force.
+    /// The blobs can be read as the markers in more than one plausible way, or in none: no force.
     MARKERS_AMBIGUOUS = 1, "markers_ambiguous";
     /// More blobs than the fixed storage holds, or more runs than a frame of noise is allowed: no
     /// force.
     BLOB_OVERFLOW = 2, "blob_overflow";
-    /// Areas or shapes of the four markers do not fit each other and their distance: no force.
+    /// Areas or shapes of the markers do not fit each other and their distance: no force.
     MARKERS_IMPLAUSIBLE = 3, "markers_implausible";
     /// |F| is outside the range that the model was calibrated for, or the markers moved farther
     /// than the inputs of the model can represent.
@@ -52,8 +52,8 @@ bits! {
     NOT_CALIBRATED = 13, "not_calibrated";
     /// There is no usable model: no force.
     MODEL_MISSING = 14, "model_missing";
-    /// The model was made for another frame size, format, threshold or centroid estimator: no
-    /// force.
+    /// The model was made for another frame size, format, threshold, centroid estimator or number of
+    /// markers: no force.
     MODEL_MISMATCH = 15, "model_mismatch";
     /// Something touches the film ([`ContactLimits`](crate::temporal::ContactLimits)).
     CONTACT = 16, "contact";
@@ -64,7 +64,7 @@ bits! {
     DIRECTION_OUT_OF_RANGE = 18, "direction_out_of_range";
     /// The place of contact is outside the range that the model was calibrated for.
     PLACE_OUT_OF_RANGE = 19, "place_out_of_range";
-    /// No single contact fits the positions of the four markers: no force.
+    /// No single contact fits the positions of the markers: no force.
     UNEXPLAINED = 20, "unexplained";
     /// Re-zeroing has moved the rest position from where it was taken.
     REZEROED = 21, "rezeroed";
@@ -81,9 +81,12 @@ bits! {
     /// One contact explains the markers' positions badly, so standard uncertainties are widened by
     /// what is left over.
     LOOSELY_EXPLAINED = 25, "loosely_explained";
-    /// One marker is not seen, or is plainly faulty. The force is that of the other three, which
-    /// nothing checks.
+    /// A marker is not seen, or is plainly faulty. The force is that of the others; with four
+    /// markers nothing checks it.
     MARKER_LOST = 26, "marker_lost";
+    /// With too few or ambiguous markers: the picture shows as many whole dots as a film of another
+    /// layout than the model's.
+    ANOTHER_LAYOUT = 27, "another_layout";
 }
 
 impl Status {

@@ -8,7 +8,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_terms::units::{Microseconds, Sixteenths};
-use hivtac_twin::Shutter;
+use hivtac_twin::{Layout, Shutter};
 use hivtac_wire::message::Inspection;
 use hivtac_wire::settings::CameraReport;
 
@@ -55,9 +55,14 @@ impl Kind {
         }
     }
 
-    /// The model that the firmware has built in.
-    pub fn model(self) -> &'static [u8] {
+    /// The model of the nominal unit with these dots; with others than four and `8v` the one that
+    /// the firmware has built in.
+    pub fn model(self, layout: Layout) -> &'static [u8] {
+        let is_8v = "8v".parse() == Ok(layout);
         match self {
+            Kind::Ov7725 if is_8v => {
+                include_bytes!("../../../calibration/models/8v/default.hvtm")
+            }
             Kind::Ov7725 => include_bytes!("../../../calibration/models/default.hvtm"),
             Kind::Mt9v034 => include_bytes!("../../../calibration/models/mt9v034/default.hvtm"),
         }

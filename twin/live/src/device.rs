@@ -22,6 +22,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
+use hivtac_twin::Layout;
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::HOST_FRAME_LIMIT;
 use hivtac_wire::kept::Record;
@@ -57,6 +58,8 @@ pub struct Captured {
 pub struct Device {
     sensor: Box<Sensor<'static>>,
     fitting: Fitting,
+    /// The file of the built-in model.
+    built_in: &'static [u8],
     source: ModelSource,
     camera: Camera,
     /// Brightness of the light on the film, 1 is nominal; automatic exposure suits it.
@@ -86,11 +89,12 @@ pub struct Device {
 }
 
 impl Device {
-    /// A new device in light of a brightness; 1 is nominal.
-    pub fn new(kind: Kind, device_id: [u8; 12], light: f64) -> Self {
+    /// A new device for a film with these dots, in light of a brightness; 1 is nominal.
+    pub fn new(kind: Kind, layout: Layout, device_id: [u8; 12], light: f64) -> Self {
         let fitting = kind.fitting(device_id);
         // The project's own files: a test reads them.
-        let model = Model::parse(kind.model()).ok();
+        let built_in = kind.model(layout);
+        let model = Model::parse(built_in).ok();
         let mut sensor = Box::new(Sensor::<64>::new());
         let settings = fitting.settings(model.as_ref(), None);
         let pixels = settings.threshold.format();
@@ -103,6 +107,7 @@ impl Device {
         Self {
             sensor,
             fitting,
+            built_in,
             source: ModelSource::BuiltIn,
             camera: Camera::new(kind, pixels, record.camera, light),
             light,

@@ -7,6 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use anyhow::Context;
 use clap::Parser;
+use hivtac_twin::Layout;
 
 use crate::arrivals::Arrivals;
 use crate::board;
@@ -48,6 +49,9 @@ pub struct Arguments {
     /// Geometry of the simulated sensor: ov7725, mt9v034 or paper; the camera's own by default.
     #[arg(long)]
     preset: Option<String>,
+    /// The dots of a scene by name: 4 or 8v, which is for the OV7725.
+    #[arg(long, default_value = "4", value_name = "NAME")]
+    layout: Layout,
     /// Offer the serial port at this TCP port of 127.0.0.1; 0 takes a free one.
     #[arg(long, value_name = "PORT")]
     tcp: Option<u16>,
@@ -201,12 +205,9 @@ impl Arguments {
             let file = Path::new(&self.scene);
             return Ok(Box::new(SceneSource::load(file, self.camera())?));
         }
-        Ok(Box::new(SceneSource::new(
-            &self.scene,
-            self.preset.as_deref(),
-            self.seed,
-            self.camera(),
-        )?))
+        let preset = self.preset.as_deref();
+        let scene = SceneSource::new(&self.scene, preset, self.seed, self.camera())?;
+        Ok(Box::new(scene.with_layout(self.layout)?))
     }
 
     fn program(&self) -> anyhow::Result<(Program, Option<Port>)> {

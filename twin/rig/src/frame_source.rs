@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::camera::part::Kind;
 use crate::truth::Exposed;
 use anyhow::{Context, bail};
-use hivtac_twin::{Format, Options, Preset, PresetCamera, Scene, Shutter};
+use hivtac_twin::{Format, Layout, Options, Preset, PresetCamera, Scene, Shutter};
 use serde_json::{Value, json};
 
 /// The coding of a picture's pixels.
@@ -163,6 +163,22 @@ impl SceneSource {
         let (width, height) = array.size;
         let scene = Scene::preset(name, preset, width, height, seed);
         Self::of(scene.context("--scene")?, array.window)
+    }
+
+    /// The same with other dots on the film.
+    ///
+    /// # Errors
+    /// If the film does not take them.
+    pub fn with_layout(self, layout: Layout) -> anyhow::Result<Self> {
+        if layout == self.usual.options().layout {
+            return Ok(self);
+        }
+        let options = Options {
+            layout,
+            ..self.usual.options().clone()
+        };
+        let scene = self.usual.with_options(options).context("--layout")?;
+        Self::of(scene, self.window)
     }
 
     fn of(usual: Scene, window: [f64; 2]) -> anyhow::Result<Self> {

@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use hivtac_terms::layout::EIGHT_V;
+
 use crate::film::{Dots, FilmError, MARKER_CENTRES_MM, MARKER_RADIUS_MM, MOST_DOTS};
 
 /// The smallest number of dots.
@@ -10,17 +12,6 @@ const LEAST_DOTS: usize = 4;
 const MOST_PLACE_MM: f64 = 8.0;
 /// The range of a dot's diameter, mm.
 const DIAMETERS_MM: [f64; 2] = [0.4, 2.0];
-/// The layout `8v`: wide corners and a narrow middle, so that no dot leaves the picture.
-const EIGHT_V: [[f64; 2]; 8] = [
-    [-7.0, -4.5],
-    [7.0, -4.5],
-    [7.0, 4.5],
-    [-7.0, 4.5],
-    [-2.5, 0.0],
-    [0.0, -2.4],
-    [2.5, 0.0],
-    [0.0, 2.4],
-];
 
 /// The dots of a film at rest.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -109,7 +100,10 @@ impl FromStr for Layout {
     fn from_str(name: &str) -> Result<Layout, FilmError> {
         match name {
             "4" => Ok(Layout::default()),
-            "8v" => Layout::new(&EIGHT_V, 2.0 * MARKER_RADIUS_MM),
+            "8v" => {
+                let mm = EIGHT_V.map(|place| place.map(|part| f64::from(part.0) / 1e3));
+                Layout::new(&mm, 2.0 * MARKER_RADIUS_MM)
+            }
             _ => Err(FilmError::Layout(format!(
                 "unknown layout `{name}`: use one of {}",
                 Layout::NAMES.join(", ")

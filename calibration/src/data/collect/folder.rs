@@ -18,7 +18,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_terms::down::Direction;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{LEAST_MARKERS, Marker};
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
 use hivtac_twin::Contact;
@@ -279,6 +279,15 @@ fn same_unit(path: &Path, conditions: &Conditions) -> Result<()> {
 /// # Errors
 /// When this program does not know its preset.
 pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
+    let markers = hello
+        .model
+        .as_ref()
+        .map_or(LEAST_MARKERS, |model| model.markers.into());
+    ensure!(
+        markers == LEAST_MARKERS,
+        "units with four dots are calibrated; this device's model is for {markers}: go back to one \
+         of four with `hivtac update model`, if that is its film"
+    );
     let threshold = hello.threshold;
     crate::data::conditions::preset(&hello.preset)
         .context("the sensor says what this program does not know")?;

@@ -134,7 +134,7 @@ impl Device {
     }
 
     fn set_tare(&mut self, position: Option<RestPosition>) -> Outcome {
-        let rest = position.map(|position| settings::rest(&position, self.sensor.settings()));
+        let rest = position.map(|position| settings::rest(&position, &self.sensor));
         match rest.transpose() {
             Ok(rest) => {
                 self.give_up_tare();
@@ -194,7 +194,7 @@ impl Device {
     }
 
     fn use_built_in(&mut self, id: u16, afresh: bool) -> Option<Outcome> {
-        let model = Model::parse(self.camera.kind.model()).ok();
+        let model = Model::parse(self.built_in).ok();
         self.replace(id, model, ModelSource::BuiltIn, afresh)
     }
 
@@ -241,7 +241,7 @@ impl Device {
     /// The self-test: of a device's checks, those that a twin can fail. It has neither stack nor
     /// temperature; the latter is told as 25 °C.
     fn health(&mut self) -> Health {
-        let answers_right = Model::parse(self.camera.kind.model()).is_ok_and(|model| {
+        let answers_right = Model::parse(self.built_in).is_ok_and(|model| {
             let expected = known_answer::of(&model, &mut Network::new());
             self.sensor.known_answer(&model) == expected
         });

@@ -4,7 +4,7 @@ use super::{Captured, Device};
 use crate::camera::Kind;
 use crate::eye::{Disturbances, Eye, Presses};
 use crate::hand::Hand;
-use hivtac_twin::Scene;
+use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     Command, DeviceMessage, HostHello, HostMessage, ModelPart, Outcome, Request,
@@ -24,7 +24,7 @@ impl Tested {
         let scene = Scene::preset("rest", kind.preset(), 320, 240, 1).unwrap();
         let undisturbed = Disturbances::default();
         Tested {
-            device: Device::new(kind, [7; 12], 1.0),
+            device: Device::new(kind, Layout::default(), [7; 12], 1.0),
             eye: Eye::new(kind, scene, Presses::Scene, undisturbed, Hand::default()).unwrap(),
             number: 0,
         }

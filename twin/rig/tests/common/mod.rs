@@ -28,6 +28,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::Threshold;
+use hivtac_twin::Layout;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
 use hivtac_wire::health::Health;
@@ -126,6 +127,8 @@ pub struct Setup {
     /// A scene's name, or its file relative to the package's folder.
     pub scene: &'static str,
     pub seed: u64,
+    /// The dots of a scene by name.
+    pub layout: Layout,
     /// The shape of what presses; `None` leaves the device's own. Scenes press with a needle.
     pub shape: Option<ContactShape>,
     pub faults: Vec<&'static str>,
@@ -148,6 +151,7 @@ impl Setup {
             camera: part::Kind::Ov7725,
             scene: "demo",
             seed: 1,
+            layout: Layout::default(),
             shape: Some(ContactShape::Needle),
             faults: (std::env::var_os("HIVTAC_BUSY_BUS").iter())
                 .map(|_| "bus-busy")
@@ -212,7 +216,7 @@ impl Setup {
             let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(self.scene);
             return SceneSource::load(&file, self.camera);
         }
-        SceneSource::new(self.scene, None, self.seed, self.camera)
+        SceneSource::new(self.scene, None, self.seed, self.camera)?.with_layout(self.layout)
     }
 
     pub fn try_run(self, truth: &Path) -> anyhow::Result<Outcome> {
