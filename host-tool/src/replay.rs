@@ -29,7 +29,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Example: hivtac replay press.mcap --tcp 7000
 #[derive(Args)]
 pub struct ReplayArguments {
-    /// What `record` made; also one that was cut
+    /// What `record` made; also one that was cut or damaged, or that other tools packed, trimmed or
+    /// merged
     file: PathBuf,
     /// The sensor with this name or serial number, where it holds several
     #[arg(long, value_name = "NAME")]
@@ -78,6 +79,9 @@ pub fn run(arguments: &ReplayArguments) -> Result<(), Failure> {
         is_gone: false,
     };
     player.play(&mut recording, arguments.fast)?;
+    for damage in recording.damage() {
+        note(&format!("hivtac: {}: {damage}", recording.name));
+    }
     if recording.is_cut() {
         let name = &recording.name;
         note(&format!("hivtac: {name} is cut: it ends before its end"));

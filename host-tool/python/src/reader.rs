@@ -49,6 +49,17 @@ impl Reader {
     fn is_cut(&self, py: Python<'_>) -> bool {
         py.detach(|| self.lock().is_cut())
     }
+
+    /// The damaged parts that were skipped until now.
+    fn damage(&self, py: Python<'_>) -> Vec<String> {
+        py.detach(|| {
+            self.lock()
+                .damage()
+                .iter()
+                .map(ToString::to_string)
+                .collect()
+        })
+    }
 }
 
 impl Reader {

@@ -4,7 +4,7 @@
 use crate::clock::Clock;
 use crate::ros::channel::{Channel, Frames, messages, topic_of};
 use crate::ros::{self, Definition};
-use hivtac_host::recording::WIRE;
+use hivtac_host::recording::{HELLO, WIRE, to_hex};
 use hivtac_host::shown::unit_number;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
@@ -44,12 +44,19 @@ impl Topics {
             channels.map(|channel| (format!("/{}", channel.name()), channel.definition()));
         let topics: Vec<(String, &Definition)> =
             channels.chain([(WIRE.to_owned(), &ros::BYTES)]).collect();
+        let mut buffer = [0; MAX_DEVICE_FRAME];
+        let frame = encode(&DeviceMessage::Hello(hello.clone()), &mut buffer);
+        let hello_text = to_hex(frame.as_deref().unwrap_or_default());
         let mut numbers = [0; TOPICS];
         for (number, (topic, definition)) in numbers.iter_mut().zip(topics) {
             let text = definition.text.as_bytes();
             let schema = writer.add_schema(definition.name, "ros2msg", text)?;
             let topic = topic_of(&unit) + &topic;
-            *number = writer.add_channel(schema, &topic, "cdr", &BTreeMap::new())?;
+            let metadata = match topic.ends_with(WIRE) {
+                true => BTreeMap::from([(HELLO.to_owned(), hello_text.clone())]),
+                false => BTreeMap::new(),
+            };
+            *number = writer.add_channel(schema, &topic, "cdr", &metadata)?;
         }
         Ok(Topics {
             numbers,
