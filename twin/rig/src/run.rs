@@ -173,7 +173,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         array: Vec::new(),
         program: options.program,
         limits: options.limits,
-        interrupt: options.interrupt.clone(),
+        interrupt: options.interrupt,
         bytes: Vec::new(),
         client: Client::None,
         heard_at: 0,
@@ -182,9 +182,8 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         settled_at_ns: 0,
     };
     let began = Instant::now();
-    let mut start = Start::new(&images);
-    start.interrupt = Some(&options.interrupt);
-    let finished = emulator::run(session, &start, driver)?;
+    // The conductor ends the run at an interrupt: only it can read the flash then.
+    let finished = emulator::run(session, &Start::new(&images), driver)?;
     if let Some(broken) = rules.first() {
         bail!("the firmware broke a rule of the chip: {broken}");
     }
@@ -348,6 +347,9 @@ impl Conductor {
 
     /// Serves the port's program. Returns whether the run goes on.
     fn serve(&mut self, now: u64) -> bool {
+        if self.interrupt.load(Ordering::Relaxed) {
+            return false;
+        }
         match &mut self.program {
             Program::Script(script) => {
                 let mut host = self.host.lock();

@@ -6,6 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::{firmware, hello};
+use hivtac_rig::peripherals::flash::Contents;
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
 use hivtac_wire::message::DeviceMessage;
@@ -122,6 +123,29 @@ fn a_signal_ends_a_rig_that_waits_for_its_client() {
             .success()
     );
     assert_eq!(end(child).0, Some(0));
+}
+
+/// A signal while the firmware runs, and one while the rig waits for its client: both leave the
+/// whole bank, and no other file beside it.
+#[test]
+fn a_signal_keeps_the_flash() {
+    for (signal, options) in [("-INT", &["--no-wait"][..]), ("-TERM", &[])] {
+        let directory = tempfile::tempdir().unwrap();
+        let flash = directory.path().join("flash");
+        let mut before = Contents::default();
+        *before.array.last_mut().unwrap() = 7;
+        before.save(&flash).unwrap();
+        let keep = ["--tcp", "0", "--flash", flash.to_str().unwrap()];
+        let (child, _) = start(&[&keep, options].concat());
+        let process = child.id().to_string();
+        let sent = Command::new("kill").args([signal, &process]).status();
+        assert!(sent.unwrap().success());
+        let (code, error) = end(child);
+        assert_eq!(code, Some(0), "{error}");
+        let left = Contents::load(&flash).unwrap();
+        assert_eq!(left.array.last(), Some(&7), "{signal}");
+        assert_eq!(std::fs::read_dir(directory.path()).unwrap().count(), 1);
+    }
 }
 
 #[test]

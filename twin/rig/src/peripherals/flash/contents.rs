@@ -123,14 +123,20 @@ impl Contents {
         })
     }
 
-    /// Writes such a file.
+    /// Writes such a file. The file before stays whole until the new one is, whatever ends this
+    /// program.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn save(&self, file: &Path) -> anyhow::Result<()> {
         let torn = self.torn.iter().flat_map(|address| address.to_le_bytes());
         let bytes: Vec<u8> = self.array.iter().copied().chain(torn).collect();
-        std::fs::write(file, bytes).with_context(|| file.display().to_string())
+        let mut new = file.as_os_str().to_owned();
+        new.push(format!(".{}.new", std::process::id()));
+        std::fs::write(&new, bytes)
+            .and_then(|()| std::fs::rename(&new, file))
+            .inspect_err(|_| drop(std::fs::remove_file(&new)))
+            .with_context(|| file.display().to_string())
     }
 
     /// Returns the count of unreadable words.
