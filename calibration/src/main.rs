@@ -2,6 +2,8 @@
 
 mod commands;
 
+use std::process::ExitCode;
+
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 use commands::data::DatasetArgs;
@@ -53,10 +55,20 @@ enum Command {
     DefaultModel(DefaultModelArgs),
 }
 
-fn main() -> Result<()> {
+fn main() -> ExitCode {
     // A reader of the output may close it early.
     sigpipe::reset();
-    match Cli::parse().command {
+    match run(Cli::parse().command) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("hivtac-calibrate: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(command: Command) -> Result<()> {
+    match command {
         Command::Collect(command) => command.run(),
         Command::Unit(args) => args.run(),
         Command::Export(args) => args.run(),

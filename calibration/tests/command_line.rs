@@ -31,6 +31,32 @@ fn stderr_of_failure(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
+/// A user's mistake is told in one line, whatever the environment asks of panics.
+#[test]
+fn a_mistake_is_told_without_a_backtrace() {
+    let directory = tempfile::tempdir().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
+        .current_dir(directory.path())
+        .env("RUST_BACKTRACE", "1")
+        .args([
+            "evaluate",
+            "--model",
+            "none.hvtm",
+            "--data",
+            "none.csv",
+            "--out",
+            "x.html",
+        ])
+        .output()
+        .unwrap();
+    let error = stderr_of_failure(&output);
+    assert!(
+        error.starts_with("hivtac-calibrate: ") && error.contains("none."),
+        "{error}"
+    );
+    assert_eq!(error.lines().count(), 1, "{error}");
+}
+
 #[test]
 fn from_data_to_a_checked_model() {
     let directory = tempfile::tempdir().unwrap();
