@@ -110,6 +110,10 @@ impl Bag {
                 let clock = &mut self.sensors[sensor].clock;
                 clock.stamp_ns(sample.time_us, now_ns)
             }
+            DeviceMessage::Stats(stats) => {
+                self.sensors[sensor].clock.latency(stats.latency_us);
+                now_ns
+            }
             _ => now_ns,
         };
         let when = When {

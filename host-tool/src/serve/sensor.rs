@@ -1,7 +1,7 @@
 //! The thread of a served device: it passes messages to the outlets, and takes a tare when asked.
 
 use super::diagnosis::diagnose;
-use crate::clock::{Clock, now_ns};
+use crate::clock::{LiveClock, now_ns};
 use crate::follow::{Follower, note_connected_again};
 use crate::output::note;
 use crate::ros::Diagnosis;
@@ -53,7 +53,7 @@ pub struct Sensor {
     number: usize,
     patience: Duration,
     state: State,
-    clock: Clock,
+    clock: LiveClock,
     /// Bits of the samples since the last diagnosis; `None` if there were no samples.
     since: Option<Status>,
     diagnosed: Instant,
@@ -79,7 +79,7 @@ impl Sensor {
             number,
             patience,
             state: State::new(port, hello),
-            clock: Clock::default(),
+            clock: LiveClock::new(),
             since: None,
             diagnosed: Instant::now(),
             lost: None,
@@ -95,11 +95,13 @@ impl Sensor {
         self.state.take(&message);
         match message {
             DeviceMessage::Sample(sample) => {
-                let stamp_ns = self.clock.stamp_ns(sample.time_us, came_ns);
+                let came = Instant::now();
+                let stamp_ns = self.clock.stamp_ns(sample.time_us, came, came_ns);
                 let since = self.since.unwrap_or_default();
                 self.since = Some(since | sample.status);
                 self.tell(came_ns, What::Sample(Box::new(sample), stamp_ns));
             }
+            DeviceMessage::Stats(stats) => self.clock.latency(stats.latency_us),
             DeviceMessage::Log(line) => note(&log_text(&line)),
             _ => (),
         }
@@ -161,7 +163,7 @@ impl Follower for Sensor {
 
     fn connected_again(&mut self, hello: DeviceHello) {
         self.state.connected_again(hello);
-        self.clock = Clock::default();
+        self.clock = LiveClock::new();
         if let Some(lost) = self.lost.take() {
             note_connected_again(&self.state.port, lost);
         }
