@@ -1,11 +1,21 @@
 //! Catches Ctrl-C and termination in a flag; loops read it and end with their summary.
 
 use crate::failure::{Failure, Kind};
-use std::sync::OnceLock;
+use std::cell::OnceCell;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 static STOP: AtomicBool = AtomicBool::new(false);
 static ASKED_BESIDES: OnceLock<fn() -> bool> = OnceLock::new();
+
+thread_local! {
+    static OWN: OnceCell<Arc<AtomicBool>> = const { OnceCell::new() };
+}
+
+/// In this thread, loops end by this flag alone.
+pub(crate) fn only_by(flag: Arc<AtomicBool>) {
+    OWN.with(|own| own.get_or_init(|| flag).clone());
+}
 
 /// Catches Ctrl-C, SIGTERM and SIGHUP from now on.
 pub fn install() -> Result<(), Failure> {
@@ -20,8 +30,12 @@ pub fn ask_besides(is_over: fn() -> bool) {
     ASKED_BESIDES.get_or_init(|| is_over);
 }
 
-/// True once the program should end.
+/// True once the program, or this thread's work, should end.
 pub fn requested() -> bool {
+    let own = OWN.with(|own| own.get().map(|flag| flag.load(Ordering::Relaxed)));
+    if let Some(is_over) = own {
+        return is_over;
+    }
     STOP.load(Ordering::Relaxed) || ASKED_BESIDES.get().is_some_and(|is_over| is_over())
 }
 

@@ -9,6 +9,7 @@ mod fake;
 mod firmware;
 mod health;
 mod monitor;
+mod reader;
 mod recordings;
 mod rests;
 mod run;
