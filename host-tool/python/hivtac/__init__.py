@@ -90,7 +90,7 @@ class Sample:
     time: float
     """Device time of the middle of the frame's exposure, s since its start."""
     host_time: float
-    """Receive time at the computer that read it, s since 1970."""
+    """Time of its arrival at the computer, s since 1970, however late it is taken."""
     status: tuple[str, ...]
     """Why the force is missing, or how reliable it is: names of `docs/wire.md`."""
     status_bits: int
@@ -216,8 +216,8 @@ class Sensor:
         return self
 
     def __next__(self) -> Sample:
-        """Waits for the next sample. Samples that arrive during a tare or a snapshot are kept. A
-        program that is too slow loses samples, which leaves a gap in `Sample.sequence`.
+        """Waits for the next sample. Up to 1024 samples wait for the program, also during a tare or
+        a snapshot; of more, the oldest are passed over, which `missed` counts.
 
         Raises `LostError` when the connection is lost, `StopIteration` after it was closed.
         """
@@ -228,6 +228,27 @@ class Sensor:
         if numbers is None:
             raise StopIteration
         return _sample(*numbers)
+
+    def newest(self) -> Sample:
+        """Returns the newest sample that was not taken yet, and waits for one if there is none.
+        Those before it are passed over, which `missed` counts. For control loops that are slower
+        than the sensor.
+
+        Raises `LostError` when the connection is lost, `Error` after it was closed.
+        """
+        try:
+            numbers = self._connection.newest()
+        finally:
+            self._tell_log()
+        if numbers is None:
+            raise Error("this connection was closed")
+        return _sample(*numbers)
+
+    @property
+    def missed(self) -> int:
+        """Count of the samples that arrived and were passed over: the program was too slow, or took
+        `newest`. Samples lost on the way show as a gap in `Sample.sequence`; these do, too."""
+        return self._connection.missed()
 
     def tare(self, frames: int = 32, *, force: bool = False, keep: bool = False) -> Tare:
         """Takes the mean of the next good `frames` (1–256) as the rest position. Nothing may touch
@@ -309,6 +330,11 @@ class Recording:
     def is_cut(self) -> bool:
         """True after the end of a recording that was cut."""
         return self._reader.is_cut()
+
+    @property
+    def damage(self) -> list[str]:
+        """Texts about the damaged parts that were skipped until now."""
+        return self._reader.damage()
 
     def __iter__(self) -> Iterator[Sample]:
         return self

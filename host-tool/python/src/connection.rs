@@ -11,18 +11,16 @@ use hivtac_host::link::{Link, log_text};
 use hivtac_host::look;
 use hivtac_host::named;
 use hivtac_host::port::Address;
+use hivtac_host::reader::{Arrived, Others, Reader};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel, Request};
 use hivtac_wire::settings::Selection;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use std::collections::VecDeque;
 use std::sync::{Mutex, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
-/// Silence after which a streaming device counts as gone.
-const SILENCE: Duration = Duration::from_secs(10);
 /// Time for a tare or for keeping settings, in addition to the frames.
 const PATIENCE: Duration = Duration::from_secs(10);
 /// Longest time between two frames; an emulated device is slower than a real one.
@@ -36,35 +34,14 @@ pub struct Connection {
     patience: Duration,
 }
 
-/// The state of an open connection.
+/// An open connection.
 struct Talk {
-    link: Link,
+    reader: Reader,
     is_streaming: bool,
-    heard: Heard,
 }
 
 /// A log level and a line.
 type LeveledLine = (u8, String);
-
-/// Messages that arrived during the wait for another message.
-#[derive(Default)]
-struct Heard {
-    samples: VecDeque<SampleNumbers>,
-    /// Log lines of the device.
-    lines: Vec<LeveledLine>,
-}
-
-impl Heard {
-    fn take(&mut self, message: DeviceMessage) {
-        match message {
-            DeviceMessage::Sample(sample) => {
-                self.samples.push_back(told::sample(&sample, now_ns()));
-            }
-            DeviceMessage::Log(line) => self.lines.push((level(line.level), log_text(&line))),
-            _ => (),
-        }
-    }
-}
 
 /// A log level as a number of Python's `logging`.
 fn level(level: LogLevel) -> u8 {
@@ -75,83 +52,74 @@ fn level(level: LogLevel) -> u8 {
     }
 }
 
-fn now_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.unwrap_or_default().as_nanos() as u64
-}
-
 impl Talk {
-    fn request(&mut self, request: Request, patience: Duration) -> Result<(), Failure> {
-        let Talk { link, heard, .. } = self;
-        link.request(request, patience, |message| heard.take(message))
-    }
-
-    /// Waits for the next sample, for as long as the device sends messages.
-    fn sample(&mut self, patience: Duration) -> Result<SampleNumbers, Failure> {
+    /// Waits for a sample with this function, for as long as the device sends messages.
+    fn sample(
+        &mut self,
+        patience: Duration,
+        wait: impl FnOnce(&Reader) -> Result<Arrived, Failure>,
+    ) -> Result<SampleNumbers, Failure> {
         if !self.is_streaming {
-            self.request(Request::StartWithMarkers, patience)?;
+            self.reader.stream(patience)?;
             self.is_streaming = true;
         }
-        loop {
-            if let Some(sample) = self.heard.samples.pop_front() {
-                return Ok(sample);
-            }
-            match self.link.receive(Instant::now() + SILENCE)? {
-                Some(message) => self.heard.take(message),
-                None => return Err(self.link.lost("the device sends nothing")),
-            }
-        }
+        wait(&self.reader).map(|arrived| told::sample(&arrived.sample, arrived.came_ns))
     }
+}
 
-    fn tare(&mut self, frames: u16, force: bool, keep: bool) -> Result<TareNumbers, Failure> {
-        let request = match force {
-            true => Request::TareAnyway { frames },
-            false => Request::Tare { frames },
+fn tare(
+    link: &mut Link,
+    others: Others<'_>,
+    frames: u16,
+    force: bool,
+    keep: bool,
+) -> Result<TareNumbers, Failure> {
+    let request = match force {
+        true => Request::TareAnyway { frames },
+        false => Request::Tare { frames },
+    };
+    let mut tared = None;
+    let patience = PATIENCE + SLOWEST_FRAME * frames.into();
+    link.request(request, patience, |message| match message {
+        DeviceMessage::Tared(report) => tared = Some(told::tare(&report)),
+        message => others(message),
+    })?;
+    if keep {
+        let tare = true;
+        let selection = Selection {
+            tare,
+            ..Selection::NONE
         };
-        let mut tared = None;
-        let Talk { link, heard, .. } = self;
-        let patience = PATIENCE + SLOWEST_FRAME * frames.into();
-        link.request(request, patience, |message| match message {
-            DeviceMessage::Tared(report) => tared = Some(told::tare(&report)),
-            message => heard.take(message),
-        })?;
-        if keep {
-            let tare = true;
-            let selection = Selection {
-                tare,
-                ..Selection::NONE
-            };
-            self.request(Request::Keep(selection), PATIENCE)?;
-        }
-        tared.ok_or_else(|| self.link.lost("what the tare gave did not come"))
+        link.request(Request::Keep(selection), PATIENCE, others)?;
     }
+    tared.ok_or_else(|| link.lost("what the tare gave did not come"))
+}
 
-    fn set_contact(
-        &mut self,
-        shape: ContactShape,
-        keep: bool,
-        patience: Duration,
-    ) -> Result<(), Failure> {
-        self.request(Request::SetContactShape(shape), patience)?;
-        if keep {
-            let selection = Selection {
-                contact_shape: true,
-                ..Selection::NONE
-            };
-            self.request(Request::Keep(selection), PATIENCE)?;
-        }
-        Ok(())
+fn set_contact(
+    link: &mut Link,
+    others: Others<'_>,
+    shape: ContactShape,
+    keep: bool,
+    patience: Duration,
+) -> Result<(), Failure> {
+    link.request(Request::SetContactShape(shape), patience, &mut *others)?;
+    if keep {
+        let selection = Selection {
+            contact_shape: true,
+            ..Selection::NONE
+        };
+        link.request(Request::Keep(selection), PATIENCE, others)?;
     }
+    Ok(())
+}
 
-    fn rest(&mut self, patience: Duration) -> Result<RestNumbers, Failure> {
-        let mut rest = None;
-        let Talk { link, heard, .. } = self;
-        link.request(Request::GetSettings, patience, |message| match message {
-            DeviceMessage::Settings(report) => rest = Some(told::rest(&report)),
-            message => heard.take(message),
-        })?;
-        rest.ok_or_else(|| self.link.lost("the settings did not come"))
-    }
+fn rest(link: &mut Link, others: Others<'_>, patience: Duration) -> Result<RestNumbers, Failure> {
+    let mut rest = None;
+    link.request(Request::GetSettings, patience, |message| match message {
+        DeviceMessage::Settings(report) => rest = Some(told::rest(&report)),
+        message => others(message),
+    })?;
+    rest.ok_or_else(|| link.lost("the settings did not come"))
 }
 
 #[pymethods]
@@ -182,9 +150,8 @@ impl Connection {
             })
             .map_err(raised)?;
         let talk = Talk {
-            link,
+            reader: Reader::start(link),
             is_streaming: false,
-            heard: Heard::default(),
         };
         Ok(Connection {
             talk: Mutex::new(Some(talk)),
@@ -200,21 +167,30 @@ impl Connection {
 
     /// The next sample; `None` once the connection is closed.
     fn next(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
-        let next = py.detach(|| match &mut *self.lock() {
-            Some(talk) => talk.sample(self.patience).map(Some),
-            None => Ok(None),
-        });
-        next.map_err(raised)
+        self.sample(py, Reader::next_sample)
+    }
+
+    /// The newest sample; `None` once the connection is closed.
+    fn newest(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
+        self.sample(py, Reader::newest)
+    }
+
+    /// Samples that arrived and were passed over.
+    fn missed(&self, py: Python<'_>) -> u64 {
+        py.detach(|| self.lock().as_ref().map_or(0, |talk| talk.reader.missed()))
     }
 
     /// Takes a rest position.
     fn tare(&self, py: Python<'_>, frames: u16, force: bool, keep: bool) -> PyResult<TareNumbers> {
-        self.with(py, |talk| talk.tare(frames, force, keep))
+        self.with(py, move |link, others| {
+            tare(link, others, frames, force, keep)
+        })
     }
 
     /// The rest position's state and changes.
     fn rest(&self, py: Python<'_>) -> PyResult<RestNumbers> {
-        self.with(py, |talk| talk.rest(self.patience))
+        let patience = self.patience;
+        self.with(py, move |link, others| rest(link, others, patience))
     }
 
     /// Sets the direction of gravity, as a vector of any length in the film's frame; `None` if it
@@ -224,13 +200,16 @@ impl Connection {
             None => Down::Unknown,
             Some(vector) => Down::Told(direction(vector).map_err(Error::new_err)?),
         };
-        self.with(py, |talk| talk.link.set_down(down))
+        self.with(py, move |link, _| link.set_down(down))
     }
 
     /// Sets the shape of what presses: `needle`, `round:R`, `flat:R` or `unknown`, R in mm.
     fn set_contact(&self, py: Python<'_>, shape: &str, keep: bool) -> PyResult<()> {
         let shape = contact_shape::parse(shape).map_err(Error::new_err)?;
-        self.with(py, |talk| talk.set_contact(shape, keep, self.patience))
+        let patience = self.patience;
+        self.with(py, move |link, others| {
+            set_contact(link, others, shape, keep, patience)
+        })
     }
 
     /// Number of a frame, its device time (s), columns, rows, and levels of red, green and blue.
@@ -238,10 +217,9 @@ impl Connection {
         &self,
         py: Python<'py>,
     ) -> PyResult<(u32, f64, u16, u16, Bound<'py, PyBytes>)> {
-        let frame = self.with(py, |talk| {
-            let Talk { link, heard, .. } = talk;
-            let taken = frame::take(link, self.patience, |message| heard.take(message))?;
-            Ok(taken.frame)
+        let patience = self.patience;
+        let frame = self.with(py, move |link, others| {
+            Ok(frame::take(link, patience, others)?.frame)
         })?;
         let levels = PyBytes::new(py, &look::levels(&frame));
         let time_s = frame.time_us as f64 / 1e6;
@@ -251,22 +229,18 @@ impl Connection {
     /// The lines that the device logged since the last call.
     fn take_lines(&self, py: Python<'_>) -> Vec<LeveledLine> {
         py.detach(|| {
-            let mut talk = self.lock();
-            let lines = talk.as_mut().map(|talk| &mut talk.heard.lines);
-            lines.map(std::mem::take).unwrap_or_default()
+            let talk = self.lock();
+            let lines = talk.as_ref().map(|talk| talk.reader.take_lines());
+            let lines = lines.into_iter().flatten();
+            lines
+                .map(|line| (level(line.level), log_text(&line)))
+                .collect()
         })
     }
 
     /// Ends the conversation; further calls have no effect.
     fn close(&self, py: Python<'_>) {
-        py.detach(|| {
-            if let Some(mut talk) = self.lock().take()
-                && talk.is_streaming
-            {
-                // An error is ignored: the port may be gone, and is closed anyway.
-                let _ = talk.link.command(Request::Stop);
-            }
-        });
+        py.detach(|| drop(self.lock().take()));
     }
 }
 
@@ -275,14 +249,26 @@ impl Connection {
         self.talk.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Runs a function on an open connection, without the interpreter's lock.
-    fn with<T: Send>(
+    fn sample(
         &self,
         py: Python<'_>,
-        work: impl FnOnce(&mut Talk) -> Result<T, Failure> + Send,
+        wait: impl FnOnce(&Reader) -> Result<Arrived, Failure> + Send,
+    ) -> PyResult<Option<SampleNumbers>> {
+        let sample = py.detach(|| match &mut *self.lock() {
+            Some(talk) => talk.sample(self.patience, wait).map(Some),
+            None => Ok(None),
+        });
+        sample.map_err(raised)
+    }
+
+    /// Works with an open connection, without the interpreter's lock.
+    fn with<T: Send + 'static>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut Link, Others<'_>) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        let done = py.detach(|| match &mut *self.lock() {
-            Some(talk) => work(talk),
+        let done = py.detach(|| match &*self.lock() {
+            Some(talk) => talk.reader.with(work),
             None => Err(Failure::new(Kind::Input, "this connection was closed")),
         });
         done.map_err(raised)

@@ -64,6 +64,20 @@ class OnTheRig(unittest.TestCase):
         self.assertLess(np.abs(last.place).max(), 5e-3)
         self.assertLess(abs(last.host_time - time.time()), 60)
 
+    def test_a_slow_program_gets_arrival_times_and_the_newest_sample(self):
+        with Rig() as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:
+            next(sensor)
+            # Whatever the rig's speed, samples wait here at last.
+            waited = time.time()
+            while waited - (second := next(sensor)).host_time < 0.05:
+                time.sleep(0.2)
+                waited = time.time()
+            newest = sensor.newest()
+            self.assertGreater(newest.sequence, second.sequence)
+            self.assertEqual(
+                sensor.missed, newest.sequence - second.sequence - 1
+            )
+
     def test_a_tare_and_a_picture_between_samples(self):
         with Rig("rest") as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:
             before = next(sensor)
