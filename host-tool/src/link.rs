@@ -32,6 +32,8 @@ pub struct Link {
     inbox: Vec<u8>,
     decoded: usize,
     last_id: u16,
+    /// Bytes that came, whatever they were.
+    came: u64,
 }
 
 impl Link {
@@ -50,6 +52,7 @@ impl Link {
             inbox: Vec::new(),
             decoded: 0,
             last_id: 0,
+            came: 0,
         };
         let hello = link.exchange_hellos(patience)?;
         Ok((link, hello))
@@ -78,9 +81,10 @@ impl Link {
     fn no_hello(&self, patience: Duration) -> Failure {
         let name = &self.name;
         let seconds = patience.as_secs_f32();
-        let bytes = match self.decoder.rejected().bytes {
+        // Text without a zero is no frame yet, which the decoder does not reject.
+        let bytes = match self.came {
             0 => "nothing came".to_owned(),
-            bytes => format!("{bytes} bytes came that are no message"),
+            bytes => format!("{bytes} bytes came, and none was a hello"),
         };
         Failure::new(
             Kind::NoDevice,
@@ -152,6 +156,7 @@ impl Link {
         self.decoded = 0;
         let result = self.port.read(&mut self.inbox);
         self.inbox.truncate(*result.as_ref().unwrap_or(&0));
+        self.came += self.inbox.len() as u64;
         match result {
             Ok(0) => Err(self.lost("the other end closed it")),
             Ok(_) => Ok(()),

@@ -130,18 +130,23 @@ fn a_silent_device_is_no_device() {
 
 #[test]
 fn a_device_of_another_kind_is_no_device() {
-    let device = FakeDevice::on_tcp([Box::new(|device| {
-        device.raw(b"$GPGGA,some,other,thing\0");
-        while device.next().is_some() {}
-    })]);
-    let run = run(&["info", "--port", &device.port, "--timeout", "0.6"]);
-    assert!(
-        run.stderr
-            .contains("within 0.6 s (23 bytes came that are no message)"),
-        "{}",
-        run.stderr
-    );
-    assert_eq!(run.code, Some(3));
+    for said in [
+        &b"$GPGGA,some,other,thing\0"[..],
+        b"some text of 24 bytes\r\n>",
+    ] {
+        let device = FakeDevice::on_tcp([Box::new(move |device| {
+            device.raw(said);
+            while device.next().is_some() {}
+        })]);
+        let run = run(&["info", "--port", &device.port, "--timeout", "0.6"]);
+        assert!(
+            run.stderr
+                .contains("within 0.6 s (24 bytes came, and none was a hello)"),
+            "{}",
+            run.stderr
+        );
+        assert_eq!(run.code, Some(3));
+    }
 }
 
 /// The device starts late and misses the first hellos.
