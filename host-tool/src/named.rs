@@ -128,7 +128,7 @@ mod tests {
             serial: format!("0a{port}"),
             name: name.map(str::to_owned),
             board: name.map(|_| "weact-h743 + ov7725".to_owned()),
-            firmware: name.map(|_| "hivtac 0.1.0".to_owned()),
+            firmware: name.map(|_| "hivtac 0.2.0".to_owned()),
             problem: name.is_none().then(|| "cannot open it".to_owned()),
         }
     }
@@ -156,7 +156,7 @@ mod tests {
     #[test]
     fn lines_say_who_is_there() {
         let named = sensor("A", Some("thumb")).line();
-        assert_eq!(named, "0aA A thumb, weact-h743 + ov7725, hivtac 0.1.0");
+        assert_eq!(named, "0aA A thumb, weact-h743 + ov7725, hivtac 0.2.0");
         assert!(sensor("A", Some("")).line().contains("no name"));
     }
 }
