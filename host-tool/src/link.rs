@@ -401,6 +401,7 @@ mod tests {
             name: "slow".to_owned(),
             decoder: Decoder::new(),
             inbox: Vec::new(),
+            came: 0,
             decoded: 0,
             last_id: 0,
         };
