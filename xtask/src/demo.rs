@@ -23,19 +23,41 @@ pub struct Demo {
     /// The board and its camera: an OV7725 on the first, an MT9V034 on the second.
     #[arg(long, value_enum, default_value_t)]
     board: Board,
+    /// Dots on the film: four, which the built-in model is for, or eight, whose model is sent
+    /// first.
+    #[arg(long, default_value_t = FOUR, value_parser = dots)]
+    dots: u8,
+}
+
+/// The built-in model's number of dots.
+const FOUR: u8 = 4;
+/// The model of eight dots.
+const EIGHT_DOTS: &str = "calibration/models/8v/default.hvtm";
+
+/// Reads a number of dots.
+fn dots(text: &str) -> Result<u8, String> {
+    match text {
+        "4" => Ok(FOUR),
+        "8" => Ok(8),
+        _ => Err("4 or 8".to_owned()),
+    }
 }
 
 impl Demo {
     /// Builds the programs, runs the rig, and shows the host tool's output; names the rig's log
     /// after a failure.
     pub fn run(&self) -> Result<()> {
+        ensure!(
+            self.dots == FOUR || self.board == Board::default(),
+            "eight dots are for the first board: leave --board out"
+        );
         let start = Instant::now();
         let programs = self.build()?;
         let built = start.elapsed().as_secs_f64();
         let folder = toolchain::work_folder("demo")?;
-        let files = ["truth.jsonl", "arrivals.jsonl", "rig.log"];
+        let files = ["truth.jsonl", "arrivals.jsonl", "rig.log", "flash"];
         let logs = files.map(|name| folder.join(name));
-        let [truth, _, log] = &logs;
+        let [truth, _, log, _] = &logs;
         if let Err(error) = self.show(&programs, &logs) {
             let text = std::fs::read_to_string(log).unwrap_or_default();
             let lines: Vec<&str> = text.lines().collect();
@@ -72,13 +94,20 @@ impl Demo {
         })
     }
 
-    fn show(&self, programs: &[PathBuf; 3], logs: &[PathBuf; 3]) -> Result<()> {
-        let [truth, arrivals, log] = logs;
+    fn show(&self, programs: &[PathBuf; 3], logs: &[PathBuf; 4]) -> Result<()> {
+        let [truth, arrivals, log, flash] = logs;
         let [firmware, rig, tool] = programs;
         let (frames, board) = (self.frames.to_string(), self.board.to_possible_value());
         let board = board.context("a board without a name")?;
+        let has_own_model = self.dots != FOUR;
+        if has_own_model {
+            send_model(programs, flash, log)?;
+        }
         eprintln!("The board boots, and {frames} frames pass: some half a minute.");
         let mut command = Command::new(rig);
+        if has_own_model {
+            command.args(["--layout", "8v", "--flash"]).arg(flash);
+        }
         command.args("--scene demo --pty --board".split(' '));
         command.arg(board.get_name()).arg("--truth").arg(truth);
         let rig = Rig::start(command.arg("--arrivals").arg(arrivals).arg(firmware), log)?;
@@ -98,6 +127,21 @@ impl Demo {
         );
         Ok(())
     }
+}
+
+/// Sends the model of eight dots to a new device, which keeps it in its flash. The camera is left
+/// out, as it takes most of the emulator's time.
+fn send_model([firmware, rig, tool]: &[PathBuf; 3], flash: &Path, log: &Path) -> Result<()> {
+    eprintln!("A device gets the model of eight dots: some half a minute.");
+    if flash.exists() {
+        std::fs::remove_file(flash).with_context(|| format!("removing {}", flash.display()))?;
+    }
+    let mut command = Command::new(rig);
+    command.args("--pty --exit-on-hangup --fault camera-absent --flash".split(' '));
+    let rig = Rig::start(command.arg(flash).arg(firmware), log)?;
+    let update = ["update", "model", EIGHT_DOTS, "--timeout", "120"];
+    process::run(Command::new(tool).args(update).args(["--port", &rig.port]))?;
+    rig.ended()
 }
 
 /// A running rig, which is killed when this value is dropped.
@@ -127,10 +171,15 @@ impl Rig {
     }
 
     /// Makes the rig end, and waits for that.
-    fn finish(mut self) -> Result<()> {
+    fn finish(self) -> Result<()> {
         let id = self.process.id().to_string();
         let told = process::succeeds(Command::new("kill").args(["-TERM", &id]));
         ensure!(told, "the rig is gone");
+        self.ended()
+    }
+
+    /// Waits for its end.
+    fn ended(mut self) -> Result<()> {
         let status = self.process.wait()?;
         ensure!(status.success(), "the rig failed ({status})");
         Ok(())

@@ -115,7 +115,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
         ),
         Status::MODEL_MISSING => ("the device has no usable model", "flash one"),
         Status::MODEL_MISMATCH => (
-            "the model was made for another threshold, another picture or another number of markers",
+            "the model was made for another threshold, picture or number of markers",
             "go back to the model's threshold, or take a new tare",
         ),
         Status::CONTACT => ("something touches the film", ""),

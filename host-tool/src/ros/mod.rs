@@ -330,6 +330,22 @@ pub fn bytes(bytes: &[u8]) -> Vec<u8> {
 mod tests {
     use super::*;
     use hivtac_host::recording::BEFORE_BYTES;
+    use hivtac_terms::units::Px;
+
+    /// Behind the header: the number of points, then column, row and area of each.
+    #[test]
+    fn a_polygon_has_a_point_for_each_marker() {
+        let marker = |id: i32| Marker {
+            x: Px(id << 16),
+            y: Px(-(id << 16)),
+            area: 170,
+        };
+        let bytes = polygon(0, "", &[0, 1, 2, 3, 4, 5, 6, 7].map(marker));
+        let (header, points) = bytes.split_at(bytes.len() - 8 * 12);
+        assert!(header.ends_with(&[8, 0, 0, 0]), "{header:?}");
+        let last = [7.0_f32, -7.0, 170.0].map(f32::to_le_bytes).concat();
+        assert!(points.ends_with(&last), "{points:?}");
+    }
 
     #[test]
     fn numbers_are_aligned_behind_the_encoding() {

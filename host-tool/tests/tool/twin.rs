@@ -183,6 +183,32 @@ fn a_twin_takes_models_that_fit_it() {
     assert_eq!(twin.json(&["info"])["model"]["source"], "built-in");
 }
 
+#[test]
+fn a_twin_of_eight_dots_tells_all_of_them_and_names_another_model() {
+    let twin = Twin::of(&["--scene", "rest", "--layout", "8v"]);
+    assert_eq!(twin.json(&["info"])["model"]["markers"], 8);
+    let tared = twin.json(&["tare"]);
+    assert_eq!(tared["markers"].as_array().unwrap().len(), 8, "{tared}");
+    let [table, bag] = ["rest.csv", "rest.mcap"].map(|name| text(&twin.folder, name));
+    for file in [&table, &bag] {
+        twin.done(&["record", file, "--seconds", "0.3"]);
+    }
+    let rows = std::fs::read_to_string(&table).unwrap();
+    let (header, last) = (rows.lines().next(), rows.lines().last());
+    assert!(header.unwrap().ends_with("x7_px,y7_px,area7_px"), "{rows}");
+    assert!(!last.unwrap().ends_with(','), "{rows}");
+    assert!(std::fs::metadata(&bag).unwrap().len() > 10_000);
+
+    let focus = twin.run(&["focus"]);
+    assert!(focus.stderr.contains("model is for 8"), "{focus:?}");
+    twin.done(&["update", "model", MODEL]);
+    let samples = twin.samples(&["--frames", "20"]);
+    let last = samples.last().unwrap();
+    assert!(last["force"].is_null(), "{last}");
+    let status = last["status"].as_array().unwrap();
+    assert!(status.contains(&"another_layout".into()), "{last}");
+}
+
 /// Returns |sensed − true| over the stated standard uncertainty, of |F|, both angles and both
 /// coordinates of the place.
 fn ratios(sample: &Value, truth: &Value) -> Vec<f64> {

@@ -82,8 +82,8 @@ impl Rest {
         }
     }
 
-    /// Returns whether this can be a rest position: of enough markers, inside the largest picture, of
-    /// at least a pixel each.
+    /// Returns whether this can be a rest position: of enough markers, inside the largest picture,
+    /// of at least a pixel each.
     pub fn is_sound(&self) -> bool {
         let inside = |px: Px| (0..=LARGEST_SIDE << Px::FRACTION_BITS).contains(&px.0);
         let largest = (LARGEST_SIDE * LARGEST_SIDE) as u32;

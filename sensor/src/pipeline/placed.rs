@@ -70,7 +70,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let Some((prepared, rest)) = parts else {
             return Status::OK;
         };
-        let shown = prepared.finder.dots(self.scanner.blobs(), &rest.areas);
+        let shown = prepared.finder.dots(self.scanner.blobs());
         let is_another = shown >= LEAST_MARKERS
             && (shown >= rest.areas.len() + 2 || shown + 2 < rest.areas.len());
         match is_another {

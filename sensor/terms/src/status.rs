@@ -52,8 +52,8 @@ bits! {
     NOT_CALIBRATED = 13, "not_calibrated";
     /// There is no usable model: no force.
     MODEL_MISSING = 14, "model_missing";
-    /// The model was made for another frame size, format, threshold, centroid estimator or number of
-    /// markers: no force.
+    /// The model was made for another frame size, format, threshold, centroid estimator or number
+    /// of markers: no force.
     MODEL_MISMATCH = 15, "model_mismatch";
     /// Something touches the film ([`ContactLimits`](crate::temporal::ContactLimits)).
     CONTACT = 16, "contact";

@@ -82,13 +82,9 @@ impl Finder {
         candidates.filter(|shape| self.is_whole(shape))
     }
 
-    /// The number of whole dots that are at most twice as large as the largest of these areas, and at
-    /// least half as large as the smallest.
-    pub fn dots(&self, blobs: &[Blob], areas: &[u32]) -> usize {
-        let least = areas.iter().min().map_or(0, |least| least / 2);
-        let most = areas.iter().max().map_or(0, |most| most.saturating_mul(2));
-        let alike = |shape: &Shape| (least..=most).contains(&shape.area);
-        self.whole(blobs).filter(alike).count()
+    /// The number of whole dots.
+    pub fn dots(&self, blobs: &[Blob]) -> usize {
+        self.whole(blobs).count()
     }
 
     /// How far the middle of as many images as markers is from the middle of these; 0 for another
