@@ -5,7 +5,7 @@ use crate::board;
 use crate::camera::{self, Camera, Format, Setting};
 use crate::capture::Capture;
 use crate::condition::{self, Condition};
-use crate::session::Asked;
+use crate::session::Origin;
 use crate::{log, outbox, self_test, stats, vsync};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_futures::select::{Either4, select4};
@@ -40,7 +40,7 @@ const RETRY: Duration = Duration::from_millis(500);
 /// A host's order for the camera, and who sent it.
 struct CameraOrder {
     action: Action,
-    asked: Asked,
+    origin: Origin,
 }
 
 /// The action of an order.
@@ -59,8 +59,8 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
     if CAMERA_ORDERED.swap(true, Ordering::Relaxed) {
         return Some(Outcome::Busy);
     }
-    let asked = Asked::by(id);
-    CAMERA_ORDER.signal(CameraOrder { action, asked });
+    let origin = Origin::by(id);
+    CAMERA_ORDER.signal(CameraOrder { action, origin });
     None
 }
 
@@ -75,9 +75,9 @@ pub fn set_afresh() {
 }
 
 /// Ends an order and replies to it.
-fn end_order(asked: Asked, outcome: Outcome) {
+fn end_order(origin: Origin, outcome: Outcome) {
     CAMERA_ORDERED.store(false, Ordering::Relaxed);
-    if let Some(id) = asked.id() {
+    if let Some(id) = origin.id() {
         outbox::reply(id, outcome);
     }
 }
@@ -177,13 +177,13 @@ impl CaptureTask {
         self.go_on_when_set_up(from, answered).await;
     }
 
-    async fn carry_out(&mut self, CameraOrder { action, asked }: CameraOrder) {
+    async fn carry_out(&mut self, CameraOrder { action, origin }: CameraOrder) {
         let outcome = match action {
             Action::Expose => self.expose().await,
             Action::Set(settings) => self.set(settings).await,
-            Action::Inspect => self.inspect(asked).await,
+            Action::Inspect => self.inspect(origin).await,
         };
-        end_order(asked, outcome);
+        end_order(origin, outcome);
     }
 
     async fn set(&mut self, settings: CameraSettings) -> Outcome {
@@ -213,11 +213,11 @@ impl CaptureTask {
     }
 
     /// Reports the camera's state while it keeps running.
-    async fn inspect(&mut self, asked: Asked) -> Outcome {
+    async fn inspect(&mut self, origin: Origin) -> Outcome {
         let frame_time = self.camera.frame_time();
         match self.camera.setting(self.capture.format()).await {
             Ok(setting) => {
-                if asked.id().is_some() {
+                if origin.id().is_some() {
                     let inspection = inspection(setting, frame_time);
                     outbox::offer(DeviceMessage::Inspection(inspection));
                 }
@@ -266,7 +266,7 @@ impl CaptureTask {
             self_test::camera_failed(&error, self.starting);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             if let Some(order) = CAMERA_ORDER.try_take() {
-                end_order(order.asked, Outcome::NoCamera);
+                end_order(order.origin, Outcome::NoCamera);
             }
             Timer::after(RETRY).await;
         }

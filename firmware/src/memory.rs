@@ -12,7 +12,7 @@ use crate::model::{self, Chosen};
 use crate::model_upload::{self, Whole};
 use crate::orders::{ORDERS, Order};
 use crate::self_test::{self, OfFlash};
-use crate::session::Asked;
+use crate::session::Origin;
 use crate::thermometer::Thermometer;
 use crate::{camera, capture_task, log, model_slots, outbox, settings};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -38,7 +38,7 @@ static MEMORY_ORDERED: AtomicBool = AtomicBool::new(false);
 /// A host's order for the flash, and who sent it.
 struct MemoryOrder {
     action: Action,
-    asked: Asked,
+    origin: Origin,
 }
 
 /// The action of an order.
@@ -63,8 +63,8 @@ pub fn order(action: Action, id: u16) -> Option<Outcome> {
     if MEMORY_ORDERED.swap(true, Ordering::Relaxed) {
         return Some(Outcome::Busy);
     }
-    let asked = Asked::by(id);
-    MEMORY_ORDER.signal(MemoryOrder { action, asked });
+    let origin = Origin::by(id);
+    MEMORY_ORDER.signal(MemoryOrder { action, origin });
     None
 }
 
@@ -128,10 +128,10 @@ impl Memory {
         }
     }
 
-    async fn carry_out(&mut self, MemoryOrder { action, asked }: MemoryOrder) {
+    async fn carry_out(&mut self, MemoryOrder { action, origin }: MemoryOrder) {
         let outcome = match action {
-            Action::Report => Err(self.report(asked)),
-            Action::Health => Err(self.health(asked).await),
+            Action::Report => Err(self.report(origin)),
+            Action::Health => Err(self.health(origin).await),
             Action::Keep(selection) => Err(self.keep(selection).await),
             Action::UseModel => self.keep_model().await,
             Action::UseBuiltInModel => self.forget_model().await,
@@ -142,7 +142,7 @@ impl Memory {
             // The pipeline replies once it uses the model.
             Ok(next) => {
                 let order = Order::UseModel {
-                    asked,
+                    origin,
                     next,
                     afresh: matches!(action, Action::Reset),
                 };
@@ -151,15 +151,15 @@ impl Memory {
             }
         };
         MEMORY_ORDERED.store(false, Ordering::Relaxed);
-        if let Some((id, outcome)) = asked.id().zip(outcome) {
+        if let Some((id, outcome)) = origin.id().zip(outcome) {
             outbox::reply(id, outcome);
         }
     }
 
-    async fn health(&mut self, asked: Asked) -> Outcome {
+    async fn health(&mut self, origin: Origin) -> Outcome {
         let temperature = self.thermometer.read().await;
         let health = self_test::health(&self.of_flash(), temperature);
-        if asked.id().is_some() {
+        if origin.id().is_some() {
             outbox::offer(DeviceMessage::Health(health));
         }
         Outcome::Done
@@ -173,11 +173,11 @@ impl Memory {
         }
     }
 
-    fn report(&self, asked: Asked) -> Outcome {
+    fn report(&self, origin: Origin) -> Outcome {
         let Some(used) = settings::in_use() else {
             return Outcome::Busy;
         };
-        if asked.id().is_some() {
+        if origin.id().is_some() {
             let keeper = Keeper {
                 found: self.found,
                 erases: self.log.erases(),

@@ -4,12 +4,12 @@
 use crate::camera::Format;
 use crate::capture_task;
 use crate::dtcm_table::Sensor;
-use crate::session::Asked;
+use crate::session::Origin;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::Outcome;
 
 /// The threshold that waits for the camera's pixels, if any, and who requested it.
-pub struct NextThreshold(Option<(Asked, Threshold)>);
+pub struct NextThreshold(Option<(Origin, Threshold)>);
 
 impl NextThreshold {
     /// No threshold waits.
@@ -38,31 +38,31 @@ impl NextThreshold {
             let _ = sensor.set_threshold(threshold);
             return Ok(true);
         }
-        self.begin(Asked::by(id), threshold, format);
+        self.begin(Origin::by(id), threshold, format);
         Ok(false)
     }
 
     /// Makes a threshold of a different pixel format wait for the first frame of that format, for a
     /// command. Returns false if a threshold already waits, or the camera does not send the format.
-    pub fn wait_for(&mut self, asked: Asked, threshold: Threshold) -> bool {
+    pub fn wait_for(&mut self, origin: Origin, threshold: Threshold) -> bool {
         let format = Format::of(threshold.format()).filter(|_| self.0.is_none());
         if let Some(format) = format {
-            self.begin(asked, threshold, format);
+            self.begin(origin, threshold, format);
         }
         format.is_some()
     }
 
-    fn begin(&mut self, asked: Asked, threshold: Threshold, format: Format) {
-        self.0 = Some((asked, threshold));
+    fn begin(&mut self, origin: Origin, threshold: Threshold, format: Format) {
+        self.0 = Some((origin, threshold));
         capture_task::request_format(format);
     }
 
     /// Brings the waiting threshold into use, once the camera sends its pixels. Returns who
     /// requested it; `None` if no threshold waits.
-    pub fn come_into_use(&mut self, sensor: &mut Sensor) -> Option<Asked> {
-        let (asked, threshold) = self.0.take()?;
+    pub fn come_into_use(&mut self, sensor: &mut Sensor) -> Option<Origin> {
+        let (origin, threshold) = self.0.take()?;
         // It was checked when it came.
         let _ = sensor.set_threshold(threshold);
-        Some(asked)
+        Some(origin)
     }
 }

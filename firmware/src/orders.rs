@@ -1,7 +1,7 @@
 //! Defines the host's orders for the pipeline.
 
 use crate::model::Chosen;
-use crate::session::Asked;
+use crate::session::Origin;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
 use hivtac_terms::temporal::TemporalSettings;
@@ -46,11 +46,11 @@ pub enum Order {
         settings: TemporalSettings,
     },
     /// Keep the next whole frame and send it.
-    Snapshot(Asked),
+    Snapshot(Origin),
     /// Use a different model.
     UseModel {
         /// Who requested it.
-        asked: Asked,
+        origin: Origin,
         /// The model.
         next: Chosen,
         /// True to use its threshold and no tare, regardless of those in use.

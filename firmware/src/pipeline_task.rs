@@ -10,7 +10,7 @@ use crate::model::Chosen;
 use crate::next_model::{self, InUse};
 use crate::next_threshold::NextThreshold;
 use crate::orders::{ORDERS, Order};
-use crate::session::Asked;
+use crate::session::Origin;
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
 use crate::{outbox, session, settings, stats, vsync};
@@ -206,17 +206,17 @@ impl PipelineTask {
                 self.follow();
                 outbox::reply(id, outcome);
             }
-            Order::Snapshot(asked) => self.snapshots.begin(asked),
+            Order::Snapshot(origin) => self.snapshots.begin(origin),
             Order::UseModel {
-                asked,
+                origin,
                 next,
                 afresh,
-            } => self.use_model(asked, next, afresh),
+            } => self.use_model(origin, next, afresh),
         }
     }
 
     /// Called between two frames, so that no frame mixes two models.
-    fn use_model(&mut self, asked: Asked, next: Chosen, afresh: bool) {
+    fn use_model(&mut self, origin: Origin, next: Chosen, afresh: bool) {
         self.give_up_tare();
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);
@@ -229,8 +229,8 @@ impl PipelineTask {
         } else {
             self.threshold_changed();
         }
-        let waits = wanted.is_some_and(|threshold| self.next_threshold.wait_for(asked, threshold));
-        if let Some(id) = asked.id().filter(|_| !waits) {
+        let waits = wanted.is_some_and(|threshold| self.next_threshold.wait_for(origin, threshold));
+        if let Some(id) = origin.id().filter(|_| !waits) {
             outbox::reply(id, Outcome::Done);
         }
     }
@@ -265,11 +265,11 @@ impl PipelineTask {
     /// Call when frames of a new pixel format come, that of the waiting threshold. Markers have
     /// other areas in them, so the rest position is discarded.
     fn change_format(&mut self) {
-        let asked = self.next_threshold.come_into_use(self.sensor);
+        let origin = self.next_threshold.come_into_use(self.sensor);
         self.use_tare(None, Drift::NONE);
         self.give_up_tare();
         self.threshold_changed();
-        if let Some(id) = asked.and_then(Asked::id) {
+        if let Some(id) = origin.and_then(Origin::id) {
             outbox::reply(id, Outcome::Done);
         }
     }

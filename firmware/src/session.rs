@@ -57,12 +57,12 @@ pub fn is_streaming() -> bool {
 
 /// The command that requested something, and its conversation.
 #[derive(Clone, Copy)]
-pub struct Asked {
+pub struct Origin {
     id: u16,
     conversation: u32,
 }
 
-impl Asked {
+impl Origin {
     /// A request by the command `id` of the current conversation.
     pub fn by(id: u16) -> Self {
         let conversation = number();

@@ -9,7 +9,7 @@
 use crate::bands::{BAND_BYTES, SHAPE};
 use crate::orders::{self, Order};
 use crate::outbox;
-use crate::session::{self, Asked};
+use crate::session::{self, Origin};
 use core::mem::MaybeUninit;
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -44,7 +44,7 @@ pub fn address(index: u16) -> u32 {
 /// A whole frame in [`FRAME`].
 pub struct Taken {
     /// Who requested it.
-    pub asked: Asked,
+    pub origin: Origin,
     /// Its description.
     pub header: Snapshot,
 }
@@ -56,10 +56,10 @@ pub fn ask(id: u16) -> Option<Outcome> {
     if SNAPSHOT_FOR.swap(conversation, Ordering::Relaxed) == conversation {
         return Some(Outcome::Busy);
     }
-    let asked = Asked::by(id);
-    let refused = orders::order(Order::Snapshot(asked));
+    let origin = Origin::by(id);
+    let refused = orders::order(Order::Snapshot(origin));
     if refused.is_some() {
-        end(asked);
+        end(origin);
     }
     refused
 }
@@ -70,8 +70,8 @@ pub fn send(taken: Taken) {
 }
 
 /// Ends the snapshot.
-pub fn end(asked: Asked) {
-    let conversation = asked.conversation();
+pub fn end(origin: Origin) {
+    let conversation = origin.conversation();
     // Fails if another conversation's snapshot is active by now.
     let _ = SNAPSHOT_FOR.compare_exchange(conversation, 0, Ordering::Relaxed, Ordering::Relaxed);
 }
@@ -105,8 +105,8 @@ impl Outgoing {
         let Some(Sending { taken, .. }) = self.0.take() else {
             return;
         };
-        end(taken.asked);
-        if let Some(id) = taken.asked.id() {
+        end(taken.origin);
+        if let Some(id) = taken.origin.id() {
             outbox::reply(id, Outcome::NotRead);
         }
     }
@@ -114,8 +114,8 @@ impl Outgoing {
     /// Returns the header, then the parts, then the reply; `None` without a snapshot.
     fn message(&mut self) -> Option<DeviceMessage> {
         let sending = self.0.as_mut()?;
-        let asked = sending.taken.asked;
-        let Some(id) = asked.id() else {
+        let origin = sending.taken.origin;
+        let Some(id) = origin.id() else {
             self.0 = None;
             return None;
         };
@@ -126,7 +126,7 @@ impl Outgoing {
         let bytes = part(offset as usize);
         if bytes.is_empty() {
             self.0 = None;
-            end(asked);
+            end(origin);
             let outcome = Outcome::Done;
             return Some(DeviceMessage::Reply(Reply { id, outcome }));
         }

@@ -16,7 +16,7 @@ use crate::bands::{BAND_BYTES, SHAPE};
 use crate::block_move::{BlockMove, End};
 use crate::camera::{HEIGHT, WIDTH};
 use crate::outbox;
-use crate::session::Asked;
+use crate::session::Origin;
 use crate::snapshot::{self, FRAME_BYTES, Taken};
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::{Duration, Instant};
@@ -35,7 +35,7 @@ pub struct SnapshotCopy {
 }
 
 struct Wanted {
-    asked: Asked,
+    origin: Origin,
     deadline: Instant,
     /// Number of bands of the current frame that were kept, including the one being copied; `None`
     /// after a missed band.
@@ -53,9 +53,9 @@ impl SnapshotCopy {
     }
 
     /// Keeps the next whole frame. A previous request is dropped.
-    pub fn begin(&mut self, asked: Asked) {
+    pub fn begin(&mut self, origin: Origin) {
         self.wanted = Some(Wanted {
-            asked,
+            origin,
             deadline: Instant::now() + PATIENCE,
             kept: None,
         });
@@ -106,17 +106,17 @@ impl SnapshotCopy {
             threshold,
             bytes: FRAME_BYTES as u32,
         };
-        let asked = wanted.asked;
-        snapshot::send(Taken { asked, header });
+        let origin = wanted.origin;
+        snapshot::send(Taken { origin, header });
     }
 
     /// Gives up after the deadline.
     pub fn give_up(&mut self) {
-        let Some(Wanted { asked, .. }) = self.wanted.take() else {
+        let Some(Wanted { origin, .. }) = self.wanted.take() else {
             return;
         };
-        snapshot::end(asked);
-        if let Some(id) = asked.id() {
+        snapshot::end(origin);
+        if let Some(id) = origin.id() {
             outbox::reply(id, Outcome::NoGoodFrames);
         }
     }
