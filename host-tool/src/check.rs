@@ -2,10 +2,11 @@
 
 use crate::device::{Device, seconds};
 use crate::output::{self, note};
-use crate::tally::Tally;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
+use hivtac_host::reply::log_text;
+use hivtac_host::tally::Tally;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use serde::Serialize;
 use std::collections::BTreeMap;

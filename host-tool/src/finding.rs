@@ -2,11 +2,11 @@
 
 use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
+use hivtac_host::marker_fields::MarkerJson;
 use hivtac_host::shown::to_json;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
-use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
@@ -40,30 +40,6 @@ struct BlobJson {
     y0: u16,
     x1: u16,
     y1: u16,
-}
-
-/// A marker: its number, its centroid and its pixels in the mask.
-#[derive(Serialize)]
-pub struct MarkerJson {
-    id: usize,
-    x: f64,
-    y: f64,
-    area: u32,
-}
-
-impl MarkerJson {
-    /// The markers of a sample.
-    pub fn all(markers: &[Marker]) -> Vec<MarkerJson> {
-        let markers = markers.iter().enumerate();
-        markers
-            .map(|(id, marker)| MarkerJson {
-                id,
-                x: marker.x.to_f64(),
-                y: marker.y.to_f64(),
-                area: marker.area,
-            })
-            .collect()
-    }
 }
 
 impl From<&Blob> for BlobJson {

@@ -1,14 +1,14 @@
 //! Takes a snapshot: one frame as the device captured it, with its pixels.
 
 use crate::failure::{Failure, Kind};
-use crate::link::{Link, judge};
+use crate::reply::judge;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
-use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample, Snapshot, SnapshotPart};
+use hivtac_wire::message::{DeviceMessage, Outcome, Sample, Snapshot, SnapshotPart};
 use std::collections::VecDeque;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Longest time that the device itself waits for a whole frame.
-const DEVICE_PATIENCE: Duration = Duration::from_secs(2);
+pub const DEVICE_PATIENCE: Duration = Duration::from_secs(2);
 /// Samples that are kept until the snapshot's frame number is known: more than arrive meanwhile.
 const SAMPLES_KEPT: usize = 64;
 /// Most columns and rows of a valid frame.
@@ -108,42 +108,11 @@ pub struct Taken {
     pub sample: Option<Sample>,
 }
 
-/// Requests the device's next whole frame and waits for it; all other messages go to `other`. The
-/// longest silence is `patience`, plus the device's own patience before the first message.
-///
-/// # Errors
-/// [`Kind::Refused`] when the device cannot send a frame or does not answer; [`Kind::Lost`] when a
-/// part was damaged on the way; those of [`Link::receive`].
-pub fn take(
-    link: &mut Link,
-    patience: Duration,
-    mut other: impl FnMut(DeviceMessage),
-) -> Result<Taken, Failure> {
-    let id = link.command(Request::Snapshot)?;
-    let mut collected = Collected::default();
-    let mut end = Instant::now() + DEVICE_PATIENCE + patience;
-    while let Some(message) = link.receive(end)? {
-        match message {
-            DeviceMessage::Reply(reply) if reply.id == id => {
-                return collected.whole(reply.outcome);
-            }
-            DeviceMessage::Snapshot(_) | DeviceMessage::SnapshotPart(_) => {
-                end = Instant::now() + patience;
-                collected.add(&message).map_err(|why| damaged(&why))?;
-            }
-            message => {
-                if let DeviceMessage::Sample(sample) = &message {
-                    collected.remember(sample.clone());
-                }
-                other(message);
-            }
-        }
-    }
+/// The failure when no part of a snapshot came within `patience`.
+pub fn no_part(patience: Duration) -> Failure {
     let seconds = patience.as_secs_f32();
-    Err(Failure::new(
-        Kind::Refused,
-        format!("no part of the snapshot came for {seconds} s; try again"),
-    ))
+    let message = format!("no part of the snapshot came for {seconds} s; try again");
+    Failure::new(Kind::Refused, message)
 }
 
 fn damaged(why: &str) -> Failure {
@@ -153,27 +122,32 @@ fn damaged(why: &str) -> Failure {
     )
 }
 
-/// The parts received until now.
+/// The parts of a snapshot received until now.
 #[derive(Default)]
-struct Collected {
+pub struct Collected {
     frame: Option<Frame>,
     samples: VecDeque<Sample>,
 }
 
 impl Collected {
-    fn add(&mut self, message: &DeviceMessage) -> Result<(), String> {
-        match (message, &mut self.frame) {
+    /// Adds the snapshot's header or a part.
+    ///
+    /// # Errors
+    /// [`Kind::Lost`] when the snapshot came damaged.
+    pub fn add(&mut self, message: &DeviceMessage) -> Result<(), Failure> {
+        let added = match (message, &mut self.frame) {
             (DeviceMessage::Snapshot(header), None) => {
-                self.frame = Some(Frame::announced(header)?);
-                Ok(())
+                Frame::announced(header).map(|frame| self.frame = Some(frame))
             }
             (DeviceMessage::SnapshotPart(part), Some(frame)) => frame.add(part),
             (DeviceMessage::SnapshotPart(_), None) => Err("its beginning is missing".to_owned()),
             _ => Err("a second one began amid it".to_owned()),
-        }
+        };
+        added.map_err(|why| damaged(&why))
     }
 
-    fn remember(&mut self, sample: Sample) {
+    /// Keeps a sample, which may be that of the frame.
+    pub fn remember(&mut self, sample: Sample) {
         let frame = self.frame.as_ref();
         if frame.is_some_and(|frame| frame.number != sample.frame) {
             return;
@@ -184,8 +158,11 @@ impl Collected {
         self.samples.push_back(sample);
     }
 
-    /// The frame, once the device has sent the last part.
-    fn whole(self, outcome: Outcome) -> Result<Taken, Failure> {
+    /// The frame, once the device has replied.
+    ///
+    /// # Errors
+    /// [`Kind::Refused`] when the device cannot send a frame; [`Kind::Lost`] when it came damaged.
+    pub fn whole(self, outcome: Outcome) -> Result<Taken, Failure> {
         if outcome == Outcome::NoGoodFrames {
             let message = "the device has no whole frame to send: its camera sent none for 2 s; \
                            see what `hivtac info` counts, and check the camera's cable";
@@ -239,7 +216,7 @@ mod tests {
         let mut collected = Collected::default();
         (0..80).for_each(|number| collected.remember(sample(number / 8)));
         for message in messages {
-            collected.add(message)?;
+            collected.add(message).map_err(|it| it.to_string())?;
         }
         let taken = collected.whole(outcome);
         taken.map_err(|failure| failure.to_string())

@@ -1,9 +1,9 @@
 //! Formats one line for each sample: for people, as JSON, or as CSV.
 
-use crate::truth::Truth;
 use hivtac_host::decimal::Decimal;
 use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE};
 use hivtac_host::shown::to_json;
+use hivtac_host::truth::Truth;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;

@@ -1,15 +1,14 @@
 //! A conversation with the device (`docs/wire.md`): hello, commands, messages.
 
 use crate::failure::{Failure, Kind};
+use crate::frame::{Collected, DEVICE_PATIENCE, Taken, no_part};
 use crate::port::{Address, Port};
-use crate::shown::shown;
+use crate::reply::{foreign, judge, name_of, unanswered};
 use crate::stop;
 use hivtac_terms::down::Down;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
-use hivtac_wire::message::{
-    Command, DeviceHello, DeviceMessage, HostMessage, LogLevel, LogLine, Outcome, Request,
-};
+use hivtac_wire::message::{Command, DeviceHello, DeviceMessage, HostMessage, Request};
 use hivtac_wire::version::HelloPrefix;
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
@@ -137,7 +136,7 @@ impl Link {
             stop::check()?;
             match self.decode() {
                 Some(Received::Message(message)) => return Ok(Some(message)),
-                Some(Received::ForeignHello(hello)) => return Err(self.foreign(hello)),
+                Some(Received::ForeignHello(hello)) => return Err(foreign(&self.name, hello)),
                 None => self.read()?,
             }
         }
@@ -175,16 +174,6 @@ impl Link {
         Failure::new(Kind::Lost, message)
     }
 
-    fn foreign(&self, device: HelloPrefix) -> Failure {
-        let host = HelloPrefix::OURS;
-        let message = format!(
-            "the device at {} speaks protocol {} (schema {:#018x}), this tool protocol {} (schema \
-             {:#018x}); use the hivtac and the firmware of one release",
-            self.name, device.protocol, device.schema, host.protocol, host.schema
-        );
-        Failure::new(Kind::Version, message)
-    }
-
     /// Sends a command without waiting for its reply; returns its id.
     pub fn command(&mut self, request: Request) -> Result<u16, Failure> {
         self.last_id = self.last_id.wrapping_add(1);
@@ -213,19 +202,51 @@ impl Link {
         patience: Duration,
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<(), Failure> {
-        let (what, advice) = (name_of(&request), after_silence(&request));
-        let id = self.command(request)?;
+        let (asked, id) = (request.clone(), self.command(request)?);
         let end = Instant::now() + patience;
         while let Some(message) = self.receive(end)? {
             match message {
-                DeviceMessage::Reply(reply) if reply.id == id => return judge(what, reply.outcome),
+                DeviceMessage::Reply(reply) if reply.id == id => {
+                    return judge(name_of(&asked), reply.outcome);
+                }
                 message => other(message),
             }
         }
-        let seconds = patience.as_secs_f32();
-        Err(refused(format!(
-            "the device did not answer \"{what}\" within {seconds} s; {advice}"
-        )))
+        Err(unanswered(&asked, patience))
+    }
+
+    /// Requests the device's next whole frame and waits for it; all other messages go to `other`.
+    /// The longest silence is `patience`, plus the device's own patience before the first message.
+    ///
+    /// # Errors
+    /// [`Kind::Refused`] when the device cannot send a frame or does not answer; [`Kind::Lost`] when
+    /// a part was damaged on the way; those of [`Link::receive`].
+    pub fn snapshot(
+        &mut self,
+        patience: Duration,
+        mut other: impl FnMut(DeviceMessage),
+    ) -> Result<Taken, Failure> {
+        let id = self.command(Request::Snapshot)?;
+        let mut collected = Collected::default();
+        let mut end = Instant::now() + DEVICE_PATIENCE + patience;
+        while let Some(message) = self.receive(end)? {
+            match message {
+                DeviceMessage::Reply(reply) if reply.id == id => {
+                    return collected.whole(reply.outcome);
+                }
+                DeviceMessage::Snapshot(_) | DeviceMessage::SnapshotPart(_) => {
+                    end = Instant::now() + patience;
+                    collected.add(&message)?;
+                }
+                message => {
+                    if let DeviceMessage::Sample(sample) = &message {
+                        collected.remember(sample.clone());
+                    }
+                    other(message);
+                }
+            }
+        }
+        Err(no_part(patience))
     }
 
     /// What the decoder rejected since the device's hello.
@@ -240,124 +261,6 @@ fn is_patience(error: &io::Error) -> bool {
         error.kind(),
         ErrorKind::TimedOut | ErrorKind::WouldBlock | ErrorKind::Interrupted
     )
-}
-
-fn name_of(request: &Request) -> &'static str {
-    match request {
-        Request::GetInfo => "get info",
-        Request::Start => "start",
-        Request::Stop => "stop",
-        Request::SetThreshold(_) => "set threshold",
-        Request::Tare { .. } => "tare",
-        Request::StartWithMarkers => "start with markers",
-        Request::Expose => "expose",
-        Request::Snapshot => "snapshot",
-        Request::Inspect => "inspect",
-        Request::GetSettings => "get settings",
-        Request::SetName(_) => "set name",
-        Request::SetTemporal(_) => "set limits of touch, slip, filter and re-zeroing",
-        Request::SetTare(_) => "set tare",
-        Request::Keep(_) => "keep settings",
-        Request::BeginModel { .. } => "begin model",
-        Request::ModelPart(_) => "model part",
-        Request::UseModel => "use model",
-        Request::UseBuiltInModel => "use built-in model",
-        Request::Reset => "reset",
-        Request::TareAnyway { .. } => "tare",
-        Request::GetHealth => "get health",
-        Request::StartLoader => "start loader",
-        Request::SetCamera(_) => "set the camera",
-        Request::SetContactShape(_) => "set the shape of what presses",
-    }
-}
-
-/// Advice when no reply came. The device may still carry the command out.
-fn after_silence(request: &Request) -> &'static str {
-    match request {
-        Request::Keep(_) => {
-            "it may be writing still and keep them all the same: wait 10 s, see what is kept with \
-             `hivtac settings get`, and try again if it is not"
-        }
-        Request::UseModel | Request::UseBuiltInModel | Request::Reset => {
-            "it may be writing still and do it all the same: wait 10 s, see with `hivtac info` \
-             which model it uses, and try again if it is another one"
-        }
-        _ => {
-            "it may do it all the same: wait 10 s and try again; when it repeats, `hivtac info` \
-             tells whether it restarts"
-        }
-    }
-}
-
-fn refused(message: String) -> Failure {
-    Failure::new(Kind::Refused, message)
-}
-
-/// Turns the outcome of the command `what` into a result.
-///
-/// # Errors
-/// [`Kind::Refused`] with the reason unless the outcome is `Done`.
-pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
-    let why = match outcome {
-        Outcome::Done => return Ok(()),
-        Outcome::InvalidArgument => "an argument is outside its range",
-        Outcome::Unsupported => "its camera does not send that pixel format; choose another",
-        Outcome::Busy => {
-            "it is still busy with an earlier command, perhaps one that was not answered or of \
-             another program: wait 10 s and try again"
-        }
-        Outcome::NotRead => "this computer took no bytes for 0.1 s; is it busy? try again",
-        Outcome::NoCamera => {
-            "its camera does not answer, or is another one; `hivtac bring-up` says what to do"
-        }
-        Outcome::Worn => {
-            "its flash is worn and keeps nothing new; it works on, with what it kept before at \
-             each start"
-        }
-        Outcome::ModelUnusable => {
-            "it cannot use this model file; the one in use goes on, and the device's line above \
-             says why"
-        }
-        Outcome::AnotherSensor => {
-            "the model was made for another sensor, camera or frame; the one in use goes on, and \
-             the device's line above says which"
-        }
-        Outcome::NotAtRest => {
-            "the markers are not where a film at rest has them; take away what touches it, and \
-             check the film's distance"
-        }
-        Outcome::MarkersImplausible => {
-            "the images at rest are not those of four whole, equal markers: one may be covered, \
-             cut, stained or glare; look at the film and its light, and clean it"
-        }
-        Outcome::Touched { looks_like } => {
-            let millinewtons = f64::from(looks_like.0) * 1e-3;
-            &format!(
-                "the film looks touched, by {millinewtons:.1} mN, beside where it rested before, \
-                 when it was calibrated, or as sensors are built; take away what touches it, or \
-                 say --force when nothing does"
-            )
-        }
-        Outcome::Unsteady => {
-            "the markers moved meanwhile; take away what touches or shakes the film"
-        }
-        Outcome::NoGoodFrames => {
-            "not enough good frames came in time; does the camera see all four markers? (hivtac \
-             monitor)"
-        }
-    };
-    Err(refused(format!("the device refused \"{what}\": {why}")))
-}
-
-/// The text of a device's log line, for standard error.
-pub fn log_text(line: &LogLine) -> String {
-    let level = match line.level {
-        LogLevel::Error => "error",
-        LogLevel::Warning => "warning",
-        LogLevel::Info => "info",
-    };
-    let seconds = line.time_us as f64 / 1e6;
-    format!("device, {seconds:.3} s, {level}: {}", shown(&line.text))
 }
 
 #[cfg(test)]
@@ -404,6 +307,7 @@ mod tests {
             came: 0,
             decoded: 0,
             last_id: 0,
+            came: 0,
         };
         link.write(&[1, 2, 3]).unwrap();
         drop(link);

@@ -3,12 +3,11 @@
 mod auto_threshold;
 mod bring_up;
 mod check;
-mod clock;
 mod device;
 mod expose;
 mod finding;
 mod firmware;
-mod focus;
+mod focus_command;
 mod follow;
 mod health;
 mod help;
@@ -21,7 +20,6 @@ mod output;
 mod record;
 mod replay;
 mod request;
-mod ros;
 mod sense;
 #[cfg_attr(
     not(all(feature = "ros2", feature = "foxglove")),
@@ -30,12 +28,13 @@ mod sense;
 mod serve;
 mod set_threshold;
 mod settings;
+#[cfg(test)]
+#[path = "focus/simulated.rs"]
+mod simulated;
 mod snapshot;
-mod tally;
 mod tare;
 mod template;
 mod threshold_command;
-mod truth;
 #[cfg(feature = "twin")]
 mod twin;
 mod update;
@@ -71,7 +70,7 @@ enum Command {
     Update(update::UpdateCommand),
     Expose(expose::ExposeArguments),
     Snapshot(snapshot::SnapshotArguments),
-    Focus(focus::FocusArguments),
+    Focus(focus_command::FocusArguments),
     BringUp(bring_up::BringUpArguments),
     View(view::ViewArguments),
     #[cfg(feature = "twin")]
@@ -99,7 +98,7 @@ impl Command {
             Command::Update(command) => update::run(&command),
             Command::Expose(arguments) => expose::run(&arguments),
             Command::Snapshot(arguments) => snapshot::run(&arguments),
-            Command::Focus(arguments) => focus::run(&arguments),
+            Command::Focus(arguments) => focus_command::run(&arguments),
             Command::BringUp(arguments) => bring_up::run(&arguments),
             Command::View(arguments) => view::run(&arguments),
             #[cfg(feature = "twin")]

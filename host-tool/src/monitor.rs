@@ -4,13 +4,14 @@ use crate::device::{Device, seconds};
 use crate::follow::{RETRY_EVERY, SILENCE, note_connected_again};
 use crate::lines::{Format, Row};
 use crate::output::{self, Reader, note, print};
-use crate::tally::Tally;
-use crate::truth::TruthFile;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
 use hivtac_host::port::Address;
+use hivtac_host::reply::log_text;
 use hivtac_host::stop;
+use hivtac_host::tally::Tally;
+use hivtac_host::truth::TruthFile;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 use std::time::{Duration, Instant};
 

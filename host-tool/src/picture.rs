@@ -10,6 +10,7 @@ use image::{
 use crate::failure::Failure;
 use crate::files::read_at_most;
 use crate::frame::pixels;
+use crate::one_picture::rgb565;
 use crate::raw;
 use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use hivtac_terms::threshold::PixelFormat;
@@ -172,11 +173,6 @@ fn size(path: &str, width: u32, height: u32) -> Result<(u16, u16), Failure> {
              {MAX_HEIGHT} px of the largest frame; scale it down, for example to 640 px wide"
         ))),
     }
-}
-
-fn rgb565([red, green, blue]: [u8; 3]) -> u16 {
-    let round = |level: u8, highest: u16| (u16::from(level) * highest + 127) / 255;
-    round(red, 31) << 11 | round(green, 63) << 5 | round(blue, 31)
 }
 
 #[cfg(test)]

@@ -2,14 +2,11 @@
 
 use crate::output::note;
 use hivtac_host::failure::Failure;
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
+use hivtac_host::reply::{KEEP_PATIENCE, log_text};
 use hivtac_wire::message::{DeviceMessage, Request};
 use hivtac_wire::settings::Selection;
 use std::time::Duration;
-
-/// Longest time for keeping settings: erasing a sector takes 1 to 2 s and is repeated for a worn
-/// one.
-pub const KEEP_PATIENCE: Duration = Duration::from_secs(20);
 
 /// Keeps the selected settings through restarts.
 ///

@@ -7,21 +7,17 @@ use clap::Args;
 use hivtac_host::contact_shape;
 use hivtac_host::failure::Failure;
 use hivtac_host::files::read_at_most;
+use hivtac_host::one_picture::{Sensor, measure, settings};
 use hivtac_host::picture::Picture;
 use hivtac_host::stop;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::rest::Rest;
-use hivtac_sensor::markers::screen::ScreenedTable;
 use hivtac_sensor::markers::settings::Settings;
-use hivtac_sensor::pipeline;
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::threshold::{ByteOrder, HsvBox};
-
-/// The sensing with the table type that is fastest on a computer.
-type Sensor<'m> = pipeline::Sensor<'m, 64, ScreenedTable>;
+use hivtac_terms::geometry::Preset;
+use hivtac_terms::threshold::HsvBox;
 
 /// The model that is built into the firmware.
 static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
@@ -148,13 +144,7 @@ impl<'a> Bench<'a> {
             }
             sensor.set_tare(Some(tare.rest), Drift::UNSEEN);
         }
-        let mut measurement = sensor.measure_frame(&picture.pixels);
-        // What the threshold finds, whether or not the sensing looks again.
-        let blobs = sensor.blobs().to_vec();
-        if let Some(again) = sensor.look_again() {
-            sensor.push_rows(&picture.pixels);
-            measurement = sensor.finish_again(again);
-        }
+        let (blobs, measurement) = measure(&mut sensor, &picture.pixels);
         let finding = Finding::new(path, sensor.settings(), &blobs, measurement);
         Ok(if self.arguments.json {
             finding.json()
@@ -212,23 +202,10 @@ impl<'a> Bench<'a> {
         Ok(sensor)
     }
 
-    /// The model's conditions, changed by the arguments. For a picture of another size the preset's
-    /// focal length is scaled with it.
+    /// The conditions of a picture, changed by the arguments.
     fn settings(&self, picture: &Picture) -> Settings {
-        let mut settings = self.model.conditions.settings(ByteOrder::Native);
-        let conditions = &self.model.conditions;
-        let size = (conditions.geometry.width, conditions.geometry.height);
-        if self.arguments.preset.is_some() || size != (picture.width, picture.height) {
-            let preset = self.arguments.preset.unwrap_or(conditions.preset);
-            let geometry = Geometry::preset(preset, picture.width, picture.height);
-            let usual = Settings::usual(geometry, ByteOrder::Native);
-            settings = Settings {
-                threshold: settings.threshold,
-                dilations: settings.dilations,
-                centroid: settings.centroid,
-                ..usual
-            };
-        }
+        let size = [picture.width, picture.height];
+        let mut settings = settings(&self.model, self.arguments.preset, size);
         settings.threshold = match self.arguments.threshold {
             Some(hsv_box) => hsv_box.into(),
             None => settings.threshold,

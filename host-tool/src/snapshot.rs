@@ -1,15 +1,15 @@
 //! `hivtac snapshot`: writes one frame, as the sensing saw it, into files.
 
 use crate::device::Device;
-use crate::finding::MarkerJson;
 use crate::lines::status_text;
 use crate::output;
 use crate::request::show_log;
 use clap::Args;
 use hivtac_host::failure::Failure;
-use hivtac_host::frame::{Frame, Taken, take};
+use hivtac_host::frame::{Frame, Taken};
 use hivtac_host::link::Link;
 use hivtac_host::look;
+use hivtac_host::marker_fields::MarkerJson;
 use hivtac_host::picture::{Channels, encode};
 use hivtac_host::raw;
 use hivtac_host::threshold;
@@ -67,7 +67,7 @@ pub fn run(arguments: &SnapshotArguments) -> Result<(), Failure> {
 /// Takes one frame with its sample and its markers. Samples flow only until it is complete.
 pub fn snapshot(link: &mut Link, patience: Duration) -> Result<Taken, Failure> {
     link.request(Request::StartWithMarkers, patience, show_log)?;
-    let taken = take(link, patience, show_log)?;
+    let taken = link.snapshot(patience, show_log)?;
     link.request(Request::Stop, patience, show_log)?;
     Ok(taken)
 }

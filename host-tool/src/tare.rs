@@ -5,6 +5,7 @@ use crate::output;
 use crate::request::{keep, show_log};
 use clap::Args;
 use hivtac_host::failure::Failure;
+use hivtac_host::usual_tare::{TARE_FRAMES, TARE_PATIENCE, taken_over};
 use hivtac_wire::message::{DeviceMessage, Request};
 use hivtac_wire::settings::{Moved, Selection, TareReport};
 use serde::Serialize;
@@ -13,11 +14,6 @@ use std::time::Duration;
 
 /// Longest time between two frames; an emulated device is slower than a real one.
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
-/// Time for a tare in addition to its frames.
-pub const TARE_PATIENCE: Duration = Duration::from_secs(10);
-/// Good frames that a tare averages by default.
-const TARE_FRAMES: u16 = 32;
-
 /// Take the present position of the film as its rest position, until the device restarts
 ///
 /// Refused while something moves, or touches the film as the tare from before tells. Says where
@@ -66,17 +62,6 @@ struct MovedPx {
     turn_deg: f64,
     larger: f64,
     beside_px: f64,
-}
-
-/// The default tare: the request, the longest time it may take, and the message when it is done.
-pub fn usual_tare(patience: Duration) -> (Request, Duration, String) {
-    let frames = TARE_FRAMES;
-    let done = taken_over(frames);
-    (Request::Tare { frames }, patience.max(TARE_PATIENCE), done)
-}
-
-fn taken_over(frames: u16) -> String {
-    format!("tare taken over {frames} frames")
 }
 
 /// Takes the mean of the next good frames as the rest position, and prints the result.

@@ -1,6 +1,6 @@
 //! Reads the true force of each frame and its place from a simulated sensor's log, by frame number.
 
-use hivtac_host::failure::Failure;
+use crate::failure::Failure;
 use serde::{Deserialize, Serialize};
 use std::collections::HashMap;
 use std::fs::File;

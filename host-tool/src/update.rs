@@ -4,11 +4,12 @@ use crate::device::Device;
 use crate::firmware::{self, FirmwareArguments};
 use crate::info;
 use crate::output;
-use crate::request::{KEEP_PATIENCE, send, show_log};
+use crate::request::{send, show_log};
 use clap::{Args, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
+use hivtac_host::reply::KEEP_PATIENCE;
 use hivtac_host::shown::shown;
 use hivtac_sensor::force::model::Model;
 use hivtac_wire::message::{

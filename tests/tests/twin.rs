@@ -153,7 +153,7 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
             camera,
             words: exposed(&scene, lines[&u64::from(sample.frame)]),
         };
-        twin.0.frame(&frame, nth == 0, sample.time_us);
+        twin.0.frame(&frame, nth == 0, || sample.time_us);
         let Some(DeviceMessage::Sample(own)) = twin.0.message() else {
             panic!("a sample comes of each frame");
         };

@@ -6,8 +6,8 @@ use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
 use hivtac_host::contact_shape;
 use hivtac_host::down::direction;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::frame;
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
+use hivtac_host::reply::log_text;
 use hivtac_host::look;
 use hivtac_host::named;
 use hivtac_host::port::Address;
@@ -219,7 +219,7 @@ impl Connection {
     ) -> PyResult<(u32, f64, u16, u16, Bound<'py, PyBytes>)> {
         let patience = self.patience;
         let frame = self.with(py, move |link, others| {
-            Ok(frame::take(link, patience, others)?.frame)
+            Ok(link.snapshot(patience, others)?.frame)
         })?;
         let levels = PyBytes::new(py, &look::levels(&frame));
         let time_s = frame.time_us as f64 / 1e6;

@@ -1,8 +1,8 @@
 //! Finds the threshold that separates dots from film.
 
 use super::levels::{Histogram, Scale};
-use crate::focus::checks::{DARKEST_VALUES, advice};
-use crate::focus::seen::{NotSeen, Spot, found_by_sensing};
+use hivtac_host::focus::checks::{DARKEST_VALUES, advice};
+use hivtac_host::focus::seen::{NotSeen, Spot, found_by_sensing};
 use hivtac_host::frame::Frame;
 use hivtac_terms::hsv::Hsv;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};

@@ -7,13 +7,13 @@ mod levels;
 mod tests;
 
 use crate::device::Device;
-use crate::focus::four_dots;
 use crate::output::print;
 use crate::set_threshold::set_threshold;
 use crate::snapshot::snapshot;
 use clap::Args;
 use find::{Found, find};
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::focus::four_dots;
 use hivtac_host::frame::Frame;
 use hivtac_host::look::{self, PASSED};
 use hivtac_host::shown::to_json;

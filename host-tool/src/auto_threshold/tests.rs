@@ -3,7 +3,7 @@
 use super::find::{Levels, find, limit};
 use super::levels::Scale;
 use super::*;
-use crate::focus::tests::{device, frame};
+use crate::simulated::{device, frame};
 use hivtac_terms::threshold::{HsvBox, Mono, Yuv422};
 use hivtac_twin::{Format, Options as Scene, Paint, Patch};
 use hivtac_wire::message::{ModelIdentity, ModelSource};

@@ -2,7 +2,7 @@
 
 use crate::output::note;
 use crate::request::show_log;
-use hivtac_host::link::log_text;
+use hivtac_host::reply::log_text;
 use hivtac_wire::message::{DeviceMessage, LogLevel};
 
 /// Shows a line that the device logs, and keeps it if it is a warning or an error.

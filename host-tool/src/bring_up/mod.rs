@@ -14,11 +14,11 @@ mod samples;
 mod tests;
 
 use crate::device::Device;
-use crate::focus::{Focus, four_dots};
 use crate::output::print;
 use crate::snapshot::snapshot;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::focus::{Focus, four_dots};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::stop;

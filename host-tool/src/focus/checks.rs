@@ -4,7 +4,7 @@
 //! `docs/building-a-sensor.md` has the same limits for a builder.
 
 use super::seen::{Marker, NotSeen, Seen};
-use hivtac_host::frame::Frame;
+use crate::frame::Frame;
 use hivtac_terms::threshold::Threshold;
 use serde::Serialize;
 

@@ -1,52 +1,20 @@
-//! `hivtac focus`: checks picture after picture, until everything about them is right.
+//! Checks a picture: how sharp, bright and well placed its markers are.
 
 pub mod checks;
 mod rim;
 pub mod seen;
 #[cfg(test)]
-pub mod tests;
+mod simulated;
+#[cfg(test)]
+mod tests;
 
-use crate::device::Device;
-use crate::output::{self, Reader};
-use crate::snapshot::snapshot;
+use crate::failure::{Failure, Kind};
+use crate::frame::Frame;
 use checks::{Check, advice, checks};
-use clap::Args;
-use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::frame::Frame;
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_wire::message::DeviceHello;
 use seen::look;
 use serde::Serialize;
-
-/// Show how sharp, bright and well placed the markers are, until all is right
-///
-/// Picture after picture: the width of each marker's rim and of the marker, its colour and
-/// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
-/// everything is right.
-///
-/// Example: hivtac focus
-#[derive(Args)]
-pub struct FocusArguments {
-    #[command(flatten)]
-    device: Device,
-    /// One JSON object a picture
-    #[arg(long)]
-    json: bool,
-}
-
-/// Shows the checks of each picture, until all are right or the program is interrupted.
-pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
-    let (mut link, hello) = arguments.device.connect()?;
-    four_dots(&hello)?;
-    loop {
-        let taken = snapshot(&mut link, arguments.device.timeout)?;
-        let focus = Focus::of(&taken.frame, &hello);
-        let reader = output::report(arguments.json, &focus, || focus.text())?;
-        if reader == Reader::Gone || focus.right {
-            return Ok(());
-        }
-    }
-}
 
 /// Refuses a device whose model is for other dots than four in a square: what looks at pictures
 /// here knows these alone.

@@ -1,8 +1,8 @@
 //! Measures the four markers in a frame: their edges, colours and pattern.
 
 use super::rim::{Edge, Field, edge};
-use hivtac_host::frame::Frame;
-use hivtac_host::look;
+use crate::frame::Frame;
+use crate::look;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::geometry::{Geometry, Preset};

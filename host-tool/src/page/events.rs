@@ -1,15 +1,9 @@
 //! Sends samples and states as Server-Sent Events for as long as the browser reads.
 
-use super::feed::{Cursor, Feed, News};
-use super::lights;
+use super::feed::{Cursor, Feed};
 use super::response::{EVENTS, begin};
-use crate::force_fields::{FORCE, PLACE};
-use crate::shown::to_json;
+use super::rows::{self, Event};
 use crate::stop;
-use hivtac_terms::force::Force;
-use hivtac_wire::message::Sample;
-use serde::Serialize;
-use serde_json::{Value, json};
 use std::io::{self, Write};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -30,22 +24,14 @@ pub fn stream(
     begin(out, EVENTS)?;
     let mut readers: Vec<(&Feed, Cursor)> =
         feeds.iter().map(|feed| (&**feed, feed.begin())).collect();
-    let mut text = event(
-        "hello",
-        &Hello {
-            sensors: feeds.len(),
-            obeys,
-            presses,
-            lights: lights::all(),
-        },
-    );
+    let mut text = text_of(&[rows::hello(feeds.len(), obeys, presses)]);
     let mut said = Instant::now();
     while !stop::requested() {
         let mut all_read = true;
         for (sensor, (feed, cursor)) in readers.iter_mut().enumerate() {
             let news = feed.news(cursor);
             all_read &= news.samples.is_empty();
-            text += &told(sensor, &news);
+            text += &text_of(&rows::events(sensor, &news));
         }
         if text.is_empty() && said.elapsed() >= SAY_SOMETHING_EVERY {
             text += ":\n\n";
@@ -66,72 +52,10 @@ pub fn stream(
     Ok(())
 }
 
-/// An event in the stream's format; JSON has no line ends.
-fn event(name: &str, data: &impl Serialize) -> String {
-    format!("event: {name}\ndata: {}\n\n", to_json(data))
-}
-
-fn told(sensor: usize, news: &News) -> String {
-    let mut text = String::new();
-    if let Some(state) = &news.state {
-        text += &format!("event: state\ndata: {{\"sensor\":{sensor},\"state\":{state}}}\n\n");
-    }
-    if !news.truths.is_empty() {
-        let truths = &news.truths;
-        text += &event("truths", &json!({ "sensor": sensor, "truths": truths }));
-    }
-    if !news.samples.is_empty() {
-        let samples = news.samples.iter().map(Row::from).collect();
-        let skipped = news.skipped;
-        text += &event(
-            "samples",
-            &Samples {
-                sensor,
-                skipped,
-                samples,
-            },
-        );
-    }
-    text
-}
-
-/// The stream's first event.
-#[derive(Serialize)]
-struct Hello {
-    sensors: usize,
-    obeys: bool,
-    presses: bool,
-    lights: Vec<lights::Light>,
-}
-
-#[derive(Serialize)]
-struct Samples {
-    sensor: usize,
-    skipped: u64,
-    samples: Vec<Row>,
-}
-
-/// A sample: sequence number, frame, device time (µs), status; then its force or `null`.
-#[derive(Serialize)]
-struct Row(u32, u32, u64, u32, Option<Value>);
-
-impl From<&Sample> for Row {
-    fn from(sample: &Sample) -> Row {
-        Row(
-            sample.sequence,
-            sample.frame,
-            sample.time_us,
-            sample.status.0,
-            sample.force.as_ref().map(force_row),
-        )
-    }
-}
-
-/// Fx, Fy, Fz, |F| and its standard uncertainty; α, β and the direction's standard uncertainty;
-/// then the place or `null`. Integers as in the wire format.
-fn force_row(force: &Force) -> Value {
-    let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.integer(force));
-    let place = force.place.as_ref();
-    let place = place.map(|place| PLACE.map(|it| it.integer(place)));
-    json!([x, y, z, size, size_sigma, alpha, beta, angle_sigma, place])
+/// Events in the stream's format; JSON has no line ends.
+fn text_of(events: &[Event]) -> String {
+    let events = events.iter();
+    events
+        .map(|(name, data)| format!("event: {name}\ndata: {data}\n\n"))
+        .collect()
 }

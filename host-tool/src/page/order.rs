@@ -1,9 +1,17 @@
 //! Orders from the page to a device: read from JSON, passed to the device's thread, and answered.
 
 use super::press::Press;
+use crate::contact_shape;
+use crate::failure::{Failure, Kind};
+use crate::reply::KEEP_PATIENCE;
+use crate::usual_tare::usual_tare;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_wire::message::{DeviceHello, Request};
+use hivtac_wire::settings::Selection;
 use serde::Deserialize;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::time::Duration;
 
 /// What a device must do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,8 +30,67 @@ pub enum Order {
     StopRecording,
     /// Take a frame.
     Picture,
+    /// Set the shape of what presses.
+    Contact(ContactShape),
+    /// Keep the settings in use through restarts.
+    Keep,
     /// Press the film of a simulated sensor, or release it.
     Press(Option<Press>),
+}
+
+/// What an order asks of a device.
+pub struct Asked {
+    /// The command.
+    pub request: Request,
+    /// Longest wait for its reply.
+    pub patience: Duration,
+    /// What is said once it is done.
+    pub done: String,
+}
+
+impl Order {
+    /// The command of an order to the device with this hello, whose replies take up to `patience`;
+    /// `None` for a picture, a recording or a press, which are no single command.
+    ///
+    /// # Errors
+    /// When the device has no model whose threshold it could use.
+    pub fn asked(&self, hello: &DeviceHello, patience: Duration) -> Result<Option<Asked>, Failure> {
+        let (request, patience, done) = match self {
+            Order::Tare => usual_tare(patience),
+            Order::Expose => {
+                let done = "exposure and gain found; take a new tare".to_owned();
+                (Request::Expose, patience, done)
+            }
+            Order::Threshold(wanted) => {
+                let done = "threshold set".to_owned();
+                (Request::SetThreshold(*wanted), patience, done)
+            }
+            Order::ModelThreshold => {
+                let model = hello.model.as_ref();
+                let none = || Failure::new(Kind::Refused, "the device has no usable model");
+                let wanted = model.ok_or_else(none)?.threshold;
+                let done = "threshold of the model set".to_owned();
+                (Request::SetThreshold(wanted), patience, done)
+            }
+            Order::Contact(shape) => {
+                let done = format!("what presses: {}", contact_shape::text(*shape));
+                (Request::SetContactShape(*shape), patience, done)
+            }
+            Order::Keep => {
+                let done = "settings kept through restarts".to_owned();
+                let patience = patience.max(KEEP_PATIENCE);
+                (Request::Keep(Selection::ALL), patience, done)
+            }
+            Order::Record | Order::StopRecording | Order::Picture | Order::Press(_) => {
+                return Ok(None);
+            }
+        };
+        Ok(Some(Asked {
+            request,
+            patience,
+            done,
+        }))
+    }
 }
 
 /// The result of an order.
@@ -65,6 +132,7 @@ struct Written {
     format: Option<String>,
     limits: Option<[u8; 6]>,
     press: Option<[f64; 5]>,
+    contact: Option<String>,
 }
 
 /// Reads an order and the index of its sensor.
@@ -82,6 +150,11 @@ pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
         "press" => Order::Press(Some(press(&written)?)),
         "release" => Order::Press(None),
         "threshold" => Order::Threshold(threshold(&written)?),
+        "contact" => {
+            let shape = written.contact.as_deref().unwrap_or("");
+            Order::Contact(contact_shape::parse(shape)?)
+        }
+        "keep" => Order::Keep,
         _ => return Err("there is no such order".to_owned()),
     };
     Ok((written.sensor, order))

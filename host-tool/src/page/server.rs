@@ -25,7 +25,7 @@ const REQUEST_PATIENCE: Duration = Duration::from_secs(5);
 const ORDER_PATIENCE: Duration = Duration::from_secs(15);
 
 /// The page's files: path, content type and text.
-const FILES: [(&str, &str, &str); 10] = [
+const FILES: [(&str, &str, &str); 14] = [
     ("/", HTML, include_str!("files/index.html")),
     ("/style.css", CSS, include_str!("files/style.css")),
     ("/main.js", SCRIPT, include_str!("files/main.js")),
@@ -36,6 +36,10 @@ const FILES: [(&str, &str, &str); 10] = [
     ("/press.js", SCRIPT, include_str!("files/press.js")),
     ("/picture.js", SCRIPT, include_str!("files/picture.js")),
     ("/threshold.js", SCRIPT, include_str!("files/threshold.js")),
+    ("/paint.js", SCRIPT, include_str!("files/paint.js")),
+    ("/sample.js", SCRIPT, include_str!("files/sample.js")),
+    ("/settings.js", SCRIPT, include_str!("files/settings.js")),
+    ("/source.js", SCRIPT, include_str!("files/source.js")),
 ];
 
 /// A device as the page shows it.

@@ -30,6 +30,8 @@ pub struct Told {
     pub threshold: Limits,
     /// The threshold that the model was made for.
     pub model_threshold: Option<Limits>,
+    /// The shape of what presses, as `hivtac settings` writes it; `None` until the device told it.
+    pub contact: Option<String>,
     /// Samples a second.
     pub rate_hz: Option<f64>,
     /// Number of missing frames and samples.
@@ -116,6 +118,7 @@ impl Told {
             simulated: model.is_some_and(|model| model.simulated),
             threshold: Limits::of(&hello.threshold),
             model_threshold: model.map(|model| Limits::of(&model.threshold)),
+            contact: None,
             rate_hz: None,
             lost: 0,
             causes: BTreeMap::new(),

@@ -1,20 +1,20 @@
 //! `hivtac record`: writes every message of one or several devices into a file.
 
-mod bag;
 mod listen;
 mod table;
 
 pub use listen::Heard;
 
-use crate::clock::now_ns;
 use crate::device::{Devices, seconds};
 use crate::output::{note, print};
-use crate::tally::Tally;
-use bag::Bag;
 use clap::Args;
+use hivtac_host::bag::{Bag, summary_of};
+use hivtac_host::clock::now_ns;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
+use hivtac_host::reply::log_text;
 use hivtac_host::shown::{shown, unit_number};
+use hivtac_host::tally::Tally;
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use listen::{Until, listen};
@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
-use std::io::{IsTerminal, Write};
+use std::io::{BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
@@ -133,7 +133,7 @@ impl Format {
 }
 
 enum Sink {
-    Bag(Box<Bag>),
+    Bag(Box<Bag<BufWriter<File>>>),
     Table(Table),
 }
 
@@ -169,27 +169,6 @@ impl Sensor {
             counts[name] = count.into();
         }
         counts
-    }
-
-    /// The summary that the file holds about it.
-    fn summary(&self, ended: &str, lasted: Duration) -> BTreeMap<String, String> {
-        let counts = self.tally.counts().into_iter();
-        let counts = counts.map(|(name, count)| (name, count.to_string()));
-        let model = self.hello.model.as_ref();
-        let about = [
-            ("unit", self.unit()),
-            ("name", self.hello.name.to_string()),
-            ("ended", ended.to_owned()),
-            ("seconds", format!("{:.3}", lasted.as_secs_f64())),
-            ("board", self.hello.board.to_string()),
-            ("firmware", self.hello.firmware.to_string()),
-            (
-                "model",
-                model.map_or("none", |model| &model.name).to_owned(),
-            ),
-        ];
-        let texts = counts.chain(about);
-        texts.map(|(name, text)| (name.to_owned(), text)).collect()
     }
 }
 
@@ -229,7 +208,8 @@ impl Recording {
         let open = open.map_err(|error| input(&partial, error))?;
         let begun_ns = now_ns();
         let sink = match kind {
-            Format::Mcap => Bag::create(open, hellos, begun_ns).map(|bag| Sink::Bag(Box::new(bag))),
+            Format::Mcap => Bag::create(BufWriter::new(open), hellos, begun_ns)
+                .map(|bag| Sink::Bag(Box::new(bag))),
             Format::Csv => {
                 let model = hellos.first().and_then(|hello| hello.model.as_ref());
                 let markers = model.map_or(LEAST_MARKERS, |model| model.markers.into());
@@ -382,7 +362,9 @@ impl Recording {
             .err()
             .map_or("as asked".to_owned(), ToString::to_string);
         let lasted = begun.elapsed();
-        let summaries = sensors.iter().map(|sensor| sensor.summary(&ended, lasted));
+        let summaries = sensors
+            .iter()
+            .map(|sensor| summary_of(&sensor.hello, &sensor.tally, &ended, lasted));
         let summaries = summaries.collect();
         finish(sink, summaries).map_err(|error| input(&partial, error))?;
         tell_counts();
@@ -405,7 +387,10 @@ impl Recording {
 /// Ends a file, and waits until the disk has it.
 fn finish(sink: Sink, summaries: Vec<BTreeMap<String, String>>) -> Result<(), mcap::McapError> {
     let file: File = match sink {
-        Sink::Bag(bag) => bag.finish(summaries)?,
+        Sink::Bag(bag) => {
+            let writer = bag.finish(summaries)?;
+            writer.into_inner().map_err(|error| error.into_error())?
+        }
         Sink::Table(table) => table.finish()?,
     };
     Ok(file.sync_all()?)

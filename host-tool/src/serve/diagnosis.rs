@@ -1,8 +1,8 @@
 //! Diagnoses a device, for `/diagnostics`.
 
-use crate::ros::{Diagnosis, Level};
-use crate::view::state::State;
+use hivtac_host::page::State;
 use hivtac_host::page::lights::{self, Light};
+use hivtac_host::ros::{Diagnosis, Level};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::status::Status;
 

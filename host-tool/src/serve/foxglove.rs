@@ -2,10 +2,10 @@
 //! can reach the port can read them, but nothing else.
 
 use super::outlet::{Outlet, Served};
-use crate::ros::channel::{Channel, topic_of};
-use crate::ros::{DIAGNOSTICS, Definition};
 use foxglove::{ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};
 use hivtac_host::failure::Failure;
+use hivtac_host::ros::channel::{Channel, topic_of};
+use hivtac_host::ros::{DIAGNOSTICS, Definition};
 use hivtac_host::shown::unit_number;
 use std::net::SocketAddr;
 use std::sync::Arc;

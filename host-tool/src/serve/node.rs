@@ -7,10 +7,10 @@
 use super::outlet::{Outlet, Served};
 use super::sensor::{Answer, TareOrder, Told};
 use crate::output::note;
-use crate::ros::channel::Channel;
-use crate::ros::{DIAGNOSTICS, Definition, trigger_reply, vector_stamped};
 use hivtac_host::down::direction;
 use hivtac_host::failure::Failure;
+use hivtac_host::ros::channel::Channel;
+use hivtac_host::ros::{DIAGNOSTICS, Definition, trigger_reply, vector_stamped};
 use hivtac_host::shown::shown;
 use hivtac_terms::down::Down;
 use ros2_client::dds::rustdds::{DomainParticipantBuilder, RTPSEntity};

@@ -1,7 +1,7 @@
 //! The interface to a program's outlet, which ROS 2 and Foxglove share.
 
 use super::sensor::{TareOrder, Told};
-use crate::ros::channel::{Channel, Frames};
+use hivtac_host::ros::channel::{Channel, Frames};
 use hivtac_wire::message::DeviceHello;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;

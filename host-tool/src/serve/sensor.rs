@@ -1,14 +1,15 @@
 //! The thread of a served device: it passes messages to the outlets, and takes a tare when asked.
 
 use super::diagnosis::diagnose;
-use crate::clock::{LiveClock, now_ns};
 use crate::follow::{Follower, note_connected_again};
 use crate::output::note;
-use crate::ros::Diagnosis;
-use crate::tare::usual_tare;
-use crate::view::state::State;
+use hivtac_host::clock::{LiveClock, now_ns};
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
+use hivtac_host::page::State;
+use hivtac_host::reply::log_text;
+use hivtac_host::ros::Diagnosis;
+use hivtac_host::usual_tare::usual_tare;
 use hivtac_terms::down::Down;
 use hivtac_terms::status::Status;
 use hivtac_wire::decoder::Rejected;

@@ -1,9 +1,7 @@
 //! `hivtac view`: shows a live page in a browser of this computer.
 
 mod owner;
-mod picture;
 mod recorder;
-pub mod state;
 #[cfg(feature = "twin")]
 mod twin;
 

@@ -1,15 +1,11 @@
 //! The thread that communicates with a device for the page: keeps its messages and carries out
 //! orders.
 
-use super::picture;
 use super::recorder::Recorder;
-use super::state::State;
 use crate::follow::{Follower, follow};
-use crate::tare::usual_tare;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::frame::take;
 use hivtac_host::link::Link;
-use hivtac_host::page::{Answer, Feed, Order, Posted};
+use hivtac_host::page::{Answer, Feed, Order, Posted, State, picture};
 use hivtac_host::port::Address;
 use hivtac_wire::decoder::Rejected;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Request};
@@ -125,36 +121,24 @@ impl Owner {
     }
 
     fn try_to(&mut self, link: &mut Link, order: Order) -> Result<Answer, Failure> {
-        let (request, patience, done) = match order {
+        match order {
             Order::Picture => return self.picture(link),
-            // The server presses by itself.
-            Order::Press(_) => return Ok(Answer::Done(String::new())),
             Order::Record => return self.record(link),
             Order::StopRecording => {
                 self.request(link, Request::GetInfo, self.patience)?;
                 return Ok(Answer::Done(self.watched.recorder.end(Ok(()))));
             }
-            Order::Tare => usual_tare(self.patience),
-            Order::Expose => {
-                let done = "exposure and gain found; take a new tare".to_owned();
-                (Request::Expose, self.patience, done)
-            }
-            Order::Threshold(wanted) => {
-                let done = "threshold set".to_owned();
-                (Request::SetThreshold(wanted), self.patience, done)
-            }
-            Order::ModelThreshold => {
-                let model = self.watched.state.hello.model.as_ref();
-                let none = || Failure::new(Kind::Refused, "the device has no usable model");
-                let wanted = model.ok_or_else(none)?.threshold;
-                let done = "threshold of the model set".to_owned();
-                (Request::SetThreshold(wanted), self.patience, done)
-            }
+            _ => {}
+        }
+        let Some(asked) = order.asked(&self.watched.state.hello, self.patience)? else {
+            // The server presses by itself.
+            return Ok(Answer::Done(String::new()));
         };
-        self.request(link, request, patience)?;
+        self.request(link, asked.request, asked.patience)?;
         // The values now in use, from the device.
         self.request(link, Request::GetInfo, self.patience)?;
-        Ok(Answer::Done(done))
+        self.request(link, Request::GetSettings, self.patience)?;
+        Ok(Answer::Done(asked.done))
     }
 
     /// Begins a file with the device's counters.
@@ -173,7 +157,7 @@ impl Owner {
 
     fn picture(&mut self, link: &mut Link) -> Result<Answer, Failure> {
         let watched = &mut self.watched;
-        let taken = take(link, self.patience, |message| watched.message(message))?;
+        let taken = link.snapshot(self.patience, |message| watched.message(message))?;
         let hello = self.watched.state.hello.clone();
         Ok(Answer::Picture(Box::new(move || {
             picture::bytes(&taken, &hello)
@@ -204,6 +188,11 @@ impl Follower for Owner {
     fn turn(&mut self, mut link: Option<&mut Link>) -> Result<bool, Failure> {
         self.watched.tell_now_and_then();
         let mut is_asked = false;
+        if let Some(link) = &mut link
+            && self.watched.state.contact_shape.is_none()
+        {
+            self.request(link, Request::GetSettings, self.patience)?;
+        }
         while let Ok(posted) = self.orders.try_recv() {
             match &mut link {
                 Some(link) => self.obey(link, posted)?,

@@ -51,13 +51,7 @@ fn touch(press: Press) -> Touch {
     }
 }
 
-/// The true press of a frame in the integers of the wire format.
 fn truth(told: &Told) -> Truth {
-    let thousandths = |value: f64| (1e3 * value).round() as i64;
-    let force = told.truth.force;
-    let [x, y, z] = force.vector_n();
-    let newtons = [x, y, z, force.magnitude_n()].map(|part| thousandths(1e3 * part));
-    let angles = [force.alpha_deg(), force.beta_deg()].map(thousandths);
-    let place = told.truth.touches_mm.map(|place| place.map(thousandths));
+    let (newtons, angles, place) = told.integers();
     Truth(told.frame, newtons, angles, place)
 }

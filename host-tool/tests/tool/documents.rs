@@ -1,7 +1,7 @@
 //! Tests that `docs/troubleshooting.md` names every fault, with what to do.
 
 use hivtac_host::failure::Kind;
-use hivtac_host::link::judge;
+use hivtac_host::reply::judge;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Outcome;
 use hivtac_wire::usb::{PRODUCT_ID, VENDOR_ID};

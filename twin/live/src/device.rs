@@ -32,7 +32,6 @@ use hivtac_wire::message::{
 };
 use hivtac_wire::settings::{Found, Name};
 use hivtac_wire::version::HelloPrefix;
-use std::time::Instant;
 use tares::Taring;
 
 /// Name of the board in the hello.
@@ -247,15 +246,15 @@ impl Device {
         self.sensor.forget_frame();
     }
 
-    /// Measures a frame, at a time in µs since the start. `missed` says that frames before it are
-    /// missing.
-    pub fn frame(&mut self, frame: &Captured, missed: bool, now_us: u64) {
+    /// Measures a frame. `missed` says that frames before it are missing, `now` the time in µs since
+    /// the start.
+    pub fn frame(&mut self, frame: &Captured, missed: bool, now: impl Fn() -> u64) {
+        let now_us = now();
         self.now_us = now_us;
         self.stats.frames_exposed = frame.number;
         if frame.camera.pixels != self.sensor.threshold().format() {
             self.change_format(frame);
         }
-        let begun = Instant::now();
         self.sensor.set_down(self.down);
         self.sensor.set_contact_shape(self.contact_shape);
         let measurement = match self.taring.is_none() {
@@ -270,7 +269,7 @@ impl Device {
             time_us,
         };
         let followed = self.sensor.follow(moment, &measurement);
-        self.stats.processing_us = begun.elapsed().as_micros() as u32;
+        self.stats.processing_us = now().saturating_sub(now_us) as u32;
         self.stats.latency_us = now_us.saturating_sub(time_us) as u32;
         self.stats.frames_processed += 1;
         self.stats.uptime_us = now_us;

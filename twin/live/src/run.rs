@@ -1,6 +1,6 @@
 //! The clock: one frame after the other, in real time.
 
-use crate::camera::Kind;
+use crate::camera::{Camera, Kind};
 use crate::device::{Captured, Device};
 use crate::eye::Eye;
 use hivtac_twin::Truth;
@@ -21,6 +21,20 @@ pub struct Told {
     pub time_us: u64,
     /// The truth.
     pub truth: Truth,
+}
+
+impl Told {
+    /// The press in the integers of the wire format: Fx, Fy, Fz and |F|, µN; α and β, thousandths of
+    /// a degree; and the place, µm along x and y, or `None` without a press.
+    pub fn integers(&self) -> ([i64; 4], [i64; 2], Option<[i64; 2]>) {
+        let thousandths = |value: f64| (1e3 * value).round() as i64;
+        let force = self.truth.force;
+        let [x, y, z] = force.vector_n();
+        let newtons = [x, y, z, force.magnitude_n()].map(|part| thousandths(1e3 * part));
+        let angles = [force.alpha_deg(), force.beta_deg()].map(thousandths);
+        let place = self.truth.touches_mm.map(|place| place.map(thousandths));
+        (newtons, angles, place)
+    }
 }
 
 /// A device that several threads share, and its clock.
@@ -75,10 +89,9 @@ impl Shared {
     }
 }
 
-/// The camera's clock and its view.
+/// The camera's clock and its view, without a thread: whoever runs it waits.
 #[derive(Debug)]
-pub struct Clock {
-    shared: Shared,
+pub struct Frames {
     eye: Eye,
     number: u32,
     /// When the next frame begins, µs.
@@ -86,75 +99,109 @@ pub struct Clock {
     missed: bool,
 }
 
-impl Clock {
-    /// A camera that looks from now on.
-    pub fn new(shared: Shared, mut eye: Eye) -> Clock {
-        let camera = shared.act(|device| {
-            device.set_light(eye.light());
-            device.camera()
-        });
+/// What is to do at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Due {
+    /// The next frame is whole in so many µs.
+    In(u64),
+    /// A frame is whole, after so many that came too late to be taken.
+    Now(u32),
+}
+
+impl Frames {
+    /// A camera that looks from `now_us` on, with the settings of `camera`.
+    pub fn new(mut eye: Eye, camera: &Camera, now_us: u64) -> Frames {
         // The film's tables are read at their first use, which takes as long as many frames.
-        eye.shot(&camera, 0, 0.0);
-        let begins_us = shared.now_us();
-        Clock {
-            shared,
+        eye.shot(camera, 0, 0.0);
+        Frames {
             eye,
             number: 1,
-            begins_us,
+            begins_us: now_us,
             missed: false,
         }
     }
 
-    /// Takes frames in real time until `stop` says so. `tell` hears of each frame's true press
-    /// before its sample can be read.
-    pub fn run(&mut self, stop: impl Fn() -> bool, mut tell: impl FnMut(Told)) {
-        while !stop() {
-            let frame_us = u64::from(self.shared.device().camera().frame_us());
-            // A frame is whole when the next one begins.
-            let due_us = self.begins_us + frame_us;
-            let now_us = self.shared.now_us();
-            if now_us < due_us {
-                let wait = Duration::from_micros(due_us - now_us);
-                std::thread::sleep(wait.min(LONGEST_SLEEP));
-                continue;
-            }
-            let late = (now_us - due_us) / frame_us;
-            if late > LATE {
-                self.leave_out(late, frame_us);
-            }
-            self.take(&mut tell);
+    /// What is to do. Frames that came too late are left out, and must be counted.
+    pub fn due(&mut self, camera: &Camera, now_us: u64) -> Due {
+        let frame_us = u64::from(camera.frame_us());
+        // A frame is whole when the next one begins.
+        let due_us = self.begins_us + frame_us;
+        if now_us < due_us {
+            return Due::In(due_us - now_us);
         }
-    }
-
-    fn leave_out(&mut self, frames: u64, frame_us: u64) {
-        self.shared.act(|device| device.missed(frames as u32));
-        self.number = self.number.wrapping_add(frames as u32);
-        self.begins_us += frames * frame_us;
+        let late = (now_us - due_us) / frame_us;
+        if late <= LATE {
+            return Due::Now(0);
+        }
+        self.number = self.number.wrapping_add(late as u32);
+        self.begins_us += late * frame_us;
         self.missed = true;
+        Due::Now(late as u32)
     }
 
-    /// Takes a frame and measures it.
-    fn take(&mut self, tell: &mut impl FnMut(Told)) {
-        let camera = self.shared.device().camera();
+    /// Takes the next frame, and the truth in it. Returns, too, whether frames before it are
+    /// missing.
+    pub fn take(&mut self, camera: Camera) -> (Captured, Told, bool) {
         let begun_us = self.begins_us;
         let time_us = begun_us.saturating_add_signed(camera.middle_us().into());
-        let shot = self.eye.shot(&camera, self.number, 1e-6 * time_us as f64);
-        tell(Told {
+        let shot = (self.eye).shot(&camera, self.number, 1e-6 * time_us as f64);
+        let told = Told {
             frame: self.number,
             time_us,
             truth: shot.truth,
-        });
+        };
         let captured = Captured {
             number: self.number,
             begun_us,
             camera,
             words: shot.words,
         };
-        let missed = std::mem::take(&mut self.missed);
-        let shared = &self.shared;
-        shared.act(|device| device.frame(&captured, missed, shared.now_us()));
         self.begins_us += u64::from(camera.frame_us());
         self.number = self.number.wrapping_add(1);
+        (captured, told, std::mem::take(&mut self.missed))
+    }
+}
+
+/// Frames in real time, for a device that several threads share.
+#[derive(Debug)]
+pub struct Clock {
+    shared: Shared,
+    frames: Frames,
+}
+
+impl Clock {
+    /// A camera that looks from now on.
+    pub fn new(shared: Shared, eye: Eye) -> Clock {
+        let camera = shared.act(|device| {
+            device.set_light(eye.light());
+            device.camera()
+        });
+        let mut frames = Frames::new(eye, &camera, 0);
+        frames.begins_us = shared.now_us();
+        Clock { shared, frames }
+    }
+
+    /// Takes frames in real time until `stop` says so. `tell` hears of each frame's true press
+    /// before its sample can be read.
+    pub fn run(&mut self, stop: impl Fn() -> bool, mut tell: impl FnMut(Told)) {
+        while !stop() {
+            let camera = self.shared.device().camera();
+            match self.frames.due(&camera, self.shared.now_us()) {
+                Due::In(wait_us) => {
+                    std::thread::sleep(Duration::from_micros(wait_us).min(LONGEST_SLEEP));
+                }
+                Due::Now(late) => {
+                    if late > 0 {
+                        self.shared.act(|device| device.missed(late));
+                    }
+                    let (captured, told, missed) = self.frames.take(camera);
+                    tell(told);
+                    let now = || self.shared.now_us();
+                    self.shared
+                        .act(|device| device.frame(&captured, missed, now));
+                }
+            }
+        }
     }
 }
 

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use hivtac_host::link::{Link, log_text};
+use hivtac_host::link::Link;
 use hivtac_host::port::Address;
+use hivtac_host::reply::log_text;
 use hivtac_host::stop;
 use hivtac_wire::message::{DeviceMessage, Request, Sample};
 

@@ -1,6 +1,7 @@
 // Runs the page: one stream of events, one view for each sensor.
 
 import { SensorView } from "./sensor.js";
+import { listen } from "./source.js";
 
 const link = document.getElementById("link");
 const room = document.getElementById("sensors");
@@ -15,22 +16,6 @@ function begin(hello) {
     return view;
   });
   link.textContent = "";
-}
-
-/** Receives the events; a new connection repeats the last half minute. */
-function listen() {
-  const events = new EventSource("events");
-  const on = (name, act) =>
-    events.addEventListener(name, (event) => act(JSON.parse(event.data)));
-  on("hello", begin);
-  on("state", ({ sensor, state }) => views[sensor].state(state));
-  on("truths", ({ sensor, truths }) => views[sensor].truths(truths));
-  on("samples", ({ sensor, skipped, samples }) => views[sensor].samples(samples, skipped));
-  events.onerror = () => {
-    link.textContent = "hivtac has ended or does not answer: start it again, and open the " +
-      "address that it prints";
-    views.forEach((view) => view.gone());
-  };
 }
 
 /** The view that receives a key: the one with the focus, or the first. */
@@ -54,5 +39,14 @@ function draw(now) {
   requestAnimationFrame(draw);
 }
 
-listen();
+listen({
+  hello: begin,
+  state: ({ sensor, state }) => views[sensor].state(state),
+  truths: ({ sensor, truths }) => views[sensor].truths(truths),
+  samples: ({ sensor, skipped, samples }) => views[sensor].samples(samples, skipped),
+  gone: (why) => {
+    link.textContent = why;
+    views.forEach((view) => view.gone());
+  },
+});
 requestAnimationFrame(draw);

@@ -5,6 +5,9 @@ import { Chart } from "./chart.js";
 import { Coverage } from "./coverage.js";
 import { Picture } from "./picture.js";
 import { Press } from "./press.js";
+import { named } from "./sample.js";
+import { Settings } from "./settings.js";
+import { order } from "./source.js";
 import { Threshold } from "./threshold.js";
 
 /** Time for which a light stays on after its last sample, long enough to be read. */
@@ -13,24 +16,6 @@ const CONTACT = 1 << 16;
 const SLIP = 1 << 17;
 /** The direction's uncertainty is that of an angle in a plane: √2 times that along one axis. */
 const ONE_AXIS = Math.SQRT1_2;
-
-/** Converts a sample of the stream to named values in mN, degrees and mm. */
-function named([sequence, frame, timeUs, status, row]) {
-  const sample = { sequence, frame, seconds: timeUs / 1e6, status, force: null };
-  if (row) {
-    const [x, y, z, magnitude, magnitudeSigma, alpha, beta, directionSigma, place] = row;
-    sample.force = {
-      vector: [x / 1e3, y / 1e3, z / 1e3],
-      magnitude: magnitude / 1e3,
-      magnitudeSigma: magnitudeSigma / 1e3,
-      alpha: alpha / 1e3,
-      beta: beta / 1e3,
-      directionSigma: directionSigma / 1e3,
-      place: place && { x: place[0] / 1e3, y: place[1] / 1e3, sigma: place[2] / 1e3 },
-    };
-  }
-  return sample;
-}
 
 /** Standard uncertainties of the components, from those along the force and across it. */
 function sigmas({ vector, magnitude, magnitudeSigma, directionSigma }) {
@@ -55,15 +40,16 @@ export class SensorView {
     this.arrow = new Arrow(this.part("arrow"), this.part("scale"));
     this.size = new Chart(this.part("size"), ["size"], true);
     this.components = new Chart(this.part("components"), ["x", "y", "z"], false);
-    const order = (what, more) => this.order(what, more);
+    const obey = (what, more) => this.order(what, more);
     // A sensor that hivtac-calibrate records takes no orders.
     for (const name of ["buttons", "camera"]) this.part(name).hidden = !obeys;
     this.part("picture-on").checked = obeys;
     this.picture = new Picture(number, (name) => this.part(name));
     this.coverage = new Coverage((name) => this.part(name));
-    this.threshold = new Threshold(this.part("sliders"), order);
+    this.threshold = new Threshold(this.part("sliders"), obey);
+    this.settings = new Settings((name) => this.part(name), obey);
     this.part("truth").hidden = !presses;
-    this.hand = presses ? new Press((name) => this.part(name), order) : null;
+    this.hand = presses ? new Press((name) => this.part(name), obey) : null;
     for (const button of this.element.querySelectorAll("[data-do]")) {
       button.addEventListener("click", () => this.press(button));
     }
@@ -80,16 +66,9 @@ export class SensorView {
 
   /** Sends an order to the device and shows the answer; returns true if it was done. */
   async order(what, more = {}) {
-    const body = JSON.stringify({ sensor: this.number, order: what, ...more });
-    try {
-      const response = await fetch("order", { method: "POST", body });
-      const answer = response.ok ? await response.json() : { text: await response.text() };
-      if (answer.text) this.say("answer", answer.text);
-      return answer.done === true;
-    } catch {
-      this.say("answer", "nothing answers");
-      return false;
-    }
+    const answer = await order(this.number, what, more);
+    if (answer.text) this.say("answer", answer.text);
+    return answer.done === true;
   }
 
   async press(button) {
@@ -159,6 +138,7 @@ export class SensorView {
     const model = state.model_threshold;
     this.say("model-threshold", model ? `the model's: ${model.text}` : "");
     this.threshold.show(state.threshold);
+    this.settings.show(state);
     this.coverage.show(state.coverage);
   }
 

@@ -66,7 +66,7 @@ impl Tested {
             camera,
             words: shot.words,
         };
-        self.device.frame(&frame, false, begun_us + 6_405);
+        self.device.frame(&frame, false, || begun_us + 6_405);
         (frame, self.messages())
     }
 }

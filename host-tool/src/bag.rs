@@ -2,17 +2,18 @@
 //! read. It also holds every message of the device as received, for `hivtac replay`.
 
 use crate::clock::Clock;
+use crate::recording::{HELLO, WIRE, to_hex};
 use crate::ros::channel::{Channel, Frames, messages, topic_of};
 use crate::ros::{self, Definition};
-use hivtac_host::recording::{HELLO, WIRE, to_hex};
-use hivtac_host::shown::unit_number;
+use crate::shown::unit_number;
+use crate::tally::Tally;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use mcap::records::{MessageHeader, Metadata};
 use mcap::{McapResult, WriteOptions, Writer};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufWriter;
+use std::io::{Seek, Write};
+use std::time::Duration;
 
 /// Most bytes of a chunk; a full disk loses at most one chunk at the end.
 const CHUNK: u64 = 1 << 18;
@@ -22,8 +23,8 @@ const TOPICS: usize = Channel::ALL.len() + 1;
 const AS_THEY_CAME: usize = Channel::ALL.len();
 
 /// The file that is being written.
-pub struct Bag {
-    writer: Writer<BufWriter<File>>,
+pub struct Bag<W: Write + Seek> {
+    writer: Writer<W>,
     frames: Frames,
     sensors: Vec<Topics>,
 }
@@ -37,7 +38,7 @@ struct Topics {
 
 impl Topics {
     /// The topics of a device: one for each [`Channel`], and that of its messages as received.
-    fn create(writer: &mut Writer<BufWriter<File>>, hello: &DeviceHello) -> McapResult<Topics> {
+    fn create<W: Write + Seek>(writer: &mut Writer<W>, hello: &DeviceHello) -> McapResult<Topics> {
         let unit = unit_number(&hello.device_id);
         let channels = Channel::ALL.iter();
         let channels =
@@ -74,15 +75,18 @@ struct When {
     stamp_ns: u64,
 }
 
-impl Bag {
+impl<W: Write + Seek> Bag<W> {
     /// Begins a file with the devices' hellos.
-    pub fn create(file: File, hellos: &[DeviceHello], now_ns: u64) -> McapResult<Bag> {
+    ///
+    /// # Errors
+    /// When the file cannot be written, as the other functions.
+    pub fn create(file: W, hellos: &[DeviceHello], now_ns: u64) -> McapResult<Bag<W>> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("hivtac ", env!("CARGO_PKG_VERSION")))
             .chunk_size(Some(CHUNK))
             .compression(None);
-        let mut writer = options.create(BufWriter::new(file))?;
+        let mut writer = options.create(file)?;
         let sensors = hellos
             .iter()
             .map(|hello| Topics::create(&mut writer, hello));
@@ -152,7 +156,7 @@ impl Bag {
 
     /// Ends the file with a summary of each sensor: metadata `hivtac` for one sensor,
     /// `hivtac/unit_NUMBER` for several.
-    pub fn finish(mut self, summaries: Vec<BTreeMap<String, String>>) -> McapResult<File> {
+    pub fn finish(mut self, summaries: Vec<BTreeMap<String, String>>) -> McapResult<W> {
         let is_one = summaries.len() == 1;
         for metadata in summaries {
             let name = match metadata.get("unit").filter(|_| !is_one) {
@@ -162,7 +166,33 @@ impl Bag {
             self.writer.write_metadata(&Metadata { name, metadata })?;
         }
         self.writer.finish()?;
-        let writer = self.writer.into_inner();
-        Ok(writer.into_inner().map_err(|error| error.into_error())?)
+        Ok(self.writer.into_inner())
     }
+}
+
+/// The summary that a file holds about a sensor: its counts, how it `ended`, and how long it
+/// `lasted`.
+pub fn summary_of(
+    hello: &DeviceHello,
+    tally: &Tally,
+    ended: &str,
+    lasted: Duration,
+) -> BTreeMap<String, String> {
+    let counts = tally.counts().into_iter();
+    let counts = counts.map(|(name, count)| (name, count.to_string()));
+    let model = hello.model.as_ref();
+    let about = [
+        ("unit", unit_number(&hello.device_id)),
+        ("name", hello.name.to_string()),
+        ("ended", ended.to_owned()),
+        ("seconds", format!("{:.3}", lasted.as_secs_f64())),
+        ("board", hello.board.to_string()),
+        ("firmware", hello.firmware.to_string()),
+        (
+            "model",
+            model.map_or("none", |model| &model.name).to_owned(),
+        ),
+    ];
+    let texts = counts.chain(about);
+    texts.map(|(name, text)| (name.to_owned(), text)).collect()
 }

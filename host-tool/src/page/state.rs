@@ -1,8 +1,10 @@
 //! The state of a device: identity, connection, rate, losses and latency.
 
+use super::{Recording, Told};
+use crate::contact_shape;
+use crate::reply::log_text;
 use crate::tally::Tally;
-use hivtac_host::link::log_text;
-use hivtac_host::page::{Recording, Told};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLine, Sample, Stats};
 use std::collections::VecDeque;
 
@@ -25,6 +27,8 @@ pub struct State {
     /// The device's newest counters.
     pub stats: Option<Stats>,
     lines: VecDeque<String>,
+    /// The shape of what presses; `None` until the device told its settings.
+    pub contact_shape: Option<ContactShape>,
 }
 
 impl State {
@@ -38,6 +42,7 @@ impl State {
             times_us: VecDeque::new(),
             stats: None,
             lines: VecDeque::new(),
+            contact_shape: None,
         }
     }
 
@@ -51,6 +56,9 @@ impl State {
             }
             DeviceMessage::Hello(hello) => self.hello = hello.clone(),
             DeviceMessage::Log(line) => self.line(line),
+            DeviceMessage::Settings(report) => {
+                self.contact_shape = Some(report.contact_shape);
+            }
             _ => (),
         }
     }
@@ -99,6 +107,7 @@ impl State {
     pub fn json(&self, recording: Recording) -> String {
         let told = Told {
             trouble: self.trouble.clone(),
+            contact: self.contact_shape.map(contact_shape::text),
             rate_hz: self.rate_hz(),
             lost: self.tally.lost(),
             causes: self.tally.causes(),

@@ -1,11 +1,11 @@
 //! Encodes a frame for the page: a line of JSON, then its pixels, then its mask.
 
-use crate::finding::MarkerJson;
+use super::Limits;
 use crate::focus::{Focus, four_dots};
-use hivtac_host::frame::Taken;
-use hivtac_host::look::{self, PASSED};
-use hivtac_host::page::Limits;
-use hivtac_host::shown::to_json;
+use crate::frame::Taken;
+use crate::look::{self, PASSED};
+use crate::marker_fields::MarkerJson;
+use crate::shown::to_json;
 use hivtac_terms::status::Status;
 use hivtac_wire::message::{DeviceHello, Sample};
 use serde::Serialize;
