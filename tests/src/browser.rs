@@ -36,7 +36,15 @@ impl Browser {
     ///
     /// # Errors
     /// If it does not start.
-    pub fn open(address: &str, [width, height]: [u32; 2]) -> Result<Browser> {
+    pub fn open(address: &str, size: [u32; 2]) -> Result<Browser> {
+        Browser::open_after("", address, size)
+    }
+
+    /// The same, with a script that runs before the page's own.
+    ///
+    /// # Errors
+    /// If it does not start.
+    pub fn open_after(script: &str, address: &str, [width, height]: [u32; 2]) -> Result<Browser> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
         let pipes = ["commands", "answers"].map(|name| folder.path().join(name));
         let made = Command::new("mkfifo").args(&pipes).status()?;
@@ -67,7 +75,12 @@ impl Browser {
             last_id: 0,
             _folder: folder,
         };
-        browser.attach(address)?;
+        browser.attach("about:blank")?;
+        browser.call("Page.enable", json!({}))?;
+        let first = json!({ "source": script });
+        browser.call("Page.addScriptToEvaluateOnNewDocument", first)?;
+        let opened = browser.call("Page.navigate", json!({ "url": address }))?;
+        ensure!(opened["errorText"].is_null(), "{address}: {opened}");
         Ok(browser)
     }
 

@@ -28,4 +28,5 @@ mod turned;
 mod twin;
 mod view;
 mod view_twin;
+mod web;
 mod wire_vectors;

@@ -10,7 +10,7 @@ use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
 use serde_json::Value;
 
-const PAGE: [u32; 2] = [1280, 1000];
+pub const PAGE: [u32; 2] = [1280, 1000];
 /// Half the side of the film that the page shows, mm.
 const FILM_MM: f64 = 5.0;
 /// Frames of a press that are compared.
@@ -90,17 +90,23 @@ fn ratios(shown: &Value) -> Vec<f64> {
 fn a_press_by_the_pointer_is_read_within_three_sigma() {
     let view = View::start();
     let mut browser = Browser::open(&view.address, PAGE).unwrap();
+    press(&mut browser, "view-twin.png");
+}
+
+/// Presses the film of a page by the pointer, and compares what is sensed with the truth.
+/// Where `HIVTAC_SCREENSHOTS` says, it keeps a screenshot of this name.
+pub fn press(browser: &mut Browser, screenshot: &str) {
     browser
         .until(&format!("{} && !{}.hidden", part("truth"), part("truth")))
         .unwrap();
-    compared(&mut browser, "truth.magnitude === 0");
-    let at = on_page(&mut browser, [1.5, -1.0]);
+    compared(browser, "truth.magnitude === 0");
+    let at = on_page(browser, [1.5, -1.0]);
     browser.pointer("mousePressed", at, false).unwrap();
     let steady = "truth.magnitude > 99.9 && force !== null";
     let mut all = Vec::new();
     let mut last = 0.0;
     for _ in 0..FRAMES {
-        let shown = compared(&mut browser, &format!("{steady} && frame > {last}"));
+        let shown = compared(browser, &format!("{steady} && frame > {last}"));
         last = shown["frame"].as_f64().unwrap();
         let place = &shown["truth"]["place"];
         for (axis, expected) in [("x", 1.5), ("y", -1.0)] {
@@ -117,17 +123,17 @@ fn a_press_by_the_pointer_is_read_within_three_sigma() {
     );
     // The wheel presses harder, Shift tilts, and the end of the press releases the film.
     browser.wheel(at, -100.0).unwrap();
-    compared(&mut browser, "truth.magnitude > 104.9");
-    let beside = on_page(&mut browser, [2.5, -1.0]);
+    compared(browser, "truth.magnitude > 104.9");
+    let beside = on_page(browser, [2.5, -1.0]);
     browser.pointer("mouseMoved", beside, true).unwrap();
-    let tilted = compared(&mut browser, "truth.alpha > 3.9");
+    let tilted = compared(browser, "truth.alpha > 3.9");
     assert!(
         (tilted["truth"]["place"]["x"].as_f64().unwrap() - 1.5).abs() < 0.05,
         "{tilted}"
     );
     if let Some(folder) = env::var_os("HIVTAC_SCREENSHOTS").map(PathBuf::from) {
-        browser.keep(&folder.join("view-twin.png")).unwrap();
+        browser.keep(&folder.join(screenshot)).unwrap();
     }
     browser.pointer("mouseReleased", beside, false).unwrap();
-    compared(&mut browser, "truth.magnitude === 0");
+    compared(browser, "truth.magnitude === 0");
 }

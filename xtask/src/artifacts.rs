@@ -205,6 +205,17 @@ fn qemu_image_command() -> Command {
     build_for_target("tests/qemu")
 }
 
+/// Builds the WebAssembly module of the page that needs no server.
+pub fn web_module() -> Result<PathBuf> {
+    toolchain::ensure_web_target()?;
+    let mut command = cargo(
+        "rustc --profile web --lib --crate-type cdylib --package",
+        "",
+    );
+    command.args(["hivtac-web", "--target", toolchain::WEB_TARGET]);
+    build(&mut command, "hivtac_web")
+}
+
 /// Builds the plugin that counts instructions, for a version of QEMU's plugin interface.
 pub fn instruction_counter(version: u32) -> Result<PathBuf> {
     let mut command = cargo("build --package xtask --example instruction-counter", "");

@@ -14,6 +14,7 @@ mod report;
 mod size;
 mod test;
 mod toolchain;
+mod web;
 
 use std::process::ExitCode;
 
@@ -37,6 +38,8 @@ enum Task {
     Release(release::Release),
     /// Write the sensor's printed parts: STL, STEP, drawings and pictures (docs/kit.md).
     Kit(kit::Kit),
+    /// Build the page that needs no server: a simulated sensor and a real one in a browser.
+    Web,
 }
 
 fn main() -> ExitCode {
@@ -52,7 +55,7 @@ fn main() -> ExitCode {
 }
 
 fn run(task: Task) -> Result<()> {
-    if !matches!(task, Task::Kit(_)) {
+    if !matches!(task, Task::Kit(_) | Task::Web) {
         toolchain::ensure_target()?;
     }
     match task {
@@ -62,5 +65,6 @@ fn run(task: Task) -> Result<()> {
         Task::Release(release) => release.run(),
         Task::Size => size::memories().map(|table| println!("{table}")),
         Task::Kit(kit) => kit.run(),
+        Task::Web => web::run(),
     }
 }

@@ -12,7 +12,7 @@ use clap::Args;
 use crate::artifacts::{self, Programs};
 use crate::report::{Report, Tally, run_tests};
 use crate::toolchain::{self, cargo};
-use crate::{bench, fuzz, packages, process, python};
+use crate::{bench, fuzz, packages, process, python, web};
 
 /// Options of `cargo xtask test`.
 #[derive(Args)]
@@ -227,6 +227,7 @@ fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
             artifacts::host_program("hivtac-calibrate")?,
         );
         command.env("HIVTAC_CHROMIUM", packages::chromium()?);
+        command.env("HIVTAC_WEB", web::page()?);
     }
     shared.run(command, tally)
 }

@@ -4,13 +4,15 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use crate::debian;
 use crate::process::{self, command};
 
 /// The microcontroller's target: Cortex-M7 with a double-precision FPU.
 const TARGET: &str = "thumbv7em-none-eabihf";
+/// The target of browsers.
+pub const WEB_TARGET: &str = "wasm32-unknown-unknown";
 
 /// A folder or file of the project, by its path from the root.
 pub fn at(name: &str) -> PathBuf {
@@ -81,22 +83,28 @@ pub fn rustc(words: &str) -> Result<String> {
     Ok(said.trim().to_owned())
 }
 
-fn has_target() -> Result<bool> {
-    let folder = rustc(&format!("--print target-libdir --target {TARGET}"))?;
+fn has_target(target: &str) -> Result<bool> {
+    let folder = rustc(&format!("--print target-libdir --target {target}"))?;
     let is_core = |file: std::fs::DirEntry| file.path().display().to_string().contains("/libcore-");
     let files = Path::new(&folder).read_dir();
     Ok(files.is_ok_and(|files| files.flatten().any(is_core)))
 }
 
-/// Adds the target to the current toolchain if missing, without a change of version. If rustup
-/// cannot, Debian's own compiler is chosen for the microcontroller.
-pub fn ensure_target() -> Result<()> {
-    if has_target()? {
-        return Ok(());
+/// Adds a target to the current toolchain if missing, without a change of version; returns whether
+/// it is there then.
+fn add_target(target: &str) -> Result<bool> {
+    if has_target(target)? {
+        return Ok(true);
     }
     let mut add = command("rustup target add");
-    let added = process::run(add.arg(TARGET).env("RUSTUP_AUTO_INSTALL", "0"));
-    if added.is_ok() && has_target()? {
+    let added = process::run(add.arg(target).env("RUSTUP_AUTO_INSTALL", "0"));
+    Ok(added.is_ok() && has_target(target)?)
+}
+
+/// Ensures that the microcontroller's target is there. If rustup cannot add it, Debian's own
+/// compiler is chosen for the microcontroller.
+pub fn ensure_target() -> Result<()> {
+    if add_target(TARGET)? {
         return Ok(());
     }
     process::say(&format!(
@@ -105,6 +113,18 @@ pub fn ensure_target() -> Result<()> {
     debian::choose().with_context(|| {
         format!("no Rust for {TARGET}: run `rustup target add {TARGET}`, or install the packages")
     })
+}
+
+/// Ensures that the target of browsers is there.
+pub fn ensure_web_target() -> Result<()> {
+    let is_there = add_target(WEB_TARGET)?;
+    ensure!(
+        is_there,
+        "rustup cannot add {WEB_TARGET}, which the page needs: run `rustup target add \
+         {WEB_TARGET}`, or, without rustup, install your system's package of that target \
+         (Debian and Ubuntu: libstd-rust-dev-wasm32)"
+    );
+    Ok(())
 }
 
 /// Whether cargo has a command, such as `clippy`.
