@@ -4,7 +4,8 @@ use std::io::Cursor;
 
 use image::codecs::png::PngEncoder;
 use image::{
-    DynamicImage, ExtendedColorType, ImageDecoder, ImageEncoder, ImageFormat, ImageReader,
+    DynamicImage, ExtendedColorType, GrayImage, ImageDecoder, ImageEncoder, ImageFormat,
+    ImageReader,
 };
 
 use crate::failure::Failure;
@@ -15,7 +16,7 @@ use crate::raw;
 use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
 use hivtac_terms::threshold::PixelFormat;
 
-/// A picture in the sensing's format: RGB565 with red in the high bits, or a frame of the device.
+/// A picture in a format of the sensing, or a frame of the device.
 pub struct Picture {
     /// Columns, 1 to [`MAX_WIDTH`].
     pub width: u16,
@@ -23,27 +24,28 @@ pub struct Picture {
     pub height: u16,
     /// Its pixel format.
     pub format: PixelFormat,
-    /// Rows from the top.
+    /// Rows from the top; RGB565 has red in the high bits.
     pub pixels: Vec<u16>,
 }
 
 impl Picture {
-    /// Reads a PNG, JPEG or PPM file, or a raw frame of `hivtac snapshot`, by its content. Levels
-    /// of 8 bits are rounded to the nearest of RGB565.
+    /// Reads a PNG, JPEG, BMP or PPM file, or a raw frame of `hivtac snapshot`, by its content. A
+    /// raw frame has its own format. Any other file is read as mono by its luma if `format` is
+    /// mono; else its levels of 8 bits are rounded to the nearest of RGB565.
     ///
     /// # Errors
     /// When the file cannot be read, has another format, or is larger than a frame can be.
-    pub fn load(path: &str) -> Result<Picture, Failure> {
+    pub fn load(path: &str, format: PixelFormat) -> Result<Picture, Failure> {
         let file = read_at_most(path, LARGEST_FILE).map_err(|error| unreadable(path, &error))?;
         let too_long = || unreadable(path, &format_args!("it has more than {LARGEST_FILE} bytes"));
-        Picture::parse(path, &file.ok_or_else(too_long)?)
+        Picture::parse(path, &file.ok_or_else(too_long)?, format)
     }
 
     /// Reads the bytes of such a file; errors name `path`.
     ///
     /// # Errors
     /// When the bytes have another format, or the picture is larger than a frame can be.
-    pub fn parse(path: &str, file: &[u8]) -> Result<Picture, Failure> {
+    pub fn parse(path: &str, file: &[u8], format: PixelFormat) -> Result<Picture, Failure> {
         if raw::is_one(file) {
             let raw = raw::parse(file).map_err(|error| unreadable(path, &error))?;
             let (width, height) = size(path, raw.width.into(), raw.height.into())?;
@@ -55,12 +57,20 @@ impl Picture {
             });
         }
         let image = decode(path, file)?;
-        let (width, height) = size(path, image.width, image.height)?;
+        let (width, height) = size(path, image.width(), image.height())?;
+        let (format, pixels) = match format {
+            PixelFormat::Mono => (PixelFormat::Mono, mono(&image.into_luma8())),
+            _ => {
+                let image = image.into_rgb8();
+                let pixels = image.pixels().map(|pixel| rgb565(pixel.0));
+                (PixelFormat::Rgb565, pixels.collect())
+            }
+        };
         Ok(Picture {
             width,
             height,
-            format: PixelFormat::Rgb565,
-            pixels: image.pixels.into_iter().map(rgb565).collect(),
+            format,
+            pixels,
         })
     }
 }
@@ -78,24 +88,17 @@ pub enum Channels {
     Colour,
 }
 
-/// A decoded picture, 8 bits a channel.
-struct Rgb {
-    width: u32,
-    height: u32,
-    pixels: Vec<[u8; 3]>,
-}
-
 /// Most bytes of a file that is read. A picture of the largest frame has a fiftieth of it.
 const LARGEST_FILE: u64 = 100 << 20;
 
 /// Decodes a picture and turns it by its EXIF data. Its claimed size is checked against a frame's
 /// before memory is taken.
-fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
+fn decode(path: &str, bytes: &[u8]) -> Result<DynamicImage, Failure> {
     let damaged = |error: image::ImageError| unreadable(path, &error);
     let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format();
     let reader = reader.map_err(|error| unreadable(path, &error))?;
     match reader.format() {
-        None => return Err(unreadable(path, &"it is no PNG, JPEG or PPM file")),
+        None => return Err(unreadable(path, &"it is no PNG, JPEG, BMP or PPM file")),
         Some(ImageFormat::Jpeg) if !is_whole_jpeg(bytes) => {
             return Err(unreadable(path, &"it is cut: a JPEG file without its end"));
         }
@@ -107,12 +110,7 @@ fn decode(path: &str, bytes: &[u8]) -> Result<Rgb, Failure> {
     let orientation = decoder.orientation().map_err(damaged)?;
     let mut image = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     image.apply_orientation(orientation);
-    let image = image.into_rgb8();
-    Ok(Rgb {
-        width: image.width(),
-        height: image.height(),
-        pixels: image.pixels().map(|pixel| pixel.0).collect(),
-    })
+    Ok(image)
 }
 
 /// Whether a JPEG file has its end-of-image marker: decoders paint missing parts grey.
@@ -175,9 +173,54 @@ fn size(path: &str, width: u32, height: u32) -> Result<(u16, u16), Failure> {
     }
 }
 
+/// The rows of a mono camera: two pixels in each `u16`, the left one low.
+fn mono(image: &GrayImage) -> Vec<u16> {
+    let rows = image
+        .rows()
+        .map(|row| row.map(|pixel| pixel.0[0]).collect::<Vec<u8>>());
+    let word = |pair: &[u8]| u16::from_le_bytes([pair[0], *pair.last().unwrap_or(&0)]);
+    rows.flat_map(|row| row.chunks(2).map(word).collect::<Vec<u16>>())
+        .collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A picture of 4 × 2 px in this many bits a pixel; BMP begins with the lowest row.
+    fn bmp() -> Vec<u8> {
+        let row: [[u8; 3]; 4] = [[0, 0, 0], [0, 0, 255], [255, 255, 255], [50, 100, 200]];
+        let rows = [row, [[40; 3]; 4]].concat().concat();
+        let header: [u32; 10] = [40, 4, 2, 24 << 16 | 1, 0, rows.len() as u32, 0, 0, 0, 0];
+        let length = 54 + rows.len() as u32;
+        let file: [u32; 3] = [length, 0, 54];
+        let words = file.iter().chain(&header);
+        let words = words.flat_map(|word| word.to_le_bytes());
+        b"BM".iter().copied().chain(words).chain(rows).collect()
+    }
+
+    #[test]
+    fn a_bmp_is_read_as_colours_and_as_luma() {
+        let colours = Picture::parse("a.bmp", &bmp(), PixelFormat::Rgb565).unwrap();
+        assert_eq!((colours.width, colours.height), (4, 2));
+        assert_eq!(colours.format, PixelFormat::Rgb565);
+        let grey = rgb565([40; 3]);
+        let below = [0, 0xf800, 0xffff, rgb565([200, 100, 50])];
+        assert_eq!(colours.pixels, [[grey; 4], below].concat());
+        let luma = Picture::parse("a.bmp", &bmp(), PixelFormat::Mono).unwrap();
+        assert_eq!(luma.format, PixelFormat::Mono);
+        // 0.2126 R + 0.7152 G + 0.0722 B
+        let pairs = [[40, 40], [40, 40], [0, 54], [255, 118]];
+        assert_eq!(luma.pixels, pairs.map(u16::from_le_bytes));
+    }
+
+    /// Rows of an odd width end with half a pair, as in the sensing.
+    #[test]
+    fn mono_rows_are_pairs_of_pixels() {
+        let image = GrayImage::from_raw(3, 2, vec![1, 2, 3, 4, 5, 6]).unwrap();
+        assert_eq!(mono(&image), [0x0201, 0x0303, 0x0504, 0x0606]);
+        assert_eq!(mono(&image).len(), 2 * PixelFormat::Mono.row_length(3));
+    }
 
     /// A saved frame, with the bits of each channel repeated, is read back unchanged.
     #[test]
@@ -197,7 +240,10 @@ mod tests {
     #[test]
     fn a_picture_that_claims_to_be_huge_takes_no_memory() {
         let file = include_bytes!("../../tests/fuzz/corpus/picture/claims_100_gb");
-        let error = Picture::parse("it.png", file).err().unwrap().to_string();
+        let error = Picture::parse("it.png", file, PixelFormat::Rgb565)
+            .err()
+            .unwrap()
+            .to_string();
         assert!(error.contains("it.png has 8 × 4194303749 px"), "{error}");
     }
 

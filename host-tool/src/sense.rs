@@ -27,8 +27,9 @@ const LARGEST_MODEL: u64 = 16 << 20;
 
 /// Look for markers and force in pictures, with the sensor's own code
 ///
-/// PNG, JPEG, PPM, or a raw frame of `hivtac snapshot`, up to 800 × 800 px. Eight bits a
-/// channel are rounded to RGB565, which is what the sensor's camera delivers. There is a force
+/// PNG, JPEG, BMP, PPM, or a raw frame of `hivtac snapshot`, up to 800 × 800 px. Eight bits a
+/// channel are rounded to RGB565, which is what the sensor's camera delivers; with a mono
+/// camera's model, their luma is taken. There is a force
 /// only when size, preset and threshold are those of the model; the status says so otherwise,
 /// and blobs, markers and features are there all the same.
 ///
@@ -131,7 +132,7 @@ struct Bench<'a> {
 impl<'a> Bench<'a> {
     /// The result for one picture, as text or JSON.
     fn look(&self, path: &str, tare: Option<&Tare>) -> Result<String, Failure> {
-        let picture = Picture::load(path)?;
+        let picture = self.picture(path)?;
         let mut sensor = self.sensor(path, &picture)?;
         if let Some(tare) = tare {
             if tare.size != (picture.width, picture.height) {
@@ -153,9 +154,14 @@ impl<'a> Bench<'a> {
         })
     }
 
+    /// Reads a picture in the format of the model's camera.
+    fn picture(&self, path: &str) -> Result<Picture, Failure> {
+        Picture::load(path, self.model.conditions.threshold.format())
+    }
+
     /// Finds the rest position in a picture.
     fn tare(&self, path: &str) -> Result<Tare, Failure> {
-        let picture = Picture::load(path)?;
+        let picture = self.picture(path)?;
         let mut sensor = self.sensor(path, &picture)?;
         let measurement = sensor.measure_frame(&picture.pixels);
         let rest = TareBuilder::new(1)

@@ -224,6 +224,36 @@ fn png_and_ppm_give_the_same_and_jpeg_is_read() {
     assert_eq!(jpeg["blobs"].as_array().unwrap().len(), 4);
 }
 
+/// A mono camera's model takes grey pictures, and colours by their luma.
+#[test]
+fn a_mono_cameras_model_reads_grey_and_coloured_pictures_by_luma() {
+    const MODEL: &str = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../calibration/models/mt9v034/default.hvtm"
+    );
+    let folder = Folder::new();
+    let scene = Scene::preset("rest", Preset::Mt9v034, 160, 120, 1).unwrap();
+    let colours = photograph(&scene.render_load(&Load::REST, 7).unwrap());
+    let grey = image::DynamicImage::from(colours.clone()).into_luma8();
+    let [grey_path, path] = [
+        folder.path("grey.png"),
+        folder.save("colours.bmp", &colours),
+    ];
+    grey.save(&grey_path).unwrap();
+    let found = [&grey_path, &path].map(|path| {
+        let mut found = json_of(&run(&["sense", "--json", "--model", MODEL, path]));
+        found["image"].take();
+        found
+    });
+    assert_eq!(
+        found[0]["markers"].as_array().unwrap().len(),
+        4,
+        "{}",
+        found[0]
+    );
+    assert_eq!(found[0], found[1]);
+}
+
 /// Decoders paint the missing part of a JPEG file grey.
 #[test]
 fn a_jpeg_that_was_cut_anywhere_is_refused() {
@@ -398,7 +428,7 @@ fn bad_pictures_are_named_and_the_others_looked_at() {
     );
     assert_eq!(
         lines[2],
-        format!("hivtac: cannot read the picture {text}: it is no PNG, JPEG or PPM file")
+        format!("hivtac: cannot read the picture {text}: it is no PNG, JPEG, BMP or PPM file")
     );
     assert!(
         lines[3].starts_with(&format!("hivtac: cannot read the picture {cut}: ")),

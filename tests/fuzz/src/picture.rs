@@ -3,10 +3,11 @@
 
 use hivtac_host::picture::Picture;
 use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
+use hivtac_terms::threshold::PixelFormat;
 
-/// Reads the input as a PNG, JPEG or PPM file, or as a raw frame.
+/// Reads the input as a PNG, JPEG, BMP or PPM file, or as a raw frame.
 pub fn attack(input: &[u8]) -> bool {
-    match Picture::parse("it.png", input) {
+    match Picture::parse("it.png", input, PixelFormat::Rgb565) {
         Ok(picture) => {
             let Picture { width, height, .. } = picture;
             assert!((1..=MAX_WIDTH).contains(&width) && (1..=MAX_HEIGHT).contains(&height));
