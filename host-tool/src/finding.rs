@@ -10,6 +10,10 @@ use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
+/// A picture with a median brightness below the first, of 255, is dark; from the second on, white.
+const DARK: u8 = 20;
+const WHITE: u8 = 240;
+
 /// The markers 0 to 3 of four.
 const CORNERS: [&str; 4] = ["upper left", "upper right", "lower right", "lower left"];
 
@@ -29,6 +33,9 @@ pub struct Finding<'a> {
     focal_px: f64,
     #[serde(skip)]
     overflow: bool,
+    /// Median of the picture's value or luma if nothing passes the threshold.
+    #[serde(skip)]
+    brightness: Option<u8>,
 }
 
 #[derive(Serialize)]
@@ -72,6 +79,7 @@ impl<'a> Finding<'a> {
         settings: &Settings,
         blobs: &[Blob],
         measurement: Measurement,
+        brightness: u8,
     ) -> Finding<'a> {
         let markers = measurement.markers.as_deref().map(|markers| {
             let mut all = MarkerJson::all(markers);
@@ -97,6 +105,7 @@ impl<'a> Finding<'a> {
             status: measurement.status.names().collect(),
             focal_px: settings.geometry.focal.to_f64(),
             overflow: measurement.status.contains(Status::BLOB_OVERFLOW),
+            brightness: (measurement.status.contains(Status::IMAGE_DARK)).then_some(brightness),
         }
     }
 
@@ -129,7 +138,24 @@ impl<'a> Finding<'a> {
             "  status    {}",
             status_text(&self.status, self.force.is_some())
         ));
+        lines.extend(self.brightness_line());
         lines.join("\n")
+    }
+
+    /// Why nothing passes the threshold: the status alone calls each such picture dark.
+    fn brightness_line(&self) -> Option<String> {
+        let brightness = self.brightness?;
+        let why = match brightness {
+            ..DARK => "the picture is dark: cap off, light on",
+            WHITE.. => "the picture is white: less light, and no glare",
+            _ => {
+                "the picture is not dark, but no pixel has the markers' colours: look at the \
+                 light's colour, and at --threshold"
+            }
+        };
+        Some(format!(
+            "            {why} (median brightness {brightness} of 255)"
+        ))
     }
 
     fn blob_lines(&self) -> Vec<String> {

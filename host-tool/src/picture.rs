@@ -14,6 +14,7 @@ use crate::frame::pixels;
 use crate::one_picture::rgb565;
 use crate::raw;
 use hivtac_sensor::markers::scanner::{MAX_HEIGHT, MAX_WIDTH};
+use hivtac_terms::hsv::Hsv;
 use hivtac_terms::threshold::PixelFormat;
 
 /// A picture in a format of the sensing, or a frame of the device.
@@ -72,6 +73,24 @@ impl Picture {
             format,
             pixels,
         })
+    }
+
+    /// Median of the pixels' value (RGB565) or luma, 0 to 255.
+    pub fn brightness(&self) -> u8 {
+        let mut values: Vec<u8> = match self.format {
+            PixelFormat::Rgb565 => {
+                let value = |pixel: &u16| Hsv::from_rgb565(*pixel).value;
+                self.pixels.iter().map(value).collect()
+            }
+            PixelFormat::Yuv422 => self.pixels.iter().map(|pixel| *pixel as u8).collect(),
+            PixelFormat::Mono => self
+                .pixels
+                .iter()
+                .flat_map(|pair| pair.to_le_bytes())
+                .collect(),
+        };
+        let middle = values.len() / 2;
+        *values.select_nth_unstable(middle).1
     }
 }
 
@@ -212,6 +231,7 @@ mod tests {
         // 0.2126 R + 0.7152 G + 0.0722 B
         let pairs = [[40, 40], [40, 40], [0, 54], [255, 118]];
         assert_eq!(luma.pixels, pairs.map(u16::from_le_bytes));
+        assert_eq!([colours.brightness(), luma.brightness()], [41, 40]);
     }
 
     /// Rows of an odd width end with half a pair, as in the sensing.

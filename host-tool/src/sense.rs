@@ -146,7 +146,8 @@ impl<'a> Bench<'a> {
             sensor.set_tare(Some(tare.rest), Drift::UNSEEN);
         }
         let (blobs, measurement) = measure(&mut sensor, &picture.pixels);
-        let finding = Finding::new(path, sensor.settings(), &blobs, measurement);
+        let brightness = picture.brightness();
+        let finding = Finding::new(path, sensor.settings(), &blobs, measurement, brightness);
         Ok(if self.arguments.json {
             finding.json()
         } else {

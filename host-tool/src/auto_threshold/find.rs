@@ -34,6 +34,8 @@ const NEAR: f64 = 4.0;
 const HUE_MARGIN: i16 = 8;
 /// A picture with a median below this, of 255, has no distinguishable colours.
 const DARK: u8 = 20;
+/// From this median on, most of a picture is white.
+const WHITE: u8 = 240;
 
 /// Advice about pale dots.
 const PALE: &str = "use dots of a stronger colour, white light, and no light from outside";
@@ -86,7 +88,6 @@ pub struct Colour {
 /// # Errors
 /// Why the pictures do not separate dots from film, and what to do.
 pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
-    let format = frames[0].format();
     let brightness = brightness(frames);
     if brightness < DARK {
         return Err(format!(
@@ -94,6 +95,18 @@ pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
              switch the light on, then `hivtac expose`"
         ));
     }
+    of_brightness(frames, device, brightness).map_err(|why| match brightness {
+        WHITE.. => format!(
+            "the picture is white (half of it is at least {WHITE} of 255): less light, then \
+             `hivtac expose`; {why}"
+        ),
+        _ => why,
+    })
+}
+
+/// Finds the threshold in pictures that are not dark.
+fn of_brightness(frames: &[Frame], device: &DeviceHello, brightness: u8) -> Result<Found, String> {
+    let format = frames[0].format();
     let scale = Scale::of(format, brightness);
     let pictures: Vec<Picture> = frames.iter().map(|it| Picture::of(it, scale)).collect();
     let span = span(&pictures, device, scale)?;

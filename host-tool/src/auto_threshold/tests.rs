@@ -116,6 +116,8 @@ fn it_follows_the_light() {
 fn what_does_not_separate_is_refused_with_the_reason() {
     let dark = refused(|options| options.gain = 0.05);
     assert!(dark.contains("the picture is dark"), "{dark}");
+    let white = refused(|options| (options.gain, options.haze) = (4.0, 200.0));
+    assert!(white.starts_with("the picture is white"), "{white}");
     let blue = refused(|options| options.markers = Paint::Blue);
     assert!(
         blue.contains("nothing in the picture has another colour"),

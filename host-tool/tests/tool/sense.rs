@@ -254,6 +254,24 @@ fn a_mono_cameras_model_reads_grey_and_coloured_pictures_by_luma() {
     assert_eq!(found[0], found[1]);
 }
 
+/// Nothing passes the threshold in either; what to do is not the same.
+#[test]
+fn a_white_picture_is_not_called_dark() {
+    let folder = Folder::new();
+    for (level, words) in [
+        (255, "the picture is white: less light"),
+        (
+            128,
+            "the picture is not dark, but no pixel has the markers' colours",
+        ),
+        (2, "the picture is dark: cap off"),
+    ] {
+        let image = RgbImage::from_pixel(320, 240, Rgb([level; 3]));
+        let found = run(&["sense", &folder.save("a.png", &image)]);
+        assert!(found.stdout.contains(words), "{found:?}");
+    }
+}
+
 /// Decoders paint the missing part of a JPEG file grey.
 #[test]
 fn a_jpeg_that_was_cut_anywhere_is_refused() {
