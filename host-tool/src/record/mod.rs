@@ -18,6 +18,7 @@ use hivtac_host::tally::Tally;
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use listen::{Until, listen};
+use mcap::McapError;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -218,7 +219,7 @@ impl Recording {
             }
         };
         Ok(Recording {
-            sink: sink.map_err(|error| input(&partial, error))?,
+            sink: sink.map_err(|error| unwritten(&partial, error))?,
             file,
             partial,
             begun: Instant::now(),
@@ -301,7 +302,7 @@ impl Recording {
             Sink::Bag(bag) => bag.message(*sensor, message, came_ns),
             Sink::Table(table) => table.message(message, came_ns).map_err(Into::into),
         };
-        kept.map_err(|error| input(&self.partial, error))
+        kept.map_err(|error| unwritten(&self.partial, error))
     }
 
     /// Writes all messages kept until now to the disk.
@@ -313,7 +314,7 @@ impl Recording {
             Sink::Bag(bag) => bag.flush(),
             Sink::Table(table) => table.flush().map_err(Into::into),
         };
-        flushed.map_err(|error| input(&self.partial, error))
+        flushed.map_err(|error| unwritten(&self.partial, error))
     }
 
     /// The duration and the counts, for a person.
@@ -366,7 +367,7 @@ impl Recording {
             .iter()
             .map(|sensor| summary_of(&sensor.hello, &sensor.tally, &ended, lasted));
         let summaries = summaries.collect();
-        finish(sink, summaries).map_err(|error| input(&partial, error))?;
+        finish(sink, summaries).map_err(|error| unwritten(&partial, error))?;
         tell_counts();
         if is_clean {
             fs::rename(&partial, &file).map_err(|error| input(&file, error))?;
@@ -385,7 +386,7 @@ impl Recording {
 }
 
 /// Ends a file, and waits until the disk has it.
-fn finish(sink: Sink, summaries: Vec<BTreeMap<String, String>>) -> Result<(), mcap::McapError> {
+fn finish(sink: Sink, summaries: Vec<BTreeMap<String, String>>) -> Result<(), McapError> {
     let file: File = match sink {
         Sink::Bag(bag) => {
             let writer = bag.finish(summaries)?;
@@ -394,6 +395,14 @@ fn finish(sink: Sink, summaries: Vec<BTreeMap<String, String>>) -> Result<(), mc
         Sink::Table(table) => table.finish()?,
     };
     Ok(file.sync_all()?)
+}
+
+/// The failure of writing: the disk's own words, such as that it is full.
+fn unwritten(file: &Path, error: McapError) -> Failure {
+    match error {
+        McapError::Io(error) => input(file, error),
+        error => input(file, error),
+    }
 }
 
 fn input(file: &Path, what: impl Display) -> Failure {

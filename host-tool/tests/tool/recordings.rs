@@ -229,6 +229,27 @@ fn ctrl_c_ends_a_recording_cleanly() {
     );
 }
 
+/// The message is the disk's own, for MCAP as for CSV.
+#[test]
+fn a_full_disk_is_called_full() {
+    let folder = Folder::new();
+    let file = folder.path("a.mcap");
+    let device = FakeDevice::on_tcp([paced((0..2_000).collect())]);
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 40; exec {} record {file} --port {}",
+        env!("CARGO_BIN_EXE_hivtac"),
+        device.port
+    );
+    let output = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .output()
+        .unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let words = format!("cannot record into {file}.partial: File too large");
+    assert!(said.contains(&words), "{said}");
+}
+
 /// Files may have a few thousand bytes here: what was flushed before is whole.
 #[test]
 fn a_full_disk_ends_a_recording_with_what_fits() {
