@@ -167,8 +167,12 @@ impl Link {
     /// The failure for a broken connection.
     pub fn lost(&self, why: &str) -> Failure {
         let name = &self.name;
+        let question = match name.starts_with("tcp:") {
+            true => "is a replay over, or has the program there ended?",
+            false => "cable pulled or device reset?",
+        };
         let message = format!(
-            "connection to {name} lost: {why}; cable pulled or device reset? \
+            "connection to {name} lost: {why}; {question} \
              (`monitor --reconnect`, `view` and `serve` go on when it is back)"
         );
         Failure::new(Kind::Lost, message)
