@@ -311,7 +311,6 @@ mod tests {
             came: 0,
             decoded: 0,
             last_id: 0,
-            came: 0,
         };
         link.write(&[1, 2, 3]).unwrap();
         drop(link);

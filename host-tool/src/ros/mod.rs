@@ -20,7 +20,333 @@ macro_rules! header {
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
-=========================================================================
+================================================================================
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+================================================================================
+"
+    };
+}
+
+/// F along x, y and z, N, and torque around the film's middle, N·m.
+pub const WRENCH: Definition = Definition {
+    name: "geometry_msgs/msg/WrenchStamped",
+    text: concat!(
+        "\
+std_msgs/Header header
+geometry_msgs/Wrench wrench
+================================================================================
+",
+        header!(),
+        "\
+MSG: geometry_msgs/Wrench
+geometry_msgs/Vector3 force
+geometry_msgs/Vector3 torque
+================================================================================
+MSG: geometry_msgs/Vector3
+float64 x
+float64 y
+float64 z
+"
+    ),
+};
+
+/// The place where the tip touches the film, m from its middle.
+pub const POINT: Definition = Definition {
+    name: "geometry_msgs/msg/PointStamped",
+    text: concat!(
+        "\
+std_msgs/Header header
+geometry_msgs/Point point
+================================================================================
+",
+        header!(),
+        "\
+MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+"
+    ),
+};
+
+/// Markers 0–3: column and row of each, px, and its area as z, px.
+pub const POLYGON: Definition = Definition {
+    name: "geometry_msgs/msg/PolygonStamped",
+    text: concat!(
+        "\
+std_msgs/Header header
+geometry_msgs/Polygon polygon
+================================================================================
+",
+        header!(),
+        "\
+MSG: geometry_msgs/Polygon
+geometry_msgs/Point32[] points
+================================================================================
+MSG: geometry_msgs/Point32
+float32 x
+float32 y
+float32 z
+"
+    ),
+};
+
+/// Whether something touches the film.
+pub const BOOL: Definition = Definition {
+    name: "std_msgs/msg/Bool",
+    text: "bool data\n",
+};
+
+/// Names of status bits.
+pub const STRING: Definition = Definition {
+    name: "std_msgs/msg/String",
+    text: "string data\n",
+};
+
+/// Bytes.
+pub const BYTES: Definition = Definition {
+    name: "std_msgs/msg/UInt8MultiArray",
+    text: "\
+std_msgs/MultiArrayLayout layout
+uint8[] data
+================================================================================
+MSG: std_msgs/MultiArrayLayout
+std_msgs/MultiArrayDimension[] dim
+uint32 data_offset
+================================================================================
+MSG: std_msgs/MultiArrayDimension
+string label
+uint32 size
+uint32 stride
+",
+};
+
+/// The state of devices.
+#[cfg(any(feature = "ros2", feature = "foxglove"))]
+pub const DIAGNOSTICS: Definition = Definition {
+    name: "diagnostic_msgs/msg/DiagnosticArray",
+    text: concat!(
+        "\
+std_msgs/Header header
+diagnostic_msgs/DiagnosticStatus[] status
+================================================================================
+",
+        header!(),
+        "\
+MSG: diagnostic_msgs/DiagnosticStatus
+byte OK=0
+byte WARN=1
+byte ERROR=2
+byte STALE=3
+byte level
+string name
+string message
+string hardware_id
+diagnostic_msgs/KeyValue[] values
+================================================================================
+MSG: diagnostic_msgs/KeyValue
+string key
+string value
+"
+    ),
+};
+
+/// The severity of a state.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u8)]
+pub enum Level {
+    /// As it should be.
+    Ok = 0,
+    /// There are forces, with a warning.
+    Warn = 1,
+    /// There are no forces.
+    Error = 2,
+    /// No samples have come.
+    Stale = 3,
+}
+
+/// The state of a device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Diagnosis {
+    /// Its severity.
+    pub level: Level,
+    /// The device's name.
+    pub name: String,
+    /// Its state, and what to do.
+    pub message: String,
+    /// The device's serial number.
+    pub hardware_id: String,
+    /// All other known values.
+    pub values: Vec<(&'static str, String)>,
+}
+
+/// A buffer of little-endian CDR. Numbers lie at multiples of their size, counted from behind the
+/// first four bytes.
+struct Cdr(Vec<u8>);
+
+impl Cdr {
+    fn new() -> Cdr {
+        Cdr(vec![0, 1, 0, 0])
+    }
+
+    fn number<const N: usize>(&mut self, bytes: [u8; N]) {
+        let used = self.0.len() - 4;
+        self.0.resize(4 + used.next_multiple_of(N), 0);
+        self.0.extend(bytes);
+    }
+
+    fn string(&mut self, text: &str) {
+        self.number((text.len() as u32 + 1).to_le_bytes());
+        self.0.extend(text.as_bytes());
+        self.0.push(0);
+    }
+
+    /// Adds a header: a time, ns since 1970, and the frame of the coordinates.
+    fn header(&mut self, stamp_ns: u64, frame: &str) {
+        self.number(((stamp_ns / 1_000_000_000) as i32).to_le_bytes());
+        self.number(((stamp_ns % 1_000_000_000) as u32).to_le_bytes());
+        self.string(frame);
+    }
+
+    fn vector(&mut self, parts: [f64; 3]) {
+        parts
+            .into_iter()
+            .for_each(|part| self.number(part.to_le_bytes()));
+    }
+}
+
+/// A [`WRENCH`]. The torque is that of the force at its place, or zero if the place is unknown.
+pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
+    let [fx, fy, fz] = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    let [x, y] = force.place.map_or([0.0; 2], place_m);
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    cdr.vector([fx, fy, fz]);
+    cdr.vector([y * fz, -x * fz, x * fy - y * fx]);
+    cdr.0
+}
+
+/// A [`POINT`]; `None` if the force has no place.
+pub fn point(stamp_ns: u64, frame: &str, force: &Force) -> Option<Vec<u8>> {
+    let place = force.place?;
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    let [x, y] = place_m(place);
+    cdr.vector([x, y, 0.0]);
+    Some(cdr.0)
+}
+
+/// A place along x and y from the film's middle, m.
+fn place_m(place: Place) -> [f64; 2] {
+    [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
+}
+
+/// A [`POLYGON`].
+pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker]) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    cdr.number((markers.len() as u32).to_le_bytes());
+    for marker in markers {
+        let numbers = [
+            marker.x.to_f64() as f32,
+            marker.y.to_f64() as f32,
+            marker.area as f32,
+        ];
+        numbers
+            .into_iter()
+            .for_each(|number| cdr.number(number.to_le_bytes()));
+    }
+    cdr.0
+}
+
+/// The frame and the vector of a `geometry_msgs/msg/Vector3Stamped`, from CDR behind its encoding.
+/// `None` for other bytes. Little-endian, as on all platforms of ROS 2.
+#[cfg(any(test, feature = "ros2"))]
+pub fn vector_stamped(body: &[u8]) -> Option<(&str, [f64; 3])> {
+    const STAMP: usize = 8;
+    let (length, rest) = body.get(STAMP..)?.split_first_chunk()?;
+    let length = usize::try_from(u32::from_le_bytes(*length)).ok()?;
+    let frame = rest.get(..length)?.strip_suffix(&[0])?;
+    let behind = (STAMP + 4 + length).next_multiple_of(8);
+    let (parts, _) = body.get(behind..)?.as_chunks();
+    let vector = [parts.first()?, parts.get(1)?, parts.get(2)?];
+    let vector = vector.map(|part| f64::from_le_bytes(*part));
+    Some((std::str::from_utf8(frame).ok()?, vector))
+}
+
+/// The reply of a service of type `std_srvs/srv/Trigger`.
+#[cfg(feature = "ros2")]
+pub fn trigger_reply(success: bool, message: &str) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.number([u8::from(success)]);
+    cdr.string(message);
+    cdr.0
+}
+
+/// A [`DIAGNOSTICS`] of one device.
+pub fn diagnostics(stamp_ns: u64, diagnosis: &Diagnosis) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, "");
+    cdr.number(1u32.to_le_bytes());
+    cdr.number([diagnosis.level as u8]);
+    cdr.string(&diagnosis.name);
+    cdr.string(&diagnosis.message);
+    cdr.string(&diagnosis.hardware_id);
+    cdr.number((diagnosis.values.len() as u32).to_le_bytes());
+    for (key, value) in &diagnosis.values {
+        cdr.string(key);
+        cdr.string(value);
+    }
+    cdr.0
+}
+
+/// A [`BOOL`].
+pub fn bool(value: bool) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.0.push(u8::from(value));
+    cdr.0
+}
+
+/// A [`STRING`].
+pub fn string(text: &str) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.string(text);
+    cdr.0
+}
+
+/// A [`BYTES`].
+pub fn bytes(bytes: &[u8]) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.number(0u32.to_le_bytes());
+    cdr.number(0u32.to_le_bytes());
+    cdr.number((bytes.len() as u32).to_le_bytes());
+    cdr.0.extend(bytes);
+    cdr.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::BEFORE_BYTES;
+    use hivtac_terms::units::Px;
+
+    /// Behind the header: the number of points, then column, row and area of each.
+    #[test]
+    fn a_polygon_has_a_point_for_each_marker() {
+        let marker = |id: i32| Marker {
+            x: Px(id << 16),
+            y: Px(-(id << 16)),
+            area: 170,
+        };
+        let bytes = polygon(0, "", &[0, 1, 2, 3, 4, 5, 6, 7].map(marker));
+        let (header, points) = bytes.split_at(bytes.len() - 8 * 12);
+        assert!(header.ends_with(&[8, 0, 0, 0]), "{header:?}");
+        let last = [7.0_f32, -7.0, 170.0].map(f32::to_le_bytes).concat();
+        assert!(points.ends_with(&last), "{points:?}");
+    }
+
     #[test]
     fn numbers_are_aligned_behind_the_encoding() {
         let mut cdr = Cdr::new();
