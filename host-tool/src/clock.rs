@@ -70,15 +70,17 @@ pub struct LiveClock {
     clock: Clock,
 }
 
-impl LiveClock {
+impl Default for LiveClock {
     /// Begins with no sample.
-    pub fn new() -> LiveClock {
+    fn default() -> LiveClock {
         LiveClock {
             begun: Instant::now(),
             clock: Clock::default(),
         }
     }
+}
 
+impl LiveClock {
     /// Notes the latency that the device tells, µs.
     pub fn latency(&mut self, latency_us: u32) {
         self.clock.latency(latency_us);
@@ -163,7 +165,7 @@ mod tests {
     /// This computer's time is set forward by 0.8 s, and back.
     #[test]
     fn a_step_of_the_time_is_followed_at_once() {
-        let mut clock = LiveClock::new();
+        let mut clock = LiveClock::default();
         clock.latency(4_785);
         let begun = clock.begun;
         for frame in 0..300 {

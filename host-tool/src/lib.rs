@@ -1,13 +1,14 @@
 //! A library for programs that communicate with a HiVTac sensor from a host.
 //!
 //! Connection: addresses ([`port`]), conversation ([`link`]), replies in words ([`reply`]), samples
-//! read in a thread of their own ([`reader`]), sensors by name ([`named`]), interruption ([`stop`]),
-//! errors ([`failure`]). Pictures: of the device ([`frame`], [`look`]), sensed ([`one_picture`]),
-//! their faults ([`focus`]), in files ([`picture`], [`raw`], [`files`]). Values: direction of
-//! gravity ([`down`]), shape of what presses ([`contact_shape`]), thresholds ([`threshold`]), forces
-//! ([`force_fields`], [`decimal`]), markers ([`marker_fields`]), texts ([`shown`]), the usual tare
-//! ([`usual_tare`]), counts ([`tally`]), true forces ([`truth`]), times ([`clock`]). Also the live
-//! page ([`page`]), and recordings: written ([`bag`], [`ros`]) and read ([`recording`]).
+//! read in a thread of their own ([`reader`]), sensors by name ([`named`]), interruption
+//! ([`stop`]), errors ([`failure`]). Pictures: of the device ([`frame`], [`look`]), sensed
+//! ([`one_picture`]), their faults ([`focus`]), in files ([`picture`], [`raw`], [`files`]).
+//! Values: direction of gravity ([`down`]), shape of what presses ([`contact_shape`]), thresholds
+//! ([`threshold`]), forces ([`force_fields`], [`decimal`]), markers ([`marker_fields`]), texts
+//! ([`shown`]), the usual tare ([`usual_tare`]), counts ([`tally`]), true forces ([`truth`]), times
+//! ([`clock`]). Also the live page ([`page`]), and recordings: written ([`bag`], [`ros`]) and read
+//! ([`recording`]).
 //!
 //! In a browser (`web/`) there are neither ports nor files: what needs them is left out there.
 

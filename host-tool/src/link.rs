@@ -223,8 +223,8 @@ impl Link {
     /// The longest silence is `patience`, plus the device's own patience before the first message.
     ///
     /// # Errors
-    /// [`Kind::Refused`] when the device cannot send a frame or does not answer; [`Kind::Lost`] when
-    /// a part was damaged on the way; those of [`Link::receive`].
+    /// [`Kind::Refused`] when the device cannot send a frame or does not answer; [`Kind::Lost`]
+    /// when a part was damaged on the way; those of [`Link::receive`].
     pub fn snapshot(
         &mut self,
         patience: Duration,

@@ -89,7 +89,6 @@ function fail(error) {
 }
 
 const ACTS = {
-  load: ({ bytes }) => load(bytes).then(turn).catch(fail),
   simulate,
   connect: ({ name }) => {
     putText(name);
@@ -116,10 +115,20 @@ const ACTS = {
   sum: (asked) => postMessage({ events: [["summed", { ticket: asked.ticket, ...summed(asked) }]] }),
 };
 
-onmessage = ({ data }) => {
+/** Resolved once the module is there: what the page asks before waits. */
+let loaded = null;
+
+onmessage = async ({ data }) => {
   try {
+    if (data.act === "load") {
+      loaded = load(data.bytes);
+      await loaded;
+      turn();
+      return;
+    }
+    await loaded;
     ACTS[data.act](data);
-    if (module !== null) tell();
+    tell();
   } catch (error) {
     fail(error);
   }

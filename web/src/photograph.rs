@@ -6,6 +6,7 @@ use hivtac_host::page::{lights, picture, rows};
 use hivtac_live::camera::Kind;
 use hivtac_live::device::Device;
 use hivtac_sensor::force::model::Model;
+use hivtac_twin::Layout;
 use hivtac_wire::message::{DeviceHello, Sample};
 use serde_json::json;
 
@@ -21,7 +22,7 @@ pub fn sense(levels: &[u8], width: u16, height: u16) -> Vec<u8> {
 
 fn try_to(levels: &[u8], width: u16, height: u16) -> Result<Vec<u8>, String> {
     let kind = Kind::default();
-    let model = Model::parse(kind.model()).map_err(|error| error.to_string())?;
+    let model = Model::parse(kind.model(Layout::default())).map_err(|error| error.to_string())?;
     let (colours, _) = levels.as_chunks::<4>();
     if colours.len() != usize::from(width) * usize::from(height) {
         return Err(format!("it has not {width} × {height} px"));
@@ -53,7 +54,7 @@ fn try_to(levels: &[u8], width: u16, height: u16) -> Result<Vec<u8>, String> {
         height,
         dilations: settings.dilations,
         centroid: settings.centroid,
-        ..Device::new(kind, [0; 12], 1.0).hello()
+        ..Device::new(kind, Layout::default(), [0; 12], 1.0).hello()
     };
     let frame = Frame {
         number: 0,

@@ -3,7 +3,7 @@
 use hivtac_live::camera::Kind;
 use hivtac_live::device::{Captured, Device};
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_twin::Scene;
+use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{CRC32, MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -29,7 +29,7 @@ pub fn sum(kind: Kind, frames: u32) -> Result<Summed, String> {
     let [width, height] = kind.size().map(u32::from);
     let scene = Scene::preset("demo", kind.preset(), width, height, SEED)
         .map_err(|error| error.to_string())?;
-    let mut device = Device::new(kind, [0; 12], 1.0);
+    let mut device = Device::new(kind, Layout::default(), [0; 12], 1.0);
     for message in greeting() {
         let mut buffer = [0; MAX_HOST_FRAME];
         if let Ok(frame) = encode(&message, &mut buffer) {

@@ -5,7 +5,7 @@ use hivtac_live::device::Device;
 use hivtac_live::eye::{Disturbances, Eye, Presses};
 use hivtac_live::hand::{Hand, Touch};
 use hivtac_live::run::{Due, Frames, Told, device_id};
-use hivtac_twin::Scene;
+use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 
 /// Most frames of one turn, so that the page's other work is not late.
@@ -34,7 +34,7 @@ impl Simulated {
         let usual = Disturbances::default();
         let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
             .map_err(|error| error.to_string())?;
-        let device = Device::new(kind, device_id(kind, NOMINAL), 1.0);
+        let device = Device::new(kind, Layout::default(), device_id(kind, NOMINAL), 1.0);
         let frames = Frames::new(eye, &device.camera(), now_us);
         Ok(Simulated {
             device,

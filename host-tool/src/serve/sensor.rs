@@ -80,7 +80,7 @@ impl Sensor {
             number,
             patience,
             state: State::new(port, hello),
-            clock: LiveClock::new(),
+            clock: LiveClock::default(),
             since: None,
             diagnosed: Instant::now(),
             lost: None,
@@ -164,7 +164,7 @@ impl Follower for Sensor {
 
     fn connected_again(&mut self, hello: DeviceHello) {
         self.state.connected_again(hello);
-        self.clock = LiveClock::new();
+        self.clock = LiveClock::default();
         if let Some(lost) = self.lost.take() {
             note_connected_again(&self.state.port, lost);
         }

@@ -246,8 +246,8 @@ impl Device {
         self.sensor.forget_frame();
     }
 
-    /// Measures a frame. `missed` says that frames before it are missing, `now` the time in µs since
-    /// the start.
+    /// Measures a frame. `missed` says that frames before it are missing, `now` the time in µs
+    /// since the start.
     pub fn frame(&mut self, frame: &Captured, missed: bool, now: impl Fn() -> u64) {
         let now_us = now();
         self.now_us = now_us;

@@ -24,8 +24,8 @@ pub struct Told {
 }
 
 impl Told {
-    /// The press in the integers of the wire format: Fx, Fy, Fz and |F|, µN; α and β, thousandths of
-    /// a degree; and the place, µm along x and y, or `None` without a press.
+    /// The press in the integers of the wire format: Fx, Fy, Fz and |F|, µN; α and β, thousandths
+    /// of a degree; and the place, µm along x and y, or `None` without a press.
     pub fn integers(&self) -> ([i64; 4], [i64; 2], Option<[i64; 2]>) {
         let thousandths = |value: f64| (1e3 * value).round() as i64;
         let force = self.truth.force;
