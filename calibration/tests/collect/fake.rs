@@ -16,7 +16,7 @@ use std::time::Duration;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::down::Direction;
 use hivtac_terms::fixed::Q;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_wire::decoder::{Decoder, Received};
@@ -221,7 +221,11 @@ fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
             (true, false) => Status::MODEL_MISSING,
         },
         force: None,
-        markers: found.then_some(seen.into()).unwrap_or_default(),
+        markers: if found {
+            seen.into()
+        } else {
+            MarkerList::default()
+        },
     }
 }
 

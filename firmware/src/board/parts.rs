@@ -86,8 +86,8 @@ pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32:
         divq: (!seeded_bugs::usb_from_hsi48()).then_some(PllDiv::DIV20),
         divr: None,
     });
-    // Nothing uses the real-time clock. From the internal 32 kHz oscillator it would let that one run
-    // fast after a quick replug, and the watchdog with it (errata ES0396, 2.2.19).
+    // Nothing uses the real-time clock. From the internal 32 kHz oscillator it would let that one
+    // run fast after a quick replug, and the watchdog with it (errata ES0396, 2.2.19).
     config.rcc.ls = LsConfig::off();
     // 480 MHz needs the highest core voltage.
     config.rcc.voltage_scale = VoltageScale::Scale0;

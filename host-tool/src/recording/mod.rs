@@ -22,8 +22,8 @@ pub const WIRE: &str = "/wire";
 /// Bytes before the device's in a message of [`WIRE`]: the encoding, and the lengths of an empty
 /// layout and of the device's bytes.
 pub const BEFORE_BYTES: usize = 16;
-/// Name of a [`WIRE`] channel's metadata with the device's hello, in hexadecimal digits: other tools
-/// that trim or merge files keep it.
+/// Name of a [`WIRE`] channel's metadata with the device's hello, in hexadecimal digits: other
+/// tools that trim or merge files keep it.
 pub const HELLO: &str = "hello";
 
 /// A message with its receive time, ns since 1970.

@@ -88,7 +88,7 @@ mod tests {
         );
         let (level, message) = verdict(None, Some(warning | Status::MARKERS_MISSING));
         assert_eq!(level, Level::Error);
-        assert!(message.starts_with("fewer than four markers"), "{message}");
+        assert!(message.starts_with("fewer markers are seen"), "{message}");
         assert!(!message.contains("no rest position"), "{message}");
         let good = (Level::Ok, "good".to_owned());
         assert_eq!(verdict(None, Some(Status::CONTACT)), good);

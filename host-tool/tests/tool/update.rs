@@ -164,7 +164,10 @@ fn a_file_that_is_no_model_is_named_with_what_is_wrong() {
     let cases = [
         (write("damaged.hvtm", &damaged), "damaged"),
         (write("text.hvtm", b"hello"), "text.hvtm: "),
-        (write("large.hvtm", &[0; 98_305]), "at most 98304 bytes"),
+        (
+            write("large.hvtm", &vec![0; 163_841]),
+            "at most 163840 bytes",
+        ),
         (
             directory.path().join("none").display().to_string(),
             "none: ",

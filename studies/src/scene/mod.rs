@@ -19,7 +19,7 @@ pub enum SceneCommand {
     Film(film::FilmArgs),
     /// Print the lengths that `hardware/` shares with the simulated sensor, as JSON.
     Dimensions(dimensions::DimensionsArgs),
-    /// Build units with one dimension of the kit off by its tolerance; measure them after ten loads.
+    /// Build units with one dimension of the kit off by its tolerance; measure after ten loads.
     Tolerances(tolerances::Tolerances),
     /// Draw the pictures of the documentation: frames, hard cases, and the guide's.
     Figures(figures::FiguresArgs),

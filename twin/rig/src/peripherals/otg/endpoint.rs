@@ -264,8 +264,10 @@ mod tests {
 
     #[test]
     fn a_packet_outlives_a_reset_until_it_is_disabled_under_nak() {
-        let mut endpoint = In::default();
-        endpoint.size = 1 << 19 | 4;
+        let mut endpoint = In {
+            size: 1 << 19 | 4,
+            ..In::default()
+        };
         endpoint.write_control(bit::ACTIVE | bit::ENABLE | bit::CLEAR_NAK);
         assert!(endpoint.push(1, 16));
         endpoint.stop();
