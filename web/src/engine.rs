@@ -278,17 +278,19 @@ impl Engine {
                 self.tell(now_us);
             }
             order => match order.asked(&state.hello, PATIENCE) {
-                Ok(Some(asked)) => self.conversation.ask(Job {
-                    ticket: Some(ticket),
-                    // The values then in use follow.
-                    commands: [
+                Ok(Some(asked)) => {
+                    let commands = [
                         (asked.request, asked.patience),
                         (Request::GetInfo, PATIENCE),
-                        (Request::GetSettings, PATIENCE),
-                    ]
-                    .into(),
-                    done: asked.done,
-                }),
+                    ];
+                    self.conversation.ask(Job {
+                        ticket: Some(ticket),
+                        commands: commands.into(),
+                        done: asked.done,
+                    });
+                    // A device that does not tell its settings has obeyed all the same.
+                    self.ask(None, Request::GetSettings);
+                }
                 Ok(None) => self.answer(ticket, false, "there is no such order"),
                 Err(failure) => self.answer(ticket, false, &failure.to_string()),
             },

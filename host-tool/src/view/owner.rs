@@ -22,6 +22,8 @@ pub struct Owner {
     patience: Duration,
     orders: Receiver<Posted>,
     watched: Watched,
+    /// Whether this connection's device was asked for its settings.
+    asked_settings: bool,
 }
 
 /// The receivers of a device's messages.
@@ -86,6 +88,7 @@ impl Owner {
             patience,
             orders,
             watched,
+            asked_settings: false,
         }
     }
 
@@ -137,8 +140,16 @@ impl Owner {
         self.request(link, asked.request, asked.patience)?;
         // The values now in use, from the device.
         self.request(link, Request::GetInfo, self.patience)?;
-        self.request(link, Request::GetSettings, self.patience)?;
+        self.ask_settings(link)?;
         Ok(Answer::Done(asked.done))
+    }
+
+    /// Asks which settings are in use. A device that does not tell them is shown without.
+    fn ask_settings(&mut self, link: &mut Link) -> Result<(), Failure> {
+        match self.request(link, Request::GetSettings, self.patience) {
+            Err(failure) if failure.kind == Kind::Refused => Ok(()),
+            result => result,
+        }
     }
 
     /// Begins a file with the device's counters.
@@ -179,6 +190,7 @@ impl Follower for Owner {
 
     fn connected_again(&mut self, hello: DeviceHello) {
         self.watched.state.connected_again(hello);
+        self.asked_settings = false;
     }
 
     fn trouble(&mut self, why: String) {
@@ -189,9 +201,9 @@ impl Follower for Owner {
         self.watched.tell_now_and_then();
         let mut is_asked = false;
         if let Some(link) = &mut link
-            && self.watched.state.contact_shape.is_none()
+            && !std::mem::replace(&mut self.asked_settings, true)
         {
-            self.request(link, Request::GetSettings, self.patience)?;
+            self.ask_settings(link)?;
         }
         while let Ok(posted) = self.orders.try_recv() {
             match &mut link {

@@ -79,7 +79,7 @@ fn orders_reach_the_device_and_refusals_the_page() {
     let orders: Vec<_> = device
         .commands
         .try_iter()
-        .filter(|request| !matches!(request, Request::GetInfo | Request::StartWithMarkers))
+        .filter(|request| !is_question(request))
         .collect();
     let set = |limits| Request::SetThreshold(Threshold::Rgb565(HsvBox::of_limits(limits)));
     let expected = [
@@ -88,6 +88,14 @@ fn orders_reach_the_device_and_refusals_the_page() {
         set([170, 10, 100, 255, 45, 255]),
     ];
     assert_eq!(orders, expected);
+}
+
+/// Returns whether a command only asks, or starts samples.
+fn is_question(request: &Request) -> bool {
+    matches!(
+        request,
+        Request::GetInfo | Request::GetSettings | Request::StartWithMarkers
+    )
 }
 
 #[test]
