@@ -382,9 +382,27 @@ def of_another(recording, unit):
         body = cobs_decoded(recording[begin:end])[:-4].replace(old, unit)
         frame = cobs_encoded(body + zlib.crc32(body).to_bytes(4, "little"))
         assert len(frame) == end - begin
+        # A channel's metadata has the hello, too, in hexadecimal digits.
+        was = recording[begin:end].hex().encode()
         recording = recording[:begin] + frame + recording[end:]
+        recording = recording.replace(was, frame.hex().encode())
         place = end
-    return recording
+    return without_checksums(recording)
+
+
+def without_checksums(recording):
+    """The MCAP file with 0, which means none, in place of its checksums."""
+    file, place = bytearray(recording), 8
+    while place + 9 <= len(file) - 8:
+        kind, length = file[place], int.from_bytes(file[place + 1 : place + 9], "little")
+        begin, end = place + 9, place + 9 + length
+        chunk, data_end, footer = 6, 15, 2
+        if kind == chunk:
+            file[begin + 24 : begin + 28] = bytes(4)
+        elif kind in (data_end, footer):
+            file[end - 4 : end] = bytes(4)
+        place = end
+    return bytes(file)
 
 
 def cobs_decoded(frame):
