@@ -31,26 +31,11 @@ pub struct View {
 impl View {
     /// Serves the page of the port `sensor` in a folder.
     fn of(folder: &Path) -> View {
-        let mut process = Command::new(artifact::named_by("HIVTAC_TOOL"))
-            .args([
-                "view",
-                "--timeout",
-                &TIMEOUT_S.to_string(),
-                "--port",
-                "sensor",
-            ])
-            .current_dir(folder)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut said = String::new();
-        let stdout = process.stdout.take().unwrap();
-        BufReader::new(stdout).read_line(&mut said).unwrap();
-        let address = said.trim().strip_prefix("ready ");
-        View {
-            address: address.expect("an address").to_owned(),
-            process,
-        }
+        let mut tool = Command::new(artifact::named_by("HIVTAC_TOOL"));
+        tool.args(["view", "--port", "sensor", "--timeout"]);
+        tool.arg(TIMEOUT_S.to_string()).current_dir(folder);
+        let (process, address) = artifact::ready(&mut tool);
+        View { process, address }
     }
 }
 

@@ -1,9 +1,8 @@
 //! Tests `hivtac view --twin` in a real browser: a press by pointer events, read beside the truth.
 
 use std::env;
-use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 use crate::view::{View, part};
 use hivtac_tests::artifact;
@@ -19,19 +18,9 @@ const FRAMES: usize = 40;
 impl View {
     /// Serves the twin's page.
     fn start() -> View {
-        let mut process = Command::new(artifact::named_by("HIVTAC_TOOL"))
-            .args(["view", "--twin"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut said = String::new();
-        let stdout = process.stdout.take().unwrap();
-        BufReader::new(stdout).read_line(&mut said).unwrap();
-        let address = said.trim().strip_prefix("ready ");
-        View {
-            address: address.expect("an address").to_owned(),
-            process,
-        }
+        let mut tool = Command::new(artifact::named_by("HIVTAC_TOOL"));
+        let (process, address) = artifact::ready(tool.args(["view", "--twin"]));
+        View { process, address }
     }
 }
 

@@ -2,9 +2,9 @@
 //! WebAssembly, a press by pointer events, a picture of one's own, and a device by Web Serial. That
 //! is mocked, and bridged to `hivtac twin`.
 
-use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
 use crate::view::part;
@@ -159,16 +159,10 @@ struct Twin {
 
 impl Twin {
     fn start() -> Twin {
-        let mut process = Command::new(artifact::named_by("HIVTAC_TOOL"))
-            .args(["twin", "--scene", "static", "--listen", "0"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut said = String::new();
-        let stdout = process.stdout.take().unwrap();
-        BufReader::new(stdout).read_line(&mut said).unwrap();
-        let address = said.trim().strip_prefix("ready tcp=").unwrap();
-        let line = TcpStream::connect(address).unwrap();
+        let mut tool = Command::new(artifact::named_by("HIVTAC_TOOL"));
+        tool.args(["twin", "--scene", "static", "--listen", "0"]);
+        let (process, address) = artifact::ready(&mut tool);
+        let line = TcpStream::connect(address.strip_prefix("tcp=").unwrap()).unwrap();
         line.set_read_timeout(Some(Duration::from_millis(10)))
             .unwrap();
         Twin { process, line }

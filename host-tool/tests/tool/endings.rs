@@ -317,18 +317,15 @@ fn a_full_disk_leaves_whole_lines() {
         let before = "kept\n";
         std::fs::write(&file, before).unwrap();
         let device = endless();
-        let script = format!(
-            "trap '' XFSZ; ulimit -f 8; exec {} monitor --csv --port {} {to} {}",
-            env!("CARGO_BIN_EXE_hivtac"),
+        let words = format!(
+            "monitor --csv --port {} {to} {}",
             device.port,
             file.display()
         );
-        let output = std::process::Command::new("sh")
-            .args(["-c", &script])
-            .output()
-            .unwrap();
-        let said = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(1), "{said}");
+        let Finished {
+            code, stderr: said, ..
+        } = run_on_full_disk(8, &words);
+        assert_eq!(code, Some(1), "{said}");
         assert!(said.contains("cannot write to standard output: "), "{said}");
         let text = std::fs::read_to_string(&file).unwrap();
         assert_eq!(text.starts_with(before), to == ">>", "{text}");

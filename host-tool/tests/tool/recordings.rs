@@ -235,17 +235,10 @@ fn a_full_disk_is_called_full() {
     let folder = Folder::new();
     let file = folder.path("a.mcap");
     let device = FakeDevice::on_tcp([paced((0..2_000).collect())]);
-    let script = format!(
-        "trap '' XFSZ; ulimit -f 40; exec {} record {file} --port {}",
-        env!("CARGO_BIN_EXE_hivtac"),
-        device.port
-    );
-    let output = std::process::Command::new("sh")
-        .args(["-c", &script])
-        .output()
-        .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let Finished {
+        code, stderr: said, ..
+    } = run_on_full_disk(40, &format!("record {file} --port {}", device.port));
+    assert_eq!(code, Some(1), "{said}");
     let words = format!("cannot record into {file}.partial: File too large");
     assert!(said.contains(&words), "{said}");
 }
@@ -256,17 +249,10 @@ fn a_full_disk_ends_a_recording_with_what_fits() {
     let folder = Folder::new();
     let file = folder.path("a.csv");
     let device = FakeDevice::on_tcp([paced((0..2_000).collect())]);
-    let script = format!(
-        "trap '' XFSZ; ulimit -f 100; exec {} record {file} --port {}",
-        env!("CARGO_BIN_EXE_hivtac"),
-        device.port
-    );
-    let output = std::process::Command::new("sh")
-        .args(["-c", &script])
-        .output()
-        .unwrap();
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert_eq!(output.status.code(), Some(1), "{said}");
+    let Finished {
+        code, stderr: said, ..
+    } = run_on_full_disk(100, &format!("record {file} --port {}", device.port));
+    assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("cannot record into "), "{said}");
     let text = std::fs::read_to_string(format!("{file}.partial")).unwrap();
     assert!(

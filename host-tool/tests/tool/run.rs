@@ -26,6 +26,15 @@ pub fn run(arguments: &[&str]) -> Finished {
     start(arguments).finish()
 }
 
+/// Runs `hivtac` to its end with `words` of the shell, on a disk that is full once a file has this
+/// many blocks of 512 bytes.
+pub fn run_on_full_disk(blocks: u32, words: &str) -> Finished {
+    let program = env!("CARGO_BIN_EXE_hivtac");
+    let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec {program} {words}");
+    let output = Command::new("sh").args(["-c", &script]).output();
+    Finished::new(output.unwrap())
+}
+
 impl Run {
     pub fn child(&mut self) -> &mut Child {
         &mut self.0

@@ -26,49 +26,43 @@ const CUT: [[u8; 8]; 3] = [
 /// A transfer takes four to six transactions of 53 µs: cuts lie this far apart.
 const STEP_US: u64 = 21;
 const STEPS: u64 = 18;
+const CUTS: u64 = CUT.len() as u64 * STEPS;
+
+/// Begins a control transfer every so many milliseconds, each cut off a step later in it by what
+/// `cut` adds at a time in µs; then says hello.
+fn cut(period_ms: u64, cut: impl Fn(Setup, u64) -> Setup) -> Run {
+    let end_ms = 200 + CUTS * period_ms;
+    let mut setup = without_camera(end_ms + 20);
+    for nth in 0..CUTS {
+        let at_us = 1000 * (200 + nth * period_ms);
+        setup = setup.at_us(at_us, Action::Request(CUT[(nth / STEPS) as usize]));
+        setup = cut(setup, at_us + STEP_US * (nth % STEPS));
+    }
+    setup.at(end_ms, Action::Send(hello())).run()
+}
 
 /// The bus is reset at any time of a control transfer, to the microsecond: the device is enumerated
 /// again each time.
 #[test]
 fn a_reset_in_a_control_transfer_is_served() {
-    const PERIOD_MS: u64 = 30;
-    let cuts = CUT.len() as u64 * STEPS;
-    let end_ms = 200 + cuts * PERIOD_MS;
-    let mut setup = without_camera(end_ms + 20);
-    for nth in 0..cuts {
-        let at_us = 1000 * (200 + nth * PERIOD_MS);
-        let request = CUT[(nth / STEPS) as usize];
-        setup = setup
-            .at_us(at_us, Action::Request(request))
-            .at_us(at_us + STEP_US * (nth % STEPS), Action::Reset);
-    }
-    let run = setup.at(end_ms, Action::Send(hello())).run();
+    let run = cut(30, |setup, cut_us| setup.at_us(cut_us, Action::Reset));
     let log = &run.report.usb_log;
-    assert_eq!(run.report.usb.enumerations, 1 + cuts, "{log:#?}");
+    assert_eq!(run.report.usb.enumerations, 1 + CUTS, "{log:#?}");
     assert_eq!((run.report.usb.failed_transfers, greetings(&run)), (0, 2));
 }
 
 /// A host gives transfers up and begins others: each of the others succeeds.
 #[test]
 fn another_setup_ends_a_control_transfer() {
-    const PERIOD_MS: u64 = 2;
-    let cuts = CUT.len() as u64 * STEPS;
-    let end_ms = 200 + cuts * PERIOD_MS;
-    let mut setup = without_camera(end_ms + 20);
-    for nth in 0..cuts {
-        let at_us = 1000 * (200 + nth * PERIOD_MS);
-        let cut_us = at_us + STEP_US * (nth % STEPS);
-        setup = setup
-            .at_us(at_us, Action::Request(CUT[(nth / STEPS) as usize]))
-            .at_us(cut_us, Action::Cancel)
-            .at_us(cut_us, Action::Request([0x82, 0, 0, 0, 0x80, 0, 2, 0]));
-    }
-    let run = setup.at(end_ms, Action::Send(hello())).run();
+    let run = cut(2, |setup, cut_us| {
+        let another = Action::Request([0x82, 0, 0, 0, 0x80, 0, 2, 0]);
+        setup.at_us(cut_us, Action::Cancel).at_us(cut_us, another)
+    });
     let log = &run.report.usb_log;
     let answered = log.iter().filter(|line| line.ends_with("2 bytes")).count();
     assert_eq!(
         (answered as u64, run.report.usb.failed_transfers),
-        (cuts, 0),
+        (CUTS, 0),
         "{log:#?}"
     );
     assert_eq!(greetings(&run), 2);
