@@ -116,18 +116,9 @@ fn converse(
 
 /// Checks whether a silent device still takes part in this conversation.
 fn probe(link: &mut Link, patience: Duration, follower: &mut impl Follower) -> Result<(), Failure> {
-    let asked = link.request(Request::GetInfo, patience, |message| {
-        follower.message(message)
-    });
-    match asked {
-        Err(failure) if failure.kind == Kind::Refused => {
-            Err(link.lost("the device sends nothing and does not answer"))
-        }
-        Err(failure) => Err(failure),
-        Ok(()) => {
-            let why = "the device answers, but sends no samples: does its camera run?";
-            follower.trouble(why.to_owned());
-            Ok(())
-        }
+    if link.probe(patience, |message| follower.message(message))? {
+        let why = "the device answers, but sends no samples: does its camera run?";
+        follower.trouble(why.to_owned());
     }
+    Ok(())
 }

@@ -8,7 +8,7 @@ use crate::stop;
 use hivtac_terms::down::Down;
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, MAX_HOST_FRAME, encode};
-use hivtac_wire::message::{Command, DeviceHello, DeviceMessage, HostMessage, Request};
+use hivtac_wire::message::{Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Request};
 use hivtac_wire::version::HelloPrefix;
 use std::io::{self, ErrorKind};
 use std::time::{Duration, Instant};
@@ -219,6 +219,37 @@ impl Link {
         Err(unanswered(&asked, patience))
     }
 
+    /// Asks a silent device whether it takes part in this conversation; what comes first goes to
+    /// `other`. Returns true if it answers, false if a sample comes first: the answer may be lost
+    /// when this host did not read for a while.
+    ///
+    /// # Errors
+    /// [`Kind::Lost`] when neither comes within `patience`; those of [`Link::receive`].
+    pub fn probe(
+        &mut self,
+        patience: Duration,
+        mut other: impl FnMut(DeviceMessage),
+    ) -> Result<bool, Failure> {
+        let id = self.command(Request::GetInfo)?;
+        let end = Instant::now() + patience;
+        while let Some(message) = self.receive(end)? {
+            match message {
+                DeviceMessage::Reply(reply) if reply.id == id => {
+                    if reply.outcome == Outcome::Done {
+                        return Ok(true);
+                    }
+                    break;
+                }
+                DeviceMessage::Sample(_) => {
+                    other(message);
+                    return Ok(false);
+                }
+                message => other(message),
+            }
+        }
+        Err(self.lost("the device sends nothing and does not answer"))
+    }
+
     /// Requests the device's next whole frame and waits for it; all other messages go to `other`.
     /// The longest silence is `patience`, plus the device's own patience before the first message.
     ///
@@ -270,6 +301,10 @@ fn is_patience(error: &io::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::marker::MarkerList;
+    use hivtac_terms::status::Status;
+    use hivtac_wire::frame::MAX_DEVICE_FRAME;
+    use hivtac_wire::message::Sample;
     use std::io::{Read, Write};
 
     /// A port that takes no byte at first, and then as many as it shall at a time.
@@ -315,5 +350,57 @@ mod tests {
         link.write(&[1, 2, 3]).unwrap();
         drop(link);
         assert_eq!(bytes.iter().collect::<Vec<_>>(), [1, 2, 3]);
+    }
+
+    /// A device that answers nothing, with what it sends.
+    struct Sending(io::Cursor<Vec<u8>>);
+
+    impl Write for Sending {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Read for Sending {
+        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+            match self.0.read(buffer)? {
+                0 => Err(ErrorKind::TimedOut.into()),
+                bytes => Ok(bytes),
+            }
+        }
+    }
+
+    #[test]
+    fn a_device_whose_answer_is_lost_is_there_while_samples_come() {
+        let sample = DeviceMessage::Sample(Sample {
+            sequence: 7,
+            frame: 7,
+            time_us: 1,
+            status: Status::OK,
+            force: None,
+            markers: MarkerList::default(),
+        });
+        let mut buffer = [0; MAX_DEVICE_FRAME];
+        let frame = encode(&sample, &mut buffer).unwrap().to_vec();
+        let probed = |sent: Vec<u8>| {
+            let mut link = Link {
+                port: Box::new(Sending(io::Cursor::new(sent))),
+                name: "sending".to_owned(),
+                decoder: Decoder::new(),
+                inbox: Vec::new(),
+                came: 0,
+                decoded: 0,
+                last_id: 0,
+            };
+            let mut seen = Vec::new();
+            let result = link.probe(Duration::from_millis(20), |message| seen.push(message));
+            (result.map_err(|failure| failure.kind), seen)
+        };
+        assert_eq!(probed(frame), (Ok(false), vec![sample]));
+        assert_eq!(probed(Vec::new()), (Err(Kind::Lost), Vec::new()));
     }
 }

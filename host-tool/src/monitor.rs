@@ -212,7 +212,12 @@ impl<'o> Monitor<'o> {
     ) -> Result<Option<End>, Failure> {
         let mut early = Vec::new();
         link.request(request, patience, |message| early.push(message))?;
-        for message in early {
+        self.take_all(early)
+    }
+
+    /// Handles messages in their order, up to a reason to end.
+    fn take_all(&mut self, messages: Vec<DeviceMessage>) -> Result<Option<End>, Failure> {
+        for message in messages {
             if let Some(end) = self.take(message)? {
                 return Ok(Some(end));
             }
@@ -238,26 +243,21 @@ impl<'o> Monitor<'o> {
                     }
                 }
                 None if Instant::now() >= silence.end() => {
-                    if let Some(end) = self.probe(link)? {
+                    let mut early = Vec::new();
+                    // Behind a TCP port the device may have been unplugged or restarted while the
+                    // port stayed open.
+                    match link.probe(self.patience, |message| early.push(message))? {
+                        true => silence.tell(),
+                        false => silence = Silence::new(),
+                    }
+                    if let Some(end) = self.take_all(early)? {
                         return Ok(end);
                     }
-                    silence.tell();
                 }
                 None => (),
             }
         }
         Ok(End::Enough)
-    }
-
-    /// Checks whether the device still takes part in this conversation. Behind a TCP port it may
-    /// have been unplugged or restarted while the port stayed open.
-    fn probe(&mut self, link: &mut Link) -> Result<Option<End>, Failure> {
-        match self.request(link, Request::GetInfo, self.patience) {
-            Err(failure) if failure.kind == Kind::Refused => {
-                Err(link.lost("the device sends nothing and does not answer"))
-            }
-            result => result,
-        }
     }
 
     /// Handles one message; returns the reason to end, if there is one.

@@ -86,7 +86,7 @@ fn an_overrun_costs_its_frame_and_no_more() {
 fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
     // Longer than the device's own buffers last, shorter than the silence after which the monitor
     // asks.
-    let (output, lines, _) = watch(&["host-not-reading@300-580"], &["--frames", "70"]);
+    let (output, lines, _) = watch(&["host-not-reading@300-700"], &["--frames", "90"]);
     check_recovery(&output, &lines);
     assert!(counter(&output, "USB") > 0, "{}", output.err);
     let no_gap = "0 frames not processed";
