@@ -5,12 +5,14 @@
 `cargo xtask test --all kit` builds the tool and installs build123d first.
 """
 
+import io
 import os
 import re
 import subprocess
 import sys
 import tempfile
 import unittest
+from contextlib import redirect_stdout
 from dataclasses import replace
 from functools import cache
 from math import cos, hypot, radians, sin
@@ -155,7 +157,8 @@ class SharedDimensions(unittest.TestCase):
     def test_template_and_jigs_have_the_same_places(self):
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "template.svg"
-            subprocess.run([os.environ["HIVTAC_TOOL"], "template", file], check=True)
+            template = [os.environ["HIVTAC_TOOL"], "template", file]
+            subprocess.run(template, check=True, stdout=subprocess.DEVNULL)
             svg = file.read_text()
         left, top, side = re.search(
             r'class="film" x="(\S+)" y="(\S+)" width="(\S+)"', svg
@@ -198,7 +201,9 @@ class Written(unittest.TestCase):
     def test_all_files_are_written_and_those_of_the_guide_are_current(self):
         with tempfile.TemporaryDirectory() as folder:
             out = Path(folder)
-            write(KIT, out)
+            # The runner's line ends in the test's result.
+            with redirect_stdout(io.StringIO()):
+                write(KIT, out)
             for name, (make, _) in {**parts.PRINTED, **jigs.PRINTED}.items():
                 again = import_step(out / "step" / f"{name}.step")
                 self.assertAlmostEqual(again.volume / make(KIT).volume, 1, places=4)
@@ -213,4 +218,5 @@ class Written(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    unittest.main(verbosity=2)
+    runner = unittest.TextTestRunner(stream=sys.stdout, verbosity=2)
+    unittest.main(testRunner=runner)
