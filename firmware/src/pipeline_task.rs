@@ -160,8 +160,9 @@ impl PipelineTask {
         let begun = Instant::now();
         if band.index == 0 {
             self.busy_us = 0;
-            if band.edge.number != self.newest.wrapping_add(1) {
-                self.sensor.forget_frame();
+            match band.edge.number.wrapping_sub(self.newest) {
+                1 => {}
+                passed => self.sensor.miss_frames(passed.wrapping_sub(1)),
             }
             self.sensor.set_down(settings::down());
             self.sensor.set_contact_shape(settings::contact_shape());

@@ -1,9 +1,9 @@
 //! Moves markers to one common time: a rolling shutter sees the lower ones later.
 //!
 //! A row is exposed one line after the row above it, and a frame every L lines. A marker seen in
-//! row y of one frame, and in row y′ of the previous frame, has moved for L + y − y′ lines. With
-//! this velocity it is moved to the time of the frame's middle row: by (y − middle) / (L + y − y′)
-//! of its motion.
+//! row y of one frame, and in row y′ of the frame n before it, has moved for n L + y − y′ lines.
+//! With this velocity it is moved to the time of the frame's middle row: by (y − middle) / (n L +
+//! y − y′) of its motion. Usually n is 1; it is more after frames that were missed.
 //!
 //! Using two frames instead of one changes a position's noise. At rest the weights are 1 − c and c,
 //! with c = (y − middle) / L. For markers 54 rows off the middle of 278 lines, the upper ones have
@@ -13,6 +13,10 @@ use crate::markers::lost::Lost;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::units::Px;
 
+/// The most frames that may be missed between two of which the motion is told. The mean motion over
+/// more says little about that during a frame.
+const MOST_MISSED: u16 = 7;
+
 /// The previous frame's markers, from which those of the current frame have moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
@@ -21,6 +25,10 @@ pub struct Motion {
     before: Option<Seen>,
     /// The markers of the current frame, which may be looked at again.
     now: Option<Seen>,
+    /// Frames missed between the previous frame and the current one.
+    missed: u16,
+    /// Frames missed since the current one.
+    missing: u16,
 }
 
 /// The markers of a frame.
@@ -35,8 +43,7 @@ impl Motion {
     /// All markers of a frame are seen at once.
     pub const GLOBAL: Motion = Motion {
         lines: None,
-        before: None,
-        now: None,
+        ..Motion::rolling(0)
     };
 
     /// A frame every `lines` lines, blank ones included; each line exposes a row.
@@ -45,17 +52,32 @@ impl Motion {
             lines: Some(lines),
             before: None,
             now: None,
+            missed: 0,
+            missing: 0,
         }
     }
 
-    /// Call before a frame that does not immediately follow the previous one.
+    /// Whether the rows of a frame are exposed one after the other.
+    pub fn is_rolling(&self) -> bool {
+        self.lines.is_some()
+    }
+
+    /// Call before a frame that the previous one says nothing about.
     pub fn forget(&mut self) {
         (self.before, self.now) = (None, None);
     }
 
+    /// Call before a frame, for frames that were missed before it.
+    pub fn miss(&mut self, frames: u32) {
+        let missing = u32::from(self.missing).saturating_add(frames);
+        self.missing = u16::try_from(missing).unwrap_or(u16::MAX);
+    }
+
     /// Call at the beginning of each frame.
     pub fn begin_frame(&mut self) {
-        self.before = self.now.take();
+        self.missed = core::mem::take(&mut self.missing);
+        let is_near = self.missed <= MOST_MISSED;
+        self.before = self.now.take().filter(|_| is_near);
     }
 
     /// Call at the end of each frame, with its markers and those that are lost, whose places are
@@ -69,9 +91,10 @@ impl Motion {
 
     /// Returns the markers as they were while the middle row of a frame of `rows` rows was exposed.
     /// Those that are `lost` stay where they are. Returns `None` with a global shutter, or if the
-    /// previous frame does not show each of the others.
+    /// previous frame does not show each of the others or is too long ago.
     pub fn at_the_middle(&self, seen: &MarkerList, lost: Lost, rows: u16) -> Option<MarkerList> {
         let (lines, before) = (self.lines?, self.before.as_ref()?);
+        let lines = (i64::from(self.missed) + 1) * i64::from(lines);
         if !before.lost.is_within(lost) {
             return None;
         }
@@ -84,13 +107,14 @@ impl Motion {
     }
 }
 
-/// Coordinates are below 2¹⁰ px, 2²⁶ in 1/65,536 px: products fit `i64` with 10 bits to spare. The
-/// divisor is positive, because a frame has more lines than rows.
+/// `lines` are those from `before` to `marker`'s frame. Coordinates are below 2¹⁰ px, 2²⁶ in
+/// 1/65,536 px: products fit `i64` with 10 bits to spare. The divisor is positive, because a frame
+/// has more lines than rows.
 #[inline(never)]
-fn move_to_the_middle(marker: &mut Marker, before: &Marker, rows: u16, lines: u16) {
+fn move_to_the_middle(marker: &mut Marker, before: &Marker, rows: u16, lines: i64) {
     let middle = (i64::from(rows) - 1) << 15;
     let below = i64::from(marker.y.0) - middle;
-    let lines = (i64::from(lines) << 16) + i64::from(marker.y.0) - i64::from(before.y.0);
+    let lines = (lines << 16) + i64::from(marker.y.0) - i64::from(before.y.0);
     let back = |now: Px, before: Px| {
         let moved = i64::from(now.0) - i64::from(before.0);
         Px(now.0 - (moved * below / lines.max(1)) as i32)
@@ -131,18 +155,38 @@ mod tests {
     fn markers_that_move_steadily_are_where_they_were_at_the_middle() {
         for velocity in [[0.0, 0.0], [1.5, 0.0], [0.0, 3.0], [-2.0, 5.0], [8.0, -8.0]] {
             let frame = |at| MarkerList::from(PLACES.map(|place| seen(place, velocity, at)));
-            let mut motion = Motion::rolling(LINES);
-            motion.ended(Some((&frame(-1.0), Lost::NONE)));
-            motion.begin_frame();
-            let moved = motion.at_the_middle(&frame(0.0), Lost::NONE, ROWS).unwrap();
-            for (moved, place) in moved.iter().zip(PLACES) {
-                let there = marker(place[0], place[1]);
-                let off = [moved.x.0 - there.x.0, moved.y.0 - there.y.0];
-                assert!(
-                    off.iter().all(|off| off.abs() <= 3),
-                    "{velocity:?}: {off:?}"
-                );
+            for missed in [0, 1, MOST_MISSED] {
+                let mut motion = Motion::rolling(LINES);
+                let earlier = frame(-1.0 - f64::from(missed));
+                motion.ended(Some((&earlier, Lost::NONE)));
+                motion.miss(missed.into());
+                motion.begin_frame();
+                let moved = motion.at_the_middle(&frame(0.0), Lost::NONE, ROWS).unwrap();
+                for (moved, place) in moved.iter().zip(PLACES) {
+                    let there = marker(place[0], place[1]);
+                    let off = [moved.x.0 - there.x.0, moved.y.0 - there.y.0];
+                    assert!(
+                        off.iter().all(|off| off.abs() <= 3),
+                        "{velocity:?}, {missed} missed: {off:?}"
+                    );
+                }
             }
+        }
+    }
+
+    #[test]
+    fn a_frame_that_is_long_ago_says_nothing() {
+        let now = MarkerList::from(PLACES.map(|[x, y]| marker(x, y)));
+        for missed in [MOST_MISSED + 1, u16::MAX] {
+            let mut motion = Motion::rolling(LINES);
+            motion.ended(Some((&now, Lost::NONE)));
+            motion.miss(u32::from(missed) - 1);
+            motion.miss(1);
+            motion.begin_frame();
+            assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
+            motion.ended(Some((&now, Lost::NONE)));
+            motion.begin_frame();
+            assert!(motion.at_the_middle(&now, Lost::NONE, ROWS).is_some());
         }
     }
 

@@ -7,7 +7,7 @@ use clap::Args;
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::forward::{Estimate, Forward, Markers, Mounting, Observed, Pose};
+use hivtac_sensor::force::forward::{Estimate, Forward, Markers, Mounting, Observed, Pose, Start};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_terms::list::List;
@@ -155,7 +155,12 @@ fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
             let focal = off_px as f32 * mounting.scale();
             observed.moved[2 * marker] += focal * turn.cos();
             observed.moved[2 * marker + 1] += focal * turn.sin();
-            let found = forward.estimate(&observed, mounting, forward.unknown(true), Some(pose));
+            let found = forward.estimate(
+                &observed,
+                mounting,
+                forward.unknown(true),
+                Start::Near(pose),
+            );
             cell.take(forward, &pose, off_px, &found);
         }
     }

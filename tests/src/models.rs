@@ -115,6 +115,11 @@ pub fn anywhere(steps: u8) -> Vec<u8> {
     with_steps(file, steps).expect("the committed model takes steps")
 }
 
+/// Returns the committed model of eight dots, which has no network.
+pub fn eight_dots() -> Vec<u8> {
+    include_bytes!("../../calibration/models/8v/default.hvtm").to_vec()
+}
+
 fn qvga() -> Geometry {
     Geometry::preset(Preset::Ov7725, 320, 240)
 }

@@ -109,7 +109,7 @@ fn the_sensing_runs_from_itcm() {
         "7Resting17estimate_of_three",
         "8pipeline6placed",
         "5rules6placed",
-        "7Resting22estimate_without_guess",
+        "7Resting16estimate_without",
         "8majority8Majority",
         "8portable8multiply",
         "8portable6spline",

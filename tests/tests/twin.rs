@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-use crate::rig::{Rig, TIMEOUT_S};
+use crate::rig::{Rig, TIMEOUT_S, tool};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_live::camera::Kind;
@@ -12,7 +12,7 @@ use hivtac_live::device::{Captured, Device};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::HsvBox;
-use hivtac_twin::{Layout, Preset, Scene, Shutter};
+use hivtac_twin::{Layout, Options, Preset, Scene, Shutter};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Reply, Request, Sample,
@@ -34,6 +34,13 @@ fn told() -> [Request; 3] {
         Request::StartWithMarkers,
         Request::SetThreshold(HsvBox::RED.into()),
     ]
+}
+
+/// The model of eight dots, and their layout.
+const EIGHT_DOTS: &str = "../calibration/models/8v/default.hvtm";
+
+fn eight_dots() -> Layout {
+    "8v".parse().unwrap()
 }
 
 /// Returns what the firmware in a rig says of itself, and the samples of successive frames, from
@@ -72,8 +79,8 @@ fn from_the_rig(rig: &Rig) -> (DeviceHello, SettingsReport, Vec<Sample>) {
 struct Twin(Device);
 
 impl Twin {
-    fn new() -> Twin {
-        let mut twin = Twin(Device::new(Kind::Ov7725, Layout::default(), [0; 12], 1.0));
+    fn new(layout: Layout) -> Twin {
+        let mut twin = Twin(Device::new(Kind::Ov7725, layout, [0; 12], 1.0));
         twin.send(&HostMessage::Hello(HelloPrefix::OURS.into()));
         twin
     }
@@ -113,30 +120,14 @@ fn bytes(sample: Sample) -> Vec<u8> {
         .to_vec()
 }
 
-/// The number of the sample counts from the device's start, and is the only difference.
-#[test]
-fn a_twin_sends_the_bytes_of_the_flashed_program() {
-    let seed = SEED.to_string();
-    let rig = Rig::start(&["--scene", "demo", "--seed", &seed]).unwrap();
-    let (hello, settings, samples) = from_the_rig(&rig);
+/// Measures the frames of a rig's samples, with its truth, in the twin: the same bytes follow. The
+/// number of the sample counts from the device's start, and is the only difference.
+fn assert_same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>) {
     let lines = rig.truth().unwrap();
     let lines: HashMap<u64, &Value> = lines
         .iter()
         .map(|line| (line["frame"].as_u64().unwrap(), line))
         .collect();
-    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
-    let mut twin = Twin::new();
-    let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
-        panic!("a hello comes first");
-    };
-    let same = DeviceHello {
-        device_id: hello.device_id,
-        board: hello.board.clone(),
-        ..own
-    };
-    assert_eq!(same, hello);
-    let report = twin.ask(Request::GetSettings);
-    assert_eq!(report[0], DeviceMessage::Settings(settings));
     for request in told() {
         let (id, outcome) = (1, Outcome::Done);
         assert_eq!(
@@ -151,7 +142,7 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
             number: sample.frame,
             begun_us: sample.time_us - u64::try_from(camera.middle_us()).unwrap(),
             camera,
-            words: exposed(&scene, lines[&u64::from(sample.frame)]),
+            words: exposed(scene, lines[&u64::from(sample.frame)]),
         };
         twin.0.frame(&frame, nth == 0, || sample.time_us);
         let Some(DeviceMessage::Sample(own)) = twin.0.message() else {
@@ -165,11 +156,65 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
                 ..own.clone()
             }),
             bytes(sample.clone()),
-            "{own:?}\n{sample:?}"
+            "{nth}: {own:?}\n{sample:?}"
         );
         // Counters may come, too.
         while twin.0.message().is_some() {}
     }
     assert!(forces > SAMPLES / 2, "{forces}");
+}
+
+#[test]
+fn a_twin_sends_the_bytes_of_the_flashed_program() {
+    let seed = SEED.to_string();
+    let rig = Rig::start(&["--scene", "demo", "--seed", &seed]).unwrap();
+    let (hello, settings, samples) = from_the_rig(&rig);
+    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
+    let mut twin = Twin::new(Layout::default());
+    let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
+        panic!("a hello comes first");
+    };
+    let same = DeviceHello {
+        device_id: hello.device_id,
+        board: hello.board.clone(),
+        ..own
+    };
+    assert_eq!(same, hello);
+    let report = twin.ask(Request::GetSettings);
+    assert_eq!(report[0], DeviceMessage::Settings(settings));
+    assert_same_samples(&mut twin, &scene, &rig, samples);
+    rig.finish().unwrap();
+}
+
+/// A device that was given the model of eight dots. It measures every frame of a moving press.
+#[test]
+#[ignore = "slow: boots two devices"]
+fn a_twin_of_eight_dots_sends_the_bytes_of_the_flashed_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let flash = folder.path().join("flash");
+    let flash = flash.to_str().unwrap();
+    let rig = Rig::start(&["--fault", "camera-absent", "--flash", flash]).unwrap();
+    let sent = tool(&rig, "update model", &[EIGHT_DOTS]).unwrap();
+    assert_eq!(sent.code, Some(0), "{sent:?}");
+    rig.finish().unwrap();
+    let seed = SEED.to_string();
+    let options = ["--scene", "demo", "--seed", &seed, "--layout", "8v"];
+    let rig = Rig::start(&[&options[..], &["--flash", flash]].concat()).unwrap();
+    let (hello, _, samples) = from_the_rig(&rig);
+    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
+    let options = Options {
+        layout: eight_dots(),
+        ..scene.options().clone()
+    };
+    let scene = scene.with_options(options).unwrap();
+    let mut twin = Twin::new(eight_dots());
+    let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
+        panic!("a hello comes first");
+    };
+    let crc = |hello: DeviceHello| hello.model.expect("a model").crc;
+    assert_eq!(crc(hello), crc(own));
+    let numbers = samples.windows(2).map(|pair| pair[1].frame - pair[0].frame);
+    assert!(numbers.into_iter().all(|step| step == 1), "{samples:?}");
+    assert_same_samples(&mut twin, &scene, &rig, samples);
     rig.finish().unwrap();
 }

@@ -3,7 +3,7 @@
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
     Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
-    Sigma, Strength, Turned,
+    Sigma, Start, Strength, Turned,
 };
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
@@ -177,7 +177,7 @@ impl Resting {
             ..Pose::default()
         };
         let unknown = forward.unknown(resting.is_own);
-        let estimate = forward.estimate(&observed, &resting.mounting, unknown, Some(guess));
+        let estimate = forward.estimate(&observed, &resting.mounting, unknown, Start::Near(guess));
         let (force, by_noise) = force(&forward.strength(resting.is_own), &estimate);
         Some((force.magnitude, by_noise))
     }
@@ -243,7 +243,7 @@ impl Resting {
             &observed,
             &self.mounting,
             forward.unknown(self.is_own),
-            Some(guess),
+            Start::Near(guess),
         )
     }
 
@@ -264,13 +264,15 @@ impl Resting {
         (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
     }
 
-    /// Returns the load that explains the markers but the `lost` ones best, without a guess.
-    pub fn estimate_without_guess(
+    /// Returns the load that explains the markers but the `lost` ones best. The steps begin at
+    /// `start`.
+    pub fn estimate_without(
         &self,
         forward: &Forward<'_>,
         markers: &[Marker],
         lost: Lost,
         noise: FrameNoise,
+        start: Start,
     ) -> Estimate {
         let mut observed = self.observed(forward, markers, noise);
         observed.lost = lost;
@@ -279,7 +281,7 @@ impl Resting {
             &observed,
             &self.mounting,
             forward.unknown(self.is_own),
-            None,
+            start,
         )
     }
 

@@ -100,6 +100,8 @@ struct Prepared {
     standing: Status,
     /// The rest position that frames are measured against.
     rest: Option<Rest>,
+    /// What the previous frame of a film of another layout showed.
+    before: placed::Before,
 }
 
 impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
@@ -280,10 +282,17 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.motion = motion;
     }
 
-    /// Call before a frame that does not immediately follow the previous one. The motion of the
-    /// markers, and the noise between the frames, are then unknown.
+    /// Call before a frame that the previous one says nothing about. The motion of the markers, and
+    /// the noise between the frames, are then unknown.
     pub fn forget_frame(&mut self) {
         self.motion.forget();
+        self.noise.forget_frame();
+    }
+
+    /// Call before a frame, for frames of the camera that were missed before it. The motion of the
+    /// markers is then their mean motion since the previous frame; the noise is unknown.
+    pub fn miss_frames(&mut self, frames: u32) {
+        self.motion.miss(frames);
         self.noise.forget_frame();
     }
 
@@ -444,6 +453,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             }),
             standing: self.standing_status(),
             rest,
+            before: placed::Before::default(),
         });
         self.apply_drift();
         self.apply_contact_shape();

@@ -8,7 +8,7 @@
 use super::again::BLUR;
 use super::{Look, Measurement, Prepared, Sensor};
 use crate::force::features::Features;
-use crate::force::forward::{Column, Estimate, Forward};
+use crate::force::forward::{Column, Estimate, Forward, Pose, Start};
 use crate::force::rest::Rest;
 use crate::force::{Force, FrameNoise, Resting};
 use crate::markers::lost::Lost;
@@ -22,6 +22,15 @@ use hivtac_terms::units::Px;
 const SQUARE: usize = 4;
 /// Number of markers that are left out in turn, those that a contact explains least first.
 const SUSPECTS: usize = 3;
+
+/// What the previous frame showed: where the steps of the next one begin.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Before {
+    /// The load that explained its markers; `None` if no load did.
+    load: Option<Pose>,
+    /// The marker that it left out.
+    left_out: Option<usize>,
+}
 
 impl Prepared {
     /// The rest position of a film with another layout than the square of four dots.
@@ -100,7 +109,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             markers: moved.unwrap_or(placed.markers),
             ..placed
         };
-        let force = self.explain(&still, &mut status);
+        // Within a rolling frame, markers whose motion is unknown may be anywhere on their way.
+        let is_still = moved.is_some() || !self.motion.is_rolling();
+        let force = self.explain(&still, is_still, &mut status);
         let is_whole = placed.lost == Lost::NONE;
         Measurement {
             status,
@@ -111,8 +122,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
     }
 
-    /// Returns the force of markers at one common time; `None` if `status` forbids one.
-    fn explain(&mut self, placed: &Placed, status: &mut Status) -> Option<Force> {
+    /// Returns the force of markers; `None` if `status` forbids one. `is_still` says that they are
+    /// seen at one common time.
+    fn explain(&mut self, placed: &Placed, is_still: bool, status: &mut Status) -> Option<Force> {
         if status.intersects(Status::NO_FORCE) {
             return None;
         }
@@ -125,7 +137,14 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         };
         let is_again = matches!(self.look, Look::Again);
         let noise = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
-        let (estimate, lost) = explained(forward, resting, placed, noise);
+        let seen = Seen {
+            forward,
+            resting,
+            placed,
+            noise,
+        };
+        let (estimate, left_out) = seen.explained(&prepared.before, is_still);
+        let lost = placed.without(left_out);
         if !is_again && lost == Lost::NONE {
             self.noise.saw(noise, &estimate.left);
         }
@@ -134,33 +153,66 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         if lost != Lost::NONE {
             *status |= Status::MARKER_LOST;
         }
+        // A second look may come too late: no later frame depends on it.
+        if let Some(prepared) = self.prepared.as_mut().filter(|_| !is_again) {
+            prepared.before = Before {
+                load: estimate.is_explained().then_some(estimate.pose),
+                left_out,
+            };
+        }
         (!status.intersects(Status::NO_FORCE)).then_some(force)
     }
 }
 
-/// Returns the load that explains the markers best, and those that it does without. A marker is
-/// left out if a contact explains only the others.
-fn explained(
-    forward: &Forward<'_>,
-    resting: &Resting,
-    placed: &Placed,
+/// The markers of a frame, and what they are measured by.
+struct Seen<'a> {
+    forward: &'a Forward<'a>,
+    resting: &'a Resting,
+    placed: &'a Placed,
     noise: FrameNoise,
-) -> (Estimate, Lost) {
-    let of = |lost: Lost| resting.estimate_without_guess(forward, &placed.markers, lost, noise);
-    let all = of(placed.lost);
-    if all.is_explained() || !placed.may_lose(1) {
-        return (all, placed.lost);
-    }
-    let mut suspects = Lost::NONE;
-    for _ in 0..SUSPECTS {
-        let suspect = least_explained(&all.left, placed.lost, suspects);
-        suspects = suspects.and(suspect);
-        let others = of(placed.lost.and(suspect));
-        if others.is_explained() {
-            return (others, placed.lost.and(suspect));
+}
+
+impl Seen<'_> {
+    /// Returns the load that explains the markers best, and the one that it leaves out. A marker is
+    /// left out if a contact explains only the others, and if they are `still`. The load of the
+    /// frame before is tried first, then without the marker that it left out.
+    fn explained(&self, before: &Before, is_still: bool) -> (Estimate, Option<usize>) {
+        let may_leave_out = is_still && self.placed.may_lose(1);
+        if let Some(load) = before.load {
+            let found = self.estimate(None, Start::At(load));
+            if found.is_explained() {
+                return (found, None);
+            }
+            let again = before.left_out.filter(|_| may_leave_out);
+            if let Some(suspect) = again.filter(|again| !self.placed.lost.contains(*again)) {
+                let others = self.estimate(Some(suspect), Start::At(load));
+                if others.is_explained() {
+                    return (others, Some(suspect));
+                }
+            }
         }
+        let all = self.estimate(None, Start::Anywhere);
+        if all.is_explained() || !may_leave_out {
+            return (all, None);
+        }
+        let mut suspects = Lost::NONE;
+        for _ in 0..SUSPECTS {
+            let suspect = least_explained(&all.left, self.placed.lost, suspects);
+            suspects = suspects.and(suspect);
+            let others = self.estimate(Some(suspect), Start::At(all.pose));
+            if others.is_explained() {
+                return (others, Some(suspect));
+            }
+        }
+        (all, None)
     }
-    (all, placed.lost)
+
+    fn estimate(&self, left_out: Option<usize>, start: Start) -> Estimate {
+        let markers = &self.placed.markers;
+        let lost = self.placed.without(left_out);
+        self.resting
+            .estimate_without(self.forward, markers, lost, self.noise, start)
+    }
 }
 
 /// The marker, neither lost nor among `others`, of which a load leaves most over.

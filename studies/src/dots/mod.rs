@@ -7,7 +7,9 @@ use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::forward::{UnitSetup, of_layout};
-use hivtac_sensor::force::forward::{Column, Estimate, Forward, Markers, Mounting, Observed};
+use hivtac_sensor::force::forward::{
+    Column, Estimate, Forward, Markers, Mounting, Observed, Start,
+};
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_terms::list::List;
 use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Unit};
@@ -247,7 +249,7 @@ impl Bench<'_> {
             pressing: None,
         };
         let unknown = self.forward.unknown(true);
-        let found = (self.forward).estimate(&observed, &self.mounting, unknown, None);
+        let found = (self.forward).estimate(&observed, &self.mounting, unknown, Start::Anywhere);
         Ok(self.judged(&found, &load))
     }
 

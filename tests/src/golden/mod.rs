@@ -198,9 +198,9 @@ impl<'b> Runner<'b> {
         let file = &self.buffers.model.0[self.model_place.clone()];
         let mut sensor = sensor(file, self.sent, [width, height])?;
         let words = [self.pixels.row_length(width), height.into()];
-        for _ in 0..frames {
+        for left in (0..frames).rev() {
             let buffers = (&mut self.buffers.row[..], &mut self.buffers.bands[..]);
-            let measurement = sense_frame(&mut sensor, source, buffers, words)?;
+            let measurement = sense_frame(&mut sensor, source, buffers, words, left == 0)?;
             say(results, self.cases, format_args!("{measurement:?}"))?;
             say(results, self.cases, format_args!("{:?}", sensor.blobs()))?;
         }
@@ -336,12 +336,15 @@ fn say(results: &mut impl Write, case: u32, result: fmt::Arguments<'_>) -> Resul
     writeln!(results, "{case}: {result}").map_err(ScriptError::Output)
 }
 
+/// Senses a frame. The instruction counter counts the work if `is_counted`: the last frame's.
 fn sense_frame(
     sensor: &mut Sensor<'_, BLOBS>,
     source: &mut impl Source,
     (row, bands): (&mut [u16], &mut [u16]),
     [length, height]: [usize; 2],
+    is_counted: bool,
 ) -> Result<Measurement, ScriptError> {
+    let counting_begins = || is_counted.then(|| counting_begins());
     let mut left = height;
     // As in the firmware, a band stays in memory until the next one was pushed.
     let (mut above, mut below) = bands.split_at_mut(bands.len() / 2);
@@ -352,7 +355,7 @@ fn sense_frame(
     while left > 0 {
         let rows = left.min(usize::from(BAND_ROWS));
         let band = read_band(source, row, below, [length, rows])?;
-        if left <= usize::from(BAND_ROWS) {
+        if is_counted && left <= usize::from(BAND_ROWS) {
             last_band_begins();
         }
         left -= rows;

@@ -243,7 +243,7 @@ impl Device {
     pub fn missed(&mut self, frames: u32) {
         self.stats.frames_exposed += frames;
         self.stats.dropped_busy += frames;
-        self.sensor.forget_frame();
+        self.sensor.miss_frames(frames);
     }
 
     /// Measures a frame. `missed` says that frames before it are missing, `now` the time in µs

@@ -24,6 +24,17 @@ const HALF: f32 = 0.5;
 /// nothing.
 const LOST: f32 = 1e6;
 
+/// Where steps begin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Start {
+    /// Nothing is known of the load.
+    Anywhere,
+    /// At a guess. If the load found there does not explain the markers, also elsewhere.
+    Near(Pose),
+    /// At a guess, and nowhere else.
+    At(Pose),
+}
+
 /// How the markers' images moved since the rest position, and how well that is known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Observed<'a> {
@@ -98,16 +109,16 @@ pub struct Estimate {
 impl Forward<'_> {
     /// Takes steps from a guess, or without one from where the markers moved most. If they get
     /// stuck, or end at a load that does not explain the markers, also takes steps from where the
-    /// markers moved most, or from the nearest of a few presses. These succeed where the first
-    /// steps began badly. Returns the better load. Compiled once, because the near memory is
-    /// scarce.
+    /// markers moved most, or from the nearest of a few presses, unless [`Start::At`] forbids it.
+    /// These succeed where the first steps began badly. Returns the better load. Compiled once,
+    /// because the near memory is scarce.
     #[inline(never)]
     pub fn estimate(
         &self,
         observed: &Observed<'_>,
         mounting: &Mounting,
         unknown: Unknown<'_>,
-        guess: Option<Pose>,
+        start: Start,
     ) -> Estimate {
         let mut storage = Storage::new();
         let mut descend = |guess| {
@@ -121,14 +132,15 @@ impl Forward<'_> {
             place_mm: self.rest_image.where_most(&observed.moved),
             ..Pose::default()
         };
-        let first = guess.unwrap_or_else(|| where_most(HALF * self.limits.size));
-        let (found, is_done) = descend(first);
-        if is_done {
-            return found;
-        }
-        let (other, _) = descend(match guess {
-            Some(guess) => where_most(guess.size),
-            None => self.nearest_press(observed, &mounting.beside_mm),
+        let (found, is_done) = descend(match start {
+            Start::Anywhere => where_most(HALF * self.limits.size),
+            Start::Near(guess) | Start::At(guess) => guess,
+        });
+        let (other, _) = descend(match start {
+            _ if is_done => return found,
+            Start::At(_) => return found,
+            Start::Near(guess) => where_most(guess.size),
+            Start::Anywhere => self.nearest_press(observed, &mounting.beside_mm),
         });
         let looks = found.looks + other.looks;
         let nearer = if other.unexplained < found.unexplained {

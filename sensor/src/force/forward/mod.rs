@@ -49,7 +49,7 @@ pub use covariance::{
 };
 pub use descent::Descent;
 pub use drift::Drift;
-pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, stated};
+pub use estimate::{Estimate, Observed, STEPS_AT_MOST, Sigma, Start, stated};
 pub use mounting::{CameraMotion, Mounting, RestImage};
 pub use pose::{Pose, Stiffness};
 pub use predict::{Dot, MOST_FUNCTIONS, Markers, Prediction, Tables};

@@ -4,7 +4,7 @@
 //! steps are those for four markers. The network cannot give the first guess; the steps begin at
 //! the nearest of a few straight presses.
 
-use super::estimate::{Estimate, Observed};
+use super::estimate::{Estimate, Observed, Start};
 use super::mounting::Mounting;
 use super::pose::Pose;
 use super::predict::Markers;
@@ -54,7 +54,7 @@ impl Forward<'_> {
         observed.lost = Lost::only(lost);
         observed.lost.clear(&mut observed.moved);
         let guess = self.nearest_press(&observed, &mounting.beside_mm);
-        let estimate = self.estimate(&observed, mounting, unknown, Some(guess));
+        let estimate = self.estimate(&observed, mounting, unknown, Start::Near(guess));
         let moved = self.moved(&estimate.pose, &mounting.beside_mm);
         let [lost_x, lost_y] = [2 * lost, 2 * lost + 1].map(|k| moved.get(k).copied());
         let at = lost_x.zip(lost_y).unwrap_or_default();

@@ -127,6 +127,11 @@ impl Placed {
         lost <= MOST_LOST && lost + FEWEST <= self.markers.len()
     }
 
+    /// The markers that count for nothing: those that are lost, and this one.
+    pub fn without(&self, left_out: Option<usize>) -> Lost {
+        left_out.map_or(self.lost, |identity| self.lost.and(identity))
+    }
+
     /// Whether these are whole markers of a film at rest, as the film of another rest picture has
     /// them.
     pub fn may_rest(&self, other: &[Marker]) -> bool {

@@ -7,7 +7,7 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
 use hivtac_sensor::force::model::{Model, OutputKind};
@@ -66,6 +66,8 @@ enum Work {
     Frame {
         /// What is special about it; empty for the usual one.
         special: &'static str,
+        /// The frames before it, which tell what moves.
+        before: Vec<Vec<u16>>,
         pixels: Vec<u16>,
     },
     /// One inference of a model with these layer widths.
@@ -90,7 +92,10 @@ impl Case {
         script.model(&self.model);
         script.threshold(Threshold::red(self.format), ByteOrder::Swapped);
         match &self.work {
-            Work::Frame { pixels, .. } => script.sense(self.size[0], &[pixels]),
+            Work::Frame { before, pixels, .. } => {
+                let frames = before.iter().chain([pixels]).map(|frame| &frame[..]);
+                script.sense(self.size[0], &frames.collect::<Vec<_>>())
+            }
             Work::Table => {
                 script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped)
             }
@@ -123,7 +128,11 @@ fn cases() -> Result<Vec<Case>> {
         let model = model?;
         let usual = usual_frame(&model, format, &scene("static", format, size)?, size)?;
         let case = |(special, pixels)| Case {
-            work: Work::Frame { special, pixels },
+            work: Work::Frame {
+                special,
+                before: Vec::new(),
+                pixels,
+            },
             model: model.clone(),
             size,
             format,
@@ -138,6 +147,8 @@ fn cases() -> Result<Vec<Case>> {
             cases.extend(strained(size, &usual).map(case));
         }
     }
+    cases.push(pressed("one step", "4", models::anywhere(1))?);
+    cases.push(pressed("eight dots", "8v", models::eight_dots())?);
     cases.extend([&SMALL[..], &PAPER].map(|widths| Case {
         work: Work::Network(widths),
         model: models::file(widths, Weights::Random, OutputKind::ForceVector, 1),
@@ -155,6 +166,35 @@ fn cases() -> Result<Vec<Case>> {
         format: PixelFormat::Rgb565,
     });
     Ok(cases)
+}
+
+/// A frame of a press of 0.1 N off the middle that grows, with the model that measures it.
+fn pressed(special: &'static str, layout: &str, model: Vec<u8>) -> Result<Case> {
+    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
+    let scene = scene("rest", format, size)?;
+    let scene = scene.clone().with_options(Options {
+        layout: layout.parse()?,
+        ..scene.options().clone()
+    })?;
+    let frame = |number, force_n| -> Result<Vec<u16>> {
+        let load = Load::from_angles(force_n, 4.0, -3.0)?.with_offset_mm([1.5, -2.25])?;
+        Ok(scene.render_load(&load, number)?.words().into_owned())
+    };
+    let (before, pixels) = (vec![frame(1, 0.096)?, frame(2, 0.098)?], frame(3, 0.1)?);
+    let case = Case {
+        work: Work::Frame {
+            special,
+            before,
+            pixels,
+        },
+        model,
+        size,
+        format,
+    };
+    let results = qemu::run_on_host(&case.script())?;
+    let forces = results.matches("force: Some").count();
+    ensure!(forces == 3, "{special}: {forces} of 3 frames have a force");
+    Ok(case)
 }
 
 /// Steps at a press of 0.1 N off the middle.
@@ -189,12 +229,15 @@ impl Board {
         let (model, pixels) = (file("model"), file("rgb565"));
         match &case.work {
             Work::Steps(..) | Work::Table => return Ok(()),
+            // The board's program measures single frames.
+            Work::Frame { before, .. } if !before.is_empty() => return Ok(()),
             Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
             // The board's program reads RGB565.
             Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),
             Work::Frame {
                 special,
                 pixels: frame,
+                ..
             } => {
                 let swapped = frame.iter().flat_map(|pixel| pixel.to_be_bytes());
                 write(&pixels, &swapped.collect::<Vec<_>>())?;
