@@ -27,6 +27,7 @@ mod condition;
 mod dtcm_table;
 mod faults;
 mod flash;
+mod image;
 mod info;
 mod led;
 mod loader;
@@ -73,6 +74,7 @@ use next_model::InUse;
 use snapshot_copy::SnapshotCopy;
 use static_cell::{ConstStaticCell, StaticCell};
 
+core::arch::global_asm!(include_str!("first_stage.s"));
 core::arch::global_asm!(include_str!("start.s"));
 
 static CAPTURE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();

@@ -1,5 +1,5 @@
-// Runs right after a reset, before any memory is initialized, and so uses registers only. Starts
-// the microcontroller's own loader if the program requested it (loader.rs). Waits until the core's
+// Runs right after the first stage (first_stage.s), or instead of it where a debug probe starts the
+// program, before any memory is initialized, and so uses registers only. Waits until the core's
 // supply is valid: no memory may be written before (RM0433, 6.4.1). Switches on the clocks of SRAM1
 // to SRAM3. Loads .itcm and .sram (memory.x) from flash in double words, the unit of error
 // correction, and clears .sram_zero and .axisram_cached.
@@ -10,34 +10,6 @@
     .type __pre_init, %function
     .thumb_func
 __pre_init:
-    ldr     r0, =0x580244D0         // RCC_RSR
-    ldr     r1, [r0]
-    tst     r1, #0x01000000         // SFTRSTF: after a reset by software memory holds what it held
-    beq     7f
-    ldr     r0, =LOADER_WANTED
-    cbz     r0, 7f
-    ldr     r1, [r0]
-    ldr     r2, =0x21554644         // "DFU!"
-    cmp     r1, r2
-    bne     7f
-    movs    r1, #0                  // once
-    str     r1, [r0]
-    ldr     r0, =0x580244D0         // RCC_RSR: the loader starts the program by a jump (AN3156),
-    ldr     r1, [r0]                // which then is not to take this reset for its own
-    orr     r1, #0x00010000         // RMVF
-    str     r1, [r0]
-    ldr     r0, =0x1FF09800         // the loader's vectors: AN2606 has the ROM from 0x1FF00000 on,
-                                    // ST's "Jump to bootloader from application on STM32H7
-                                    // devices" where to enter it
-    ldr     r1, =0xE000ED08         // VTOR
-    str     r0, [r1]
-    dsb
-    ldr     r1, [r0]
-    msr     msp, r1
-    ldr     r1, [r0, #4]
-    bx      r1
-
-7:
     ldr     r0, =0x5802480C         // PWR_CR3: the supply is the internal regulator. Written once
     ldr     r1, [r0]                // after power-on; the HAL's later write does nothing
     orr     r1, #0x00000002         // LDOEN

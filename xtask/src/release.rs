@@ -3,11 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use clap::Args;
-use object::Endianness;
-use object::elf::PT_LOAD;
-use object::read::elf::{ElfFile32, ProgramHeader};
+use hivtac_image::Image;
 use serde_json::Value;
 
 use crate::artifacts::{self, Board};
@@ -157,36 +155,14 @@ impl Target<'_> {
     }
 }
 
-/// Writes both boards' firmware as it lies in flash.
+/// Writes both boards' firmware as it lies in flash, with its checksum.
 fn images(folder: &Path) -> Result<()> {
     for (board, name) in [(Board::Weact, "weact-h743"), (Board::OpenmvH7, "openmv-h7")] {
         let elf = std::fs::read(artifacts::firmware(board)?)?;
         let file = folder.join(format!("hivtac-firmware-{VERSION}-{name}.bin"));
-        std::fs::write(file, image(&elf)?)?;
+        std::fs::write(file, Image::of_elf(&elf)?.bytes())?;
     }
     Ok(())
-}
-
-/// What an ELF loads into flash, from the first address on; gaps are blank flash.
-fn image(elf: &[u8]) -> Result<Vec<u8>> {
-    let file = ElfFile32::<Endianness>::parse(elf).context("not an ELF file")?;
-    let (endian, mut image) = (file.endian(), Vec::new());
-    let segments = file.elf_program_headers().iter();
-    let loaded = segments.filter(|segment| segment.p_filesz(endian) > 0);
-    let mut loaded: Vec<_> = loaded
-        .filter(|segment| segment.p_type(endian) == PT_LOAD)
-        .collect();
-    loaded.sort_by_key(|segment| segment.p_paddr(endian));
-    let start = loaded
-        .first()
-        .context("an ELF that loads nothing")?
-        .p_paddr(endian);
-    for segment in loaded {
-        image.resize((segment.p_paddr(endian) - start) as usize, 0xFF);
-        let bytes = segment.data(endian, elf);
-        image.extend(bytes.map_err(|()| anyhow!("an ELF that is cut"))?);
-    }
-    Ok(image)
 }
 
 /// Writes what the host tool is made of, as CycloneDX. Each wheel has its own list.

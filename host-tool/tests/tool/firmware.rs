@@ -1,24 +1,36 @@
-//! Tests an update of the firmware: the loader's start, and the report about the device afterwards.
+//! Tests an update of the firmware as far as it goes without USB: what is refused before the device
+//! is asked, and a loader that does not appear. `src/firmware/tests.rs` has the rest.
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_image::examples;
 use hivtac_wire::message::*;
 
-/// A file that begins as a program does.
-fn program(directory: &tempfile::TempDir) -> String {
+const LENGTH: usize = 0x1000;
+
+/// Writes an image for this board; returns its path.
+fn image(directory: &tempfile::TempDir, board: &str) -> String {
+    let image = examples::image(board, "1.1", LENGTH, 1);
+    file(directory, image.bytes())
+}
+
+fn file(directory: &tempfile::TempDir, bytes: &[u8]) -> String {
     let path = directory.path().join("new.bin");
-    let words = [0x2000_6000_u32, 0x0801_0101];
-    std::fs::write(&path, words.map(u32::to_le_bytes).concat()).unwrap();
+    std::fs::write(&path, bytes).unwrap();
     path.to_str().unwrap().to_owned()
+}
+
+fn is_start(message: &HostMessage) -> bool {
+    let HostMessage::Command(Command { request, .. }) = message else {
+        return false;
+    };
+    *request == Request::StartLoader
 }
 
 /// A device that goes away when it must start its loader.
 fn until_loader(device: &mut Conversation) {
     while let Some(message) = device.next() {
-        let starts = matches!(
-            &message,
-            HostMessage::Command(Command { request, .. }) if *request == Request::StartLoader
-        );
+        let starts = is_start(&message);
         device.answer_to(message);
         if starts {
             return;
@@ -27,50 +39,66 @@ fn until_loader(device: &mut Conversation) {
 }
 
 #[test]
-fn the_version_is_told_before_and_after() {
-    let directory = tempfile::tempdir().unwrap();
-    let back: Script = Box::new(|device| {
-        device.next();
-        device.send(DeviceMessage::Hello(DeviceHello {
-            firmware: "fake 1.1".try_into().unwrap(),
-            ..hello()
-        }));
-    });
-    let device = FakeDevice::on_tcp([Box::new(until_loader), back]);
-    let file = program(&directory);
-    let run = run(&["update", "firmware", &file, "--port", &device.port]);
-    assert_eq!(run.code, Some(0), "{}", run.stderr);
-    let command = format!("dfu-util -d 0483:df11 -a 0 -s 0x08000000:leave -D '{file}'\n");
-    assert!(run.stdout.contains(&command), "{}", run.stdout);
-    assert!(
-        run.stdout.ends_with("firmware fake 1.1, was fake 1.0\n"),
-        "{}",
-        run.stdout
-    );
-}
-
-#[test]
-fn a_device_that_does_not_come_back_is_no_device() {
+fn a_loader_that_does_not_appear_is_no_device() {
     let directory = tempfile::tempdir().unwrap();
     let device = FakeDevice::on_tcp([Box::new(until_loader)]);
-    let file = program(&directory);
-    let port = ["--port", &device.port, "--timeout", "0.2"];
-    let run = run(&[&["update", "firmware", &file, "--wait", "1"], &port[..]].concat());
+    let file = image(&directory, "fake board");
+    let port = ["--port", &device.port, "--wait", "0.5"];
+    let run = run(&[&["update", "firmware", &file], &port[..]].concat());
     assert_eq!(run.code, Some(3));
     assert!(
-        run.stderr.contains("did not come back within 1 s"),
+        run.stderr.contains("did not appear with its loader"),
         "{}",
         run.stderr
     );
 }
 
 #[test]
-fn a_file_that_is_no_program_is_refused_before_the_device_is_asked() {
+fn an_image_for_another_board_is_refused_and_the_device_goes_on() {
     let directory = tempfile::tempdir().unwrap();
-    let path = directory.path().join("firmware");
-    std::fs::write(&path, b"\x7fELF and more").unwrap();
-    let path = path.to_str().unwrap();
-    let run = run(&["update", "firmware", path, "--port", "tcp:127.0.0.1:1"]);
+    let script: Script = Box::new(|device: &mut Conversation| {
+        while let Some(message) = device.next() {
+            assert!(!is_start(&message), "nothing may happen to the device");
+            device.answer_to(message);
+        }
+    });
+    let device = FakeDevice::on_tcp([script]);
+    let file = image(&directory, "another board");
+    let run = run(&["update", "firmware", &file, "--port", &device.port]);
     assert_eq!(run.code, Some(1));
-    assert!(run.stderr.contains("objcopy"), "{}", run.stderr);
+    let told = "for the board another board, and the device is a fake board; give the firmware for";
+    assert!(run.stderr.contains(told), "{}", run.stderr);
+}
+
+#[test]
+fn a_file_that_is_no_image_is_refused_before_the_device_is_asked() {
+    let whole = examples::image("fake board", "1.1", LENGTH, 1);
+    let mut damaged = whole.bytes().to_vec();
+    *damaged.last_mut().unwrap() ^= 1;
+    let cut = &whole.bytes()[..whole.bytes().len() - 100];
+    let unsealed = examples::loaded("fake board", "1.1", LENGTH, 1);
+    let cases: [(&[u8], &str); 6] = [
+        (b"text", "no firmware of this sensor"),
+        (b"", "no firmware of this sensor"),
+        (b"\x7fELF and more", "an ELF that cannot be read"),
+        (&damaged, "damaged: the checksum of its program"),
+        (cut, "cut: it has"),
+        (&unsealed, "give the ELF itself"),
+    ];
+    for (bytes, told) in cases {
+        let directory = tempfile::tempdir().unwrap();
+        let path = file(&directory, bytes);
+        let run = run(&["update", "firmware", &path, "--port", "tcp:127.0.0.1:1"]);
+        assert_eq!(run.code, Some(1));
+        assert!(run.stderr.contains(&path), "{}", run.stderr);
+        assert!(run.stderr.contains(told), "{}", run.stderr);
+    }
+}
+
+#[test]
+fn a_device_that_is_nowhere_is_no_device() {
+    let directory = tempfile::tempdir().unwrap();
+    let file = image(&directory, "fake board");
+    let run = run(&["update", "firmware", &file, "--port", "tcp:127.0.0.1:1"]);
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
 }

@@ -19,14 +19,23 @@ use cortex_m_semihosting::debug;
 use defmt_rtt as _;
 use embassy_stm32::Config;
 use embassy_stm32::rcc::*;
+use hivtac_image::header::{Header, Mark};
 use panic_probe as _;
 
 use measure::{Scanners, Workplace};
 use meter::Meter;
 use static_cell::ConstStaticCell;
 
-// Loads what `memory.x` puts into ITCM.
+// What is started first, and loads what `memory.x` puts into ITCM.
+core::arch::global_asm!(include_str!("../../../firmware/src/first_stage.s"));
 core::arch::global_asm!(include_str!("../../../firmware/src/start.s"));
+
+#[used]
+#[unsafe(link_section = ".first_stage.mark")]
+static FIRST_STAGE: Mark = Mark::of_first_stage("benchmark");
+#[used]
+#[unsafe(link_section = ".image_header")]
+static HEADER: Header = Header::unsealed("benchmark", env!("CARGO_PKG_VERSION"));
 
 static WORKPLACE: ConstStaticCell<Workplace> = ConstStaticCell::new(Workplace::new());
 #[unsafe(link_section = ".sram.scanners")]

@@ -1,8 +1,8 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
 //! core that the emulator lacks.
 //!
-//! The emulator itself is not patched. [`Chip`] wraps the part and handles seven slots itself:
-//! DCMI, MDMA, CRS, the flash, and the three blocks of OTG2. All other accesses go to the part's
+//! The emulator itself is not patched. [`Chip`] wraps the part and handles eight slots itself:
+//! DCMI, MDMA, CRC, CRS, the flash, and the three blocks of OTG2. All other accesses go to the part's
 //! own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
@@ -22,6 +22,7 @@ use crate::late_enable::LateEnable;
 use crate::late_flags::LateFlags;
 use crate::late_line::LateLine;
 use crate::mpu::{Mpu, Protection};
+use crate::peripherals::crc::Crc;
 use crate::peripherals::crs::Crs;
 use crate::peripherals::dcmi::Dcmi;
 use crate::peripherals::flash::{Bank, Flash};
@@ -74,6 +75,7 @@ pub struct Chip {
     pub mdma: Mdma,
     /// The registers of an MPU that is not enforced.
     pub mpu: Option<Mpu>,
+    crc: Crc,
     crs: Crs,
     flash: Flash,
     control_bus: ControlBus,
@@ -92,6 +94,7 @@ pub struct Chip {
     slots: board::Slots,
     dcmi_slot: usize,
     mdma_slot: usize,
+    crc_slot: usize,
     crs_slot: usize,
     flash_slot: usize,
     vsync: Level,
@@ -137,6 +140,7 @@ impl Chip {
         let slots = board::Slots::of(part.bus(), board)?;
         let dcmi_slot = part.bus().slot("DCMI")?;
         let mdma_slot = part.bus().slot("MDMA")?;
+        let crc_slot = part.bus().slot("CRC")?;
         let crs_slot = part.bus().slot("CRS")?;
         let flash_slot = part.bus().slot("Flash")?;
         let i2c_slot = part.bus().slot("I2C1")?;
@@ -154,6 +158,7 @@ impl Chip {
             late: LateLine::default(),
             late_flags,
             late_enable: LateEnable::new(seed),
+            crc: Crc::default(),
             crs: Crs::default(),
             mpu,
             part,
@@ -164,6 +169,7 @@ impl Chip {
             slots,
             dcmi_slot,
             mdma_slot,
+            crc_slot,
             crs_slot,
             vsync: Level::Low,
             wiring: Wiring::default(),
@@ -282,6 +288,7 @@ impl Mcu for Chip {
             mpu.reset();
         }
         Device::reset(&mut self.mdma);
+        Device::reset(&mut self.crc);
         Device::reset(&mut self.crs);
         Device::reset(&mut self.flash);
         self.dcmi.part_reset();
@@ -316,6 +323,9 @@ impl Mcu for Chip {
         }
         if slot == self.flash_slot {
             return (self.part.bus_mut(), Some(&mut self.flash));
+        }
+        if slot == self.crc_slot {
+            return (self.part.bus_mut(), Some(&mut self.crc));
         }
         if slot == self.crs_slot {
             return (self.part.bus_mut(), Some(&mut self.crs));

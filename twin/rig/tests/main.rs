@@ -12,6 +12,7 @@ mod faults;
 mod firmware;
 mod format;
 mod health;
+mod image;
 mod led;
 mod looks;
 mod models;

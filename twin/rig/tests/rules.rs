@@ -6,6 +6,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use crate::common;
 use hivtac_rig::arrivals::Arrivals;
 use hivtac_rig::board;
 use hivtac_rig::camera::part;
@@ -40,18 +41,7 @@ fn program(writes: &[(u32, u32)]) -> Vec<u8> {
     for (address, value) in writes.iter().chain(&[(0, 0)]) {
         image.extend([address.to_le_bytes(), value.to_le_bytes()].concat());
     }
-    let mut elf = b"\x7FELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
-    let halves =
-        |elf: &mut Vec<u8>, values: &[u16]| elf.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-    let words =
-        |elf: &mut Vec<u8>, values: &[u32]| elf.extend(values.iter().flat_map(|v| v.to_le_bytes()));
-    halves(&mut elf, &[2, 40]);
-    words(&mut elf, &[1, BASE + 9, 52, 0, 0x0500_0000]);
-    halves(&mut elf, &[52, 32, 1, 40, 0, 0]);
-    let length = image.len() as u32;
-    words(&mut elf, &[1, 84, BASE, BASE, length, length, 5, 4]);
-    elf.extend(image);
-    elf
+    common::elf(BASE, &image)
 }
 
 fn run_program(

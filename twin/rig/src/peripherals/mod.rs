@@ -2,6 +2,7 @@
 //! this sensor's camera or messages. `README.md` says what each simulates and what ties it to the
 //! rig.
 
+pub mod crc;
 pub mod crs;
 pub mod dcmi;
 pub mod flash;

@@ -276,6 +276,22 @@ fn json_lines(file: &Path) -> Vec<Value> {
         .collect()
 }
 
+/// Returns an ELF that loads these bytes at their address, and is entered behind two vectors.
+pub fn elf(base: u32, bytes: &[u8]) -> Vec<u8> {
+    let mut elf = b"\x7FELF\x01\x01\x01\0\0\0\0\0\0\0\0\0".to_vec();
+    let halves =
+        |elf: &mut Vec<u8>, values: &[u16]| elf.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    let words =
+        |elf: &mut Vec<u8>, values: &[u32]| elf.extend(values.iter().flat_map(|v| v.to_le_bytes()));
+    halves(&mut elf, &[2, 40]);
+    words(&mut elf, &[1, base + 9, 52, 0, 0x0500_0000]);
+    halves(&mut elf, &[52, 32, 1, 40, 0, 0]);
+    let length = bytes.len() as u32;
+    words(&mut elf, &[1, 84, base, base, length, length, 5, 4]);
+    elf.extend(bytes);
+    elf
+}
+
 /// Returns a host's hello, with a zero byte before it.
 pub fn hello() -> Vec<u8> {
     frame(&HostMessage::Hello(HelloPrefix::OURS.into()))

@@ -1,0 +1,135 @@
+//! Writes an image by a loader: what is written, in which order, and what is read back.
+
+use super::dfuse::{Loader, Trouble, Usb};
+use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::shown::shown;
+use hivtac_host::stop;
+use hivtac_image::header::Mark;
+use hivtac_image::{FIRST_STAGE, Image, MARK_AT, PROGRAM, SECTOR_BYTES, board_of};
+use std::ops::Range;
+
+/// Bytes of the first stage, from its begin on, that say what it is.
+const FIRST_LOOK: usize = MARK_AT as usize + size_of::<Mark>();
+
+/// What is told while an image is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Progress {
+    /// The device has no first stage, which is written now, before all else.
+    FirstStage,
+    /// Bytes of the program that were written, of all.
+    Written(usize, usize),
+    /// All bytes were read back.
+    ReadBack,
+}
+
+/// Writes the image, reads it back, and starts it.
+///
+/// Only sectors that the image fills are erased, and the first one only where no first stage of
+/// this layout is. Until the last byte is written the first stage finds a wrong checksum, and a
+/// device without power starts its loader again.
+///
+/// # Errors
+/// [`Kind::Input`] if the loader's device is another board; [`Kind::Refused`] if it refuses or
+/// keeps something else; [`Kind::Lost`] if it is gone; [`Kind::Interrupted`].
+pub fn write<Io: Usb>(
+    loader: Loader<Io>,
+    image: &Image,
+    mut tell: impl FnMut(Progress),
+) -> Result<(), Failure> {
+    let found = loader.read(FIRST_STAGE, FIRST_LOOK);
+    let found = found.map_err(|why| broken("reading the first stage".to_owned(), why))?;
+    match board_of(&found) {
+        Some(board) => image.fits(&shown(&board)).map_err(|why| {
+            Failure::input(format!("the device in its loader is another one: {why}"))
+        })?,
+        None => {
+            tell(Progress::FirstStage);
+            fill(&loader, FIRST_STAGE, image.first_stage(), &mut |_| {})?;
+            verify(&loader, FIRST_STAGE, image.first_stage())?;
+        }
+    }
+    let (program, mut written) = (image.program(), 0);
+    for sector in sectors(program.len()) {
+        let part = &program[sector.clone()];
+        fill(&loader, PROGRAM + sector.start as u32, part, &mut |bytes| {
+            written += bytes;
+        })?;
+        tell(Progress::Written(written, program.len()));
+    }
+    verify(&loader, PROGRAM, program)?;
+    tell(Progress::ReadBack);
+    let left = loader.leave(FIRST_STAGE);
+    left.map_err(|why| broken("starting the program".to_owned(), why))
+}
+
+/// The parts of a program, one for each sector.
+fn sectors(length: usize) -> impl Iterator<Item = Range<usize>> {
+    let bytes = SECTOR_BYTES as usize;
+    (0..length)
+        .step_by(bytes)
+        .map(move |start| start..length.min(start + bytes))
+}
+
+/// Erases a sector, and writes these bytes to its begin.
+fn fill<Io: Usb>(
+    loader: &Loader<Io>,
+    sector: u32,
+    bytes: &[u8],
+    each: &mut dyn FnMut(usize),
+) -> Result<(), Failure> {
+    stop::check().map_err(interrupted)?;
+    let erased = loader.erase(sector);
+    erased.map_err(|why| broken(format!("erasing at {sector:#010x}"), why))?;
+    let written = loader.write(sector, bytes, |bytes| {
+        each(bytes);
+        stop::check().map_err(Stopped::Asked)
+    });
+    written.map_err(|stopped| match stopped {
+        Stopped::Asked(failure) => interrupted(failure),
+        Stopped::Broken(why) => broken(format!("writing at {sector:#010x}"), why),
+    })
+}
+
+/// Why writing stopped.
+enum Stopped {
+    Asked(Failure),
+    Broken(Trouble),
+}
+
+impl From<Trouble> for Stopped {
+    fn from(why: Trouble) -> Stopped {
+        Stopped::Broken(why)
+    }
+}
+
+fn verify<Io: Usb>(loader: &Loader<Io>, address: u32, bytes: &[u8]) -> Result<(), Failure> {
+    let read = loader.read(address, bytes.len());
+    let read = read.map_err(|why| broken(format!("reading back at {address:#010x}"), why))?;
+    let differs = read.iter().zip(bytes).position(|(is, should)| is != should);
+    match differs {
+        None => Ok(()),
+        Some(at) => {
+            let address = address as usize + at;
+            let message = format!(
+                "the device kept other bytes than it was sent, the first at {address:#010x}; \
+                 {AGAIN}; if that does not help, its flash is worn"
+            );
+            Err(Failure::new(Kind::Refused, message))
+        }
+    }
+}
+
+/// What to do after a failure in the middle.
+const AGAIN: &str = "run the same command again: the device waits in its loader";
+
+fn interrupted(failure: Failure) -> Failure {
+    Failure::new(failure.kind, format!("{failure}; {AGAIN}"))
+}
+
+fn broken(doing: String, why: Trouble) -> Failure {
+    let kind = match why {
+        Trouble::Lost(_) | Trouble::Late => Kind::Lost,
+        Trouble::Refused(_) => Kind::Refused,
+    };
+    Failure::new(kind, format!("{doing}: {why}; {AGAIN}"))
+}
