@@ -12,6 +12,7 @@ use crate::view_twin::{PAGE, press};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hivtac_host::recording::Recording;
+use hivtac_image::{Image, examples};
 use hivtac_live::camera::Kind;
 use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
@@ -62,13 +63,18 @@ fn a_press_on_the_page_is_read_within_three_sigma() {
     press(&mut open(""), "web.png");
 }
 
-/// Chooses a file, as base64, in the page's input.
+/// Chooses a file, as base64, in the page's input for pictures.
 fn choose(browser: &mut Browser, name: &str, bytes: &[u8]) {
+    choose_in(browser, "file", name, bytes);
+}
+
+/// As [`choose`], in the input with this id.
+fn choose_in(browser: &mut Browser, input: &str, name: &str, bytes: &[u8]) {
     let text = STANDARD.encode(bytes);
     let script = format!(
         "(() => {{ const bytes = Uint8Array.from(atob('{text}'), (it) => it.charCodeAt(0)); \
          const chosen = new DataTransfer(); chosen.items.add(new File([bytes], '{name}')); \
-         const input = document.getElementById('file'); input.files = chosen.files; \
+         const input = document.getElementById('{input}'); input.files = chosen.files; \
          input.dispatchEvent(new Event('change')); return 0; }})()"
     );
     browser.value(&script).unwrap();
@@ -308,4 +314,149 @@ fn what_hinders_a_connection_is_said() {
     browser
         .until(&format!("{SAID}.includes('no Web Serial')"))
         .unwrap();
+}
+
+/// WebUSB with the loader of an STM32H743, of 16 sectors. It answers as AN3156 says, and counts what
+/// it is not to be asked. `loader.wrong` flips a bit of what is kept, `loader.end` pulls the cable
+/// after so many blocks.
+const LOADER: &str = r#"
+const loader = globalThis.loader = { wrong: false, end: Infinity, misuse: [] };
+const FLASH = 0x08000000, SECTOR = 128 << 10;
+const flash = loader.flash = new Uint8Array(16 * SECTOR).fill(0xff);
+let state = 2, address = 0, begun = null, left = false;
+const reply = (bytes) => ({ status: "ok", data: new DataView(new Uint8Array(bytes).buffer) });
+const misuse = (what) => { loader.misuse.push(what); state = 10; };
+function carryOut({ value, bytes }) {
+  if (value === 0) {
+    const at = new DataView(bytes.buffer, bytes.byteOffset).getUint32(1, true) - FLASH;
+    if (at < 0 || at >= flash.length) return misuse(`address ${at}`);
+    if (bytes[0] === 0x41) {
+      if (at % SECTOR !== 0) return misuse(`erase at ${at}`);
+      flash.fill(0xff, at, at + SECTOR);
+    } else if (bytes[0] === 0x21) address = at;
+    else return misuse(`command ${bytes[0]}`);
+  } else {
+    const at = address + (value - 2) * 1024;
+    if (flash.subarray(at, at + bytes.length).some((it) => it !== 0xff)) return misuse(`not blank ${at}`);
+    flash.set(bytes, at);
+    if (loader.wrong) flash[at] ^= 1;
+    loader.end -= 1;
+  }
+  state = 5;
+}
+const lost = () => {
+  if (loader.end <= 0 || left) throw new DOMException("A transfer error has occurred.", "NetworkError");
+};
+const alternates = [{
+  alternateSetting: 0, interfaceClass: 0xfe, interfaceSubclass: 1, interfaceProtocol: 2,
+  interfaceName: "@Internal Flash  /0x08000000/16*128Kg",
+}];
+const device = {
+  configuration: { interfaces: [{ interfaceNumber: 0, alternates }] },
+  async open() { left = false; state = 2; },
+  async close() {},
+  async claimInterface() {},
+  async selectAlternateInterface() {},
+  async controlTransferIn({ requestType, request, value }, length) {
+    if (requestType === "standard") return reply([9, 2, 27, 0, 1, 1, 0, 0xc0, 50, 9, 0x21, 11, 255, 0, 0, 4, 0x1a, 1]);
+    lost();
+    if (request === 3) {
+      const was = state;
+      if (state === 3 && begun.bytes.length === 0) { left = true; return reply([0, 1, 0, 0, 7, 0]); }
+      if (state === 3) { state = 4; return reply([0, 1, 0, 0, 4, 0]); }
+      if (state === 4) carryOut(begun);
+      return reply([state === 10 ? 3 : 0, 0, 0, 0, was === 4 ? state : was, 0]);
+    }
+    if (request === 2) {
+      if (state !== 2 && state !== 9) { misuse(`upload in ${state}`); return { status: "stall" }; }
+      state = 9;
+      const at = address + (value - 2) * 1024;
+      return reply(flash.slice(at, at + length));
+    }
+    misuse(`request ${request}`);
+    return { status: "stall" };
+  },
+  async controlTransferOut({ request, value }, bytes) {
+    lost();
+    if (request === 1) {
+      if (state !== 2 && state !== 5) { misuse(`download in ${state}`); return { status: "stall" }; }
+      begun = { value, bytes: bytes.slice() };
+      state = 3;
+    } else if (request === 4 || request === 6) state = 2;
+    return { status: "ok" };
+  },
+};
+const requestDevice = async ({ filters }) => {
+  if (filters[0].vendorId !== 0x483 || filters[0].productId !== 0xdf11) throw new TypeError("another device");
+  return device;
+};
+Object.defineProperty(navigator, "usb", { value: { requestDevice }, configurable: true });
+loader.has = (text) => {
+  const image = Uint8Array.from(atob(text), (it) => it.charCodeAt(0));
+  return flash.every((it, at) => it === (image[at] ?? 0xff));
+};
+"#;
+
+/// Presses the button that writes, and waits until the page says these words.
+fn write(browser: &mut Browser, words: &str) {
+    let said = "document.getElementById('flashed').textContent";
+    browser
+        .value("document.getElementById('flash').click(); 0")
+        .unwrap();
+    let done = format!(
+        "!document.getElementById('flash').disabled && {said} !== '' && {said}.includes('{words}')"
+    );
+    browser.until(&done).unwrap();
+}
+
+#[test]
+#[ignore = "slow, and needs Chromium: run by cargo xtask test --all"]
+fn firmware_is_checked_written_and_read_back() {
+    let mut browser = open(LOADER);
+    browser.until("document.getElementById('image')").unwrap();
+    let image = examples::image("weact-h743", "1.2.3", 200_000, 7);
+    let said =
+        |words: &str| format!("document.getElementById('flashed').textContent.includes('{words}')");
+    let mut damaged = image.bytes().to_vec();
+    damaged[140_000] ^= 1;
+    choose_in(&mut browser, "image", "damaged.bin", &damaged);
+    browser.until(&said("damaged.bin: damaged")).unwrap();
+    let is_off = "document.getElementById('flash').disabled";
+    assert_eq!(browser.value(is_off).unwrap(), true);
+    choose_in(&mut browser, "image", "good.bin", image.bytes());
+    browser
+        .until(&said("good.bin: firmware 1.2.3 for weact-h743"))
+        .unwrap();
+    // A blank device gets the first stage, too.
+    write(&mut browser, "every byte read back");
+    assert_same(&mut browser, &image);
+    // Cut, it is written again; the first stage stays.
+    browser.value("loader.end = 20; 0").unwrap();
+    write(&mut browser, "choose the loader and write again");
+    browser.value("loader.end = Infinity; 0").unwrap();
+    write(&mut browser, "every byte read back");
+    assert_same(&mut browser, &image);
+    browser.value("loader.wrong = true; 0").unwrap();
+    write(&mut browser, "kept other bytes");
+    browser.value("loader.wrong = false; 0").unwrap();
+    let other = examples::image("openmv-h7", "1.2.3", 200_000, 7);
+    choose_in(&mut browser, "image", "other.bin", other.bytes());
+    browser.until(&said("other.bin: firmware")).unwrap();
+    write(&mut browser, "is another one: for the board openmv-h7");
+    assert_eq!(browser.value("loader.misuse.join()").unwrap(), "");
+    // The simulated sensor has no loader.
+    browser
+        .value("document.getElementById('restart').click(); 0")
+        .unwrap();
+    browser.until(&said("no device is connected")).unwrap();
+    browser
+        .value("delete Object.getPrototypeOf(navigator).usb; delete navigator.usb; 0")
+        .unwrap();
+    write(&mut browser, "no WebUSB");
+}
+
+/// The loader's flash has the image, and is blank behind it.
+fn assert_same(browser: &mut Browser, image: &Image) {
+    let has = format!("loader.has('{}')", STANDARD.encode(image.bytes()));
+    assert_eq!(browser.value(&has).unwrap(), true);
 }

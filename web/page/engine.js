@@ -112,6 +112,19 @@ const ACTS = {
     const bytes = taken(module.sense(width, height));
     postMessage({ events: [["sensed", { ticket, bytes }]] });
   },
+  firmware: ({ ticket, bytes }) => {
+    put(bytes);
+    const told = JSON.parse(textOf(module.firmware()));
+    postMessage({ events: [["firmware", { ticket, told }]] });
+  },
+  firmwareParts: ({ ticket, bytes }) => {
+    put(bytes);
+    const all = taken(module.firmware_parts());
+    const end = all.indexOf(10);
+    const told = JSON.parse(new TextDecoder().decode(all.subarray(0, end)));
+    postMessage({ events: [["firmware", { ticket, told, bytes: all.slice(end + 1) }]] });
+  },
+  startLoader: ({ ticket }) => module.start_loader(ticket),
   sum: (asked) => postMessage({ events: [["summed", { ticket: asked.ticket, ...summed(asked) }]] }),
 };
 

@@ -39,6 +39,7 @@ const EVENTS = {
   picture: answer,
   sensed: answer,
   summed: answer,
+  firmware: answer,
   file: ({ name, bytes }) => save(name, bytes),
   lost: ({ text }) => device?.close(text),
 };
@@ -67,7 +68,7 @@ export function listen(ours) {
   worker.onerror = (event) => stop(event.message);
   const bytes = Uint8Array.from(atob(module), (letter) => letter.charCodeAt(0)).buffer;
   post("load", { bytes }, [bytes]);
-  offer({ connect, simulate, sense });
+  offer({ connect, simulate, sense, firmware, firmwareParts, startLoader });
   // For tests and measurements: what comes of a camera's frames.
   globalThis.HIVTAC.sum = (camera, frames) => ask("sum", { camera, frames });
 }
@@ -80,6 +81,17 @@ export const picture = () => ask("picture");
 /** Senses levels of red, green, blue and opacity. */
 const sense = (levels, width, height) =>
   ask("sense", { levels, width, height }, [levels.buffer]).then(({ bytes }) => bytes);
+
+/** Checks a file of firmware: `board`, `version`, `look`; or `why` not. */
+const firmware = (bytes) => ask("firmware", { bytes }, [bytes.buffer]).then(({ told }) => told);
+
+/** What is written into a device whose flash begins so: `parts` and `bytes`; or `why` not. */
+const firmwareParts = (bytes) =>
+  ask("firmwareParts", { bytes }, [bytes.buffer]).then(({ told, bytes: all }) => ({
+    ...told, bytes: all,
+  }));
+
+const startLoader = () => ask("startLoader");
 
 /** Shows a device, which has `name`, `send` and `close`; returns what it tells of itself. */
 function connect(next) {

@@ -3,6 +3,7 @@
 import { paint, taken } from "./paint.js";
 import { named } from "./sample.js";
 import { open, whyNot } from "./serial.js";
+import { updates } from "./update.js";
 
 /** Most pixels of a side that the sensing takes; larger pictures are scaled down. */
 const LARGEST_SIDE = 800;
@@ -14,7 +15,7 @@ const element = (tag, more, ...children) => {
 };
 
 /** Adds the buttons. */
-export function offer({ connect, simulate, sense }) {
+export function offer({ connect, simulate, sense, ...forUpdates }) {
   const said = element("span", { role: "status", id: "said" });
   const say = (text) => {
     said.textContent = text;
@@ -59,7 +60,8 @@ export function offer({ connect, simulate, sense }) {
     file.value = "";
   });
   const label = element("label", {}, "A picture of your own: ", file);
-  document.getElementById("tools").append(plug, back, label, said, figure);
+  const update = updates({ element, ...forUpdates });
+  document.getElementById("tools").append(plug, back, label, said, update, figure);
 }
 
 /** Reads a picture: levels, width and height. */

@@ -242,6 +242,20 @@ impl Engine {
         }
     }
 
+    /// Has a connected device restart into its loader.
+    pub fn start_loader(&mut self, ticket: Ticket) {
+        match self.board() {
+            None => self.answer(ticket, false, "no device is connected"),
+            Some(_) => self.ask(Some(ticket), Request::StartLoader),
+        }
+    }
+
+    /// The board of the connected device; `None` for a simulated one, or before its hello.
+    pub fn board(&self) -> Option<&str> {
+        let state = self.state.as_ref().filter(|_| !self.presses)?;
+        Some(&state.hello.board)
+    }
+
     /// Takes a picture; the answer is an event `picture`, or words.
     pub fn picture(&mut self, ticket: Ticket) {
         self.ask(Some(ticket), Request::Snapshot);

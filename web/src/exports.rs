@@ -2,6 +2,7 @@
 //! into [`reserve`]'s memory before a call, and read [`taken`]'s after it.
 
 use crate::engine::Engine;
+use crate::firmware::Firmware;
 use crate::{photograph, same_bits};
 use hivtac_live::camera::Kind;
 use std::cell::RefCell;
@@ -10,6 +11,7 @@ thread_local! {
     static INPUT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static OUTPUT: RefCell<Vec<u8>> = const { RefCell::new(Vec::new()) };
     static ENGINE: RefCell<Option<Engine>> = const { RefCell::new(None) };
+    static FIRMWARE: RefCell<Firmware> = RefCell::default();
 }
 
 #[link(wasm_import_module = "page")]
@@ -113,6 +115,29 @@ pub extern "C" fn order(ticket: u32) {
 #[unsafe(no_mangle)]
 pub extern "C" fn picture(ticket: u32) {
     with(|engine| engine.picture(ticket));
+}
+
+/// Has the connected device restart into its loader.
+#[unsafe(no_mangle)]
+pub extern "C" fn start_loader(ticket: u32) {
+    with(|engine| engine.start_loader(ticket));
+}
+
+/// Checks the file of firmware that was put in; puts out what it is, as JSON.
+#[unsafe(no_mangle)]
+pub extern "C" fn firmware() -> usize {
+    let board = with(|engine| engine.board().map(str::to_owned));
+    let told =
+        FIRMWARE.with_borrow_mut(|firmware| input(|file| firmware.choose(file, board.as_deref())));
+    put(told.to_string().into_bytes())
+}
+
+/// Puts out what is written into a device whose flash begins with the bytes that were put in: a
+/// line of JSON, then the bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn firmware_parts() -> usize {
+    let (told, bytes) = FIRMWARE.with_borrow(|firmware| input(|found| firmware.parts(found)));
+    put([told.to_string().into_bytes(), vec![b'\n'], bytes].concat())
 }
 
 /// Puts the events since the last call out, as JSON; returns their length.

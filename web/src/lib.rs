@@ -16,6 +16,7 @@
 //! | [`recorder`] | a recording in memory |
 //! | [`simulated`] | the simulated sensor, frame by frame |
 //! | [`photograph`] | what the sensing makes of a picture of one's own |
+//! | [`firmware`] | new firmware, checked and divided into what is written |
 //! | [`same_bits`] | frames whose samples are the same bytes on every machine |
 //! | `exports` | what the page's scripts call, of the WebAssembly module only |
 
@@ -23,6 +24,7 @@ pub mod conversation;
 pub mod engine;
 #[cfg(target_family = "wasm")]
 mod exports;
+pub mod firmware;
 pub mod photograph;
 pub mod recorder;
 pub mod same_bits;

@@ -126,6 +126,30 @@ impl Image {
         &self.version
     }
 
+    /// What is written into a device, one part for each sector, in this order. `found` is how its
+    /// flash begins ([`FIRST_LOOK`](crate::FIRST_LOOK) bytes). A first stage that is there stays:
+    /// until the last byte is written it finds a wrong checksum, and starts the loader again. Where
+    /// none is, it comes first.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherBoard`] if the first stage that is there is another board's.
+    pub fn parts(&self, found: &[u8]) -> Result<Vec<Part<'_>>, Refusal> {
+        let mut parts = Vec::new();
+        match board_of(found) {
+            Some(board) => self.fits(&board)?,
+            None => parts.push(Part {
+                address: FIRST_STAGE,
+                bytes: self.first_stage(),
+            }),
+        }
+        let sectors = self.program().chunks(SECTOR_BYTES as usize);
+        parts.extend(sectors.zip(0..).map(|(bytes, nth)| Part {
+            address: PROGRAM + nth * SECTOR_BYTES,
+            bytes,
+        }));
+        Ok(parts)
+    }
+
     /// Checks that it is for this board.
     ///
     /// # Errors
@@ -138,6 +162,15 @@ impl Image {
             false => Err(Refusal::OtherBoard { image, device }),
         }
     }
+}
+
+/// What is written into a sector, from its begin on, once it is erased.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part<'a> {
+    /// Address of the sector.
+    pub address: u32,
+    /// Whole flash words.
+    pub bytes: &'a [u8],
 }
 
 /// The board of flash that begins with a first stage; `None` if it does not, or if the layout is

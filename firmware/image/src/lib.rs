@@ -19,7 +19,7 @@ mod refusal;
 
 use core::ops::Range;
 #[cfg(feature = "read")]
-pub use image::{Image, board_of, version_of};
+pub use image::{Image, Part, board_of, version_of};
 #[cfg(feature = "read")]
 pub use refusal::Refusal;
 
@@ -36,5 +36,7 @@ pub const FIRST_STAGE: u32 = FLASH.start;
 pub const PROGRAM: u32 = FIRST_STAGE + SECTOR_BYTES;
 /// Bytes from the first stage's begin to its [`header::Mark`], behind its vectors.
 pub const MARK_AT: u32 = 0x40;
+/// Bytes of the flash, from its begin on, that say which first stage it has.
+pub const FIRST_LOOK: usize = MARK_AT as usize + size_of::<header::Mark>();
 /// Bytes from the program's begin to its [`header::Header`], behind its vectors.
 pub const HEADER_AT: u32 = 0x400;

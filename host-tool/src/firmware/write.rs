@@ -2,14 +2,8 @@
 
 use super::dfuse::{Loader, Trouble, Usb};
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::shown::shown;
 use hivtac_host::stop;
-use hivtac_image::header::Mark;
-use hivtac_image::{FIRST_STAGE, Image, MARK_AT, PROGRAM, SECTOR_BYTES, board_of};
-use std::ops::Range;
-
-/// Bytes of the first stage, from its begin on, that say what it is.
-const FIRST_LOOK: usize = MARK_AT as usize + size_of::<Mark>();
+use hivtac_image::{FIRST_LOOK, FIRST_STAGE, Image, Part};
 
 /// What is told while an image is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,49 +32,43 @@ pub fn write<Io: Usb>(
 ) -> Result<(), Failure> {
     let found = loader.read(FIRST_STAGE, FIRST_LOOK);
     let found = found.map_err(|why| broken("reading the first stage".to_owned(), why))?;
-    match board_of(&found) {
-        Some(board) => image.fits(&shown(&board)).map_err(|why| {
-            Failure::input(format!("the device in its loader is another one: {why}"))
-        })?,
-        None => {
+    let parts = image
+        .parts(&found)
+        .map_err(|why| Failure::input(format!("the device in its loader is another one: {why}")))?;
+    let mut written = 0;
+    for part in &parts {
+        let is_first_stage = part.address == FIRST_STAGE;
+        if is_first_stage {
             tell(Progress::FirstStage);
-            fill(&loader, FIRST_STAGE, image.first_stage(), &mut |_| {})?;
-            verify(&loader, FIRST_STAGE, image.first_stage())?;
+        }
+        fill(&loader, part, &mut |bytes| written += bytes)?;
+        if is_first_stage {
+            verify(&loader, part)?;
+            written = 0;
+        } else {
+            tell(Progress::Written(written, image.program().len()));
         }
     }
-    let (program, mut written) = (image.program(), 0);
-    for sector in sectors(program.len()) {
-        let part = &program[sector.clone()];
-        fill(&loader, PROGRAM + sector.start as u32, part, &mut |bytes| {
-            written += bytes;
-        })?;
-        tell(Progress::Written(written, program.len()));
-    }
-    verify(&loader, PROGRAM, program)?;
+    let program = parts.iter().filter(|part| part.address != FIRST_STAGE);
+    program
+        .into_iter()
+        .try_for_each(|part| verify(&loader, part))?;
     tell(Progress::ReadBack);
     let left = loader.leave(FIRST_STAGE);
     left.map_err(|why| broken("starting the program".to_owned(), why))
 }
 
-/// The parts of a program, one for each sector.
-fn sectors(length: usize) -> impl Iterator<Item = Range<usize>> {
-    let bytes = SECTOR_BYTES as usize;
-    (0..length)
-        .step_by(bytes)
-        .map(move |start| start..length.min(start + bytes))
-}
-
 /// Erases a sector, and writes these bytes to its begin.
 fn fill<Io: Usb>(
     loader: &Loader<Io>,
-    sector: u32,
-    bytes: &[u8],
+    part: &Part<'_>,
     each: &mut dyn FnMut(usize),
 ) -> Result<(), Failure> {
+    let sector = part.address;
     stop::check().map_err(interrupted)?;
     let erased = loader.erase(sector);
     erased.map_err(|why| broken(format!("erasing at {sector:#010x}"), why))?;
-    let written = loader.write(sector, bytes, |bytes| {
+    let written = loader.write(sector, part.bytes, |bytes| {
         each(bytes);
         stop::check().map_err(Stopped::Asked)
     });
@@ -102,7 +90,8 @@ impl From<Trouble> for Stopped {
     }
 }
 
-fn verify<Io: Usb>(loader: &Loader<Io>, address: u32, bytes: &[u8]) -> Result<(), Failure> {
+fn verify<Io: Usb>(loader: &Loader<Io>, part: &Part<'_>) -> Result<(), Failure> {
+    let Part { address, bytes } = *part;
     let read = loader.read(address, bytes.len());
     let read = read.map_err(|why| broken(format!("reading back at {address:#010x}"), why))?;
     let differs = read.iter().zip(bytes).position(|(is, should)| is != should);
