@@ -2,7 +2,7 @@
 //! it falls silent.
 
 use crate::board;
-use crate::camera::{self, Camera, Format, Setting};
+use crate::camera::{self, Camera, Demand, Format, Setting};
 use crate::capture::Capture;
 use crate::condition::{self, Condition};
 use crate::session::Origin;
@@ -97,7 +97,7 @@ pub async fn run(camera: Camera, mut capture: Capture, format: Format) {
     };
     task.start_camera().await;
     loop {
-        let frame_time = Timer::after(task.camera.frame_time());
+        let frame_time = Timer::after(task.frame_time());
         let (format, order) = (REQUESTED_FORMAT.wait(), CAMERA_ORDER.wait());
         match select4(format, order, CAMERA_AFRESH.wait(), frame_time).await {
             Either4::First(format) => task.change_format(format).await,
@@ -125,6 +125,13 @@ struct CaptureTask {
 }
 
 impl CaptureTask {
+    /// Time from frame to frame: the nominal one, or that of a camera whose clock is slow.
+    fn frame_time(&self) -> Duration {
+        let nominal = self.camera.frame_time();
+        let measured = self.camera.pace.frame_us().map_or(0, u64::from);
+        Duration::from_micros(measured).clamp(nominal, 4 * nominal)
+    }
+
     /// Checks for activity during the last frame time. Returns whether the camera has been inactive
     /// for too long.
     fn is_silent(&mut self) -> bool {
@@ -236,6 +243,8 @@ impl CaptureTask {
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             self.try_until_it_answers().await;
             stats::CAMERA_RESTARTS.count();
+        } else {
+            self_test::camera_set(self.camera.problems());
         }
         self.go_on(from, answered.is_err()).await;
     }
@@ -261,22 +270,33 @@ impl CaptureTask {
     }
 
     async fn try_until_it_answers(&mut self) {
-        while let Err(error) = self.try_camera().await {
+        let mut demand = Demand::All;
+        while let Err(error) = self.try_camera(demand).await {
             condition::set(Condition::NoCamera);
             self_test::camera_failed(&error, self.starting);
             log::say(LogLevel::Error, format_args!("camera: {error}"));
             if let Some(order) = CAMERA_ORDER.try_take() {
                 end_order(order.origin, Outcome::NoCamera);
             }
-            Timer::after(RETRY).await;
+            // The second time a register differs, the part is like that.
+            let differs = matches!(error, camera::Error::Register { .. });
+            if differs && demand == Demand::All {
+                demand = Demand::Needed;
+            } else {
+                Timer::after(RETRY).await;
+            }
         }
-        let should_us = self.camera.frame_time().as_micros() as u32;
-        self_test::camera_answers(self.camera.pace.frame_us(), should_us, self.starting);
+        self_test::camera_answers(
+            self.camera.pace.frame_us(),
+            self.camera.frame_time().as_micros() as u32,
+            self.camera.problems(),
+            self.starting,
+        );
         self.starting = false;
     }
 
-    async fn try_camera(&mut self) -> Result<(), camera::Error> {
-        self.camera.reset().await?;
+    async fn try_camera(&mut self, demand: Demand) -> Result<(), camera::Error> {
+        self.camera.reset(demand).await?;
         if !self.numbering {
             self.numbering = true;
             vsync::restart_count();

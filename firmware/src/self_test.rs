@@ -25,8 +25,8 @@ use hivtac_wire::settings::Found;
 /// the memory task and the LED task.
 static AT_START: AtomicU32 = AtomicU32::new(0);
 
-/// Why the camera could not be set up, a bit of `Problem`; 0 if it could. Written by the capture
-/// task; read by the memory task.
+/// The camera's problems in its newest set-up, bits of `Problem`. Written by the capture task; read
+/// by the memory task.
 static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
 
 /// The highest temperature of the junction, where the sensor is, at the voltage for 480 MHz
@@ -116,23 +116,31 @@ pub fn camera_failed(error: &camera::Error, starting: bool) {
     }
 }
 
-/// Records that the camera was set up, and its frame time, µs; `None` if no frame came. `starting`
-/// is true the first time.
-pub fn camera_answers(frame_us: Option<u32>, should_us: u32, starting: bool) {
+/// Records that the camera was set up; its frame time, µs, `None` if no frame came; and its
+/// problems, bits of `Problem`. `starting` is true the first time.
+pub fn camera_answers(frame_us: Option<u32>, should_us: u32, problems: u32, starting: bool) {
     let off = |us: u32| us.abs_diff(should_us) > should_us / FRAME_TIME_PART;
-    let problem = bits(&[(Problem::Clocks, frame_us.is_some_and(off))]);
+    let problem = problems | bits(&[(Problem::Clocks, frame_us.is_some_and(off))]);
     CAMERA_PROBLEM.store(problem, Ordering::Relaxed);
     if starting {
         AT_START.fetch_or(problem, Ordering::Relaxed);
     }
 }
 
-/// Returns whether a problem was found at the start that the LED's other patterns do not show.
+/// Records that settings of the camera were changed, and its problems now, bits of `Problem`.
+pub fn camera_set(problems: u32) {
+    let clocks = CAMERA_PROBLEM.load(Ordering::Relaxed) & Problem::Clocks.bit();
+    CAMERA_PROBLEM.store(problems | clocks, Ordering::Relaxed);
+}
+
+/// Returns whether a problem was found at the start that the LED's other patterns do not show, and
+/// with which forces are not to be trusted.
 pub fn failed_at_start() -> bool {
-    const TOLD_OTHERWISE: [Problem; 5] = [
+    const TOLD_OTHERWISE: [Problem; 6] = [
         Problem::CameraSilent,
         Problem::AnotherCamera,
         Problem::CameraRegisters,
+        Problem::Exposure,
         Problem::WatchdogReset,
         Problem::SoftwareReset,
     ];

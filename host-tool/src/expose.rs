@@ -5,6 +5,7 @@ use crate::output;
 use crate::request::send;
 use clap::Args;
 use hivtac_host::failure::Failure;
+use hivtac_host::reply::CAMERA_PATIENCE;
 use hivtac_wire::message::Request;
 use serde_json::json;
 
@@ -23,7 +24,8 @@ pub struct ExposeArguments {
 pub fn run(arguments: &ExposeArguments) -> Result<(), Failure> {
     let Target { device, json } = &arguments.target;
     let (mut link, _) = device.connect()?;
-    send(&mut link, Request::Expose, device.timeout)?;
+    let patience = device.timeout.max(CAMERA_PATIENCE);
+    send(&mut link, Request::Expose, patience)?;
     output::tell(
         *json,
         "exposure and gain found; take a new tare",

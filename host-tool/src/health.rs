@@ -173,16 +173,22 @@ fn advice(problem: Problem) -> &'static str {
         Problem::SoftwareReset => {
             "a fault, unless a debug probe was at work; report it, with what the device was doing"
         }
-        Problem::Temperature => "above 85 °C, or the sensor for it does not tell; let it cool",
+        Problem::Temperature => "above 105 °C, or the sensor for it does not tell; let it cool",
         Problem::AnotherCamera => {
             "fit the camera that this firmware is for, or flash that of the camera"
         }
-        Problem::CameraRegisters => "look at its cable; restart it; else it is broken",
+        Problem::CameraRegisters => {
+            "`hivtac bring-up` names it; while frames come as they should, the part is of another \
+             revision; else look at its cable"
+        }
         Problem::Clocks => {
             "the board's crystal or the camera's clock is wrong; `hivtac bring-up` measures them"
         }
         Problem::Arithmetic => {
             "its forces mean nothing; flash it again, and when it stays, use another board"
+        }
+        Problem::Exposure => {
+            "the picture stayed too dark or too bright: change the light, then `hivtac expose`"
         }
     }
 }

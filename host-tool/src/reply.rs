@@ -10,6 +10,10 @@ use std::time::Duration;
 /// one.
 pub const KEEP_PATIENCE: Duration = Duration::from_secs(20);
 
+/// Longest time for setting the camera: the search for exposure takes up to 1.5 s, at the lowest
+/// rate after a quarter of a second.
+pub const CAMERA_PATIENCE: Duration = Duration::from_secs(4);
+
 /// A command's name.
 pub fn name_of(request: &Request) -> &'static str {
     match request {

@@ -63,17 +63,20 @@ pub enum Problem {
     Temperature = 8,
     /// The camera is not the one that the firmware supports.
     AnotherCamera = 9,
-    /// A register of the camera did not hold the written value.
+    /// A register of the camera did not hold the written value. The camera is used if frames can be
+    /// read.
     CameraRegisters = 10,
     /// The frame time is wrong by the device's own clock: this clock or the camera's is wrong.
     Clocks = 11,
     /// The built-in model's answer to a known question differs from a computer's.
     Arithmetic = 12,
+    /// The search for exposure and gain found none that expose the picture well.
+    Exposure = 13,
 }
 
 impl Problem {
     /// All problems, sorted by number.
-    pub const ALL: [Problem; 13] = [
+    pub const ALL: [Problem; 14] = [
         Problem::CameraSilent,
         Problem::ModelMissing,
         Problem::ModelFallback,
@@ -87,6 +90,7 @@ impl Problem {
         Problem::CameraRegisters,
         Problem::Clocks,
         Problem::Arithmetic,
+        Problem::Exposure,
     ];
 
     /// Its number.
@@ -115,6 +119,7 @@ impl Problem {
             Problem::CameraRegisters => "camera_registers",
             Problem::Clocks => "clocks",
             Problem::Arithmetic => "arithmetic",
+            Problem::Exposure => "exposure",
         }
     }
 }

@@ -9,7 +9,7 @@ mod registers;
 pub use bus::{BUS_CLOCK, Bus};
 pub use identity::Error;
 pub use lines::CameraLines;
-pub use registers::Comparison;
+pub use registers::{Comparison, Demand};
 
 #[cfg(feature = "board-openmv-h7")]
 mod mt9v034;
@@ -34,6 +34,7 @@ use hivtac_capture::Edge;
 use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_wire::health::Problem;
 use hivtac_wire::settings::CameraReport;
 
 /// Time from VSYNC to the middle of the exposure, µs. Written by the capture task; read by the
@@ -57,8 +58,9 @@ static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
 /// Lens, frame and markers of the sensor with this camera.
 pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
 
-/// Exposure and gain are accepted as they are after this time: ten frames at a slow rate.
-const PATIENCE: Duration = Duration::from_millis(300);
+/// Exposure and gain are accepted as they are after this time. An automatic control that moves by a
+/// sixteenth every fourth frame needs a second of it for a picture 13 times too dark.
+const PATIENCE: Duration = Duration::from_millis(1_500);
 
 /// Time from frame to frame.
 pub fn frame_time(rate: Rate) -> Duration {
@@ -93,14 +95,14 @@ impl Pace {
     }
 }
 
-/// A search for exposure and gain. It ends once they are unchanged for `frames` frames, or after
-/// [`PATIENCE`].
+/// A search for exposure and gain. It ends once they are settled and unchanged for `frames` frames,
+/// or after [`PATIENCE`].
 struct Search<F> {
     frames: u32,
     begun: Instant,
     /// Their newest values.
     found: F,
-    /// Number of successive frames with these values.
+    /// Number of successive settled frames with these values.
     steady: u32,
 }
 
@@ -111,23 +113,34 @@ impl<F: PartialEq> Search<F> {
             frames,
             begun: Instant::now(),
             found,
-            steady: 1,
+            steady: 0,
         }
     }
 
-    fn is_over(&self) -> bool {
-        self.steady >= self.frames || stats::since(self.begun) >= PATIENCE
+    /// Returns whether values were found that stay.
+    fn is_settled(&self) -> bool {
+        self.steady >= self.frames
     }
 
-    /// Takes their values a frame later.
-    fn look(&mut self, now: F) {
-        self.steady = if now == self.found {
-            self.steady + 1
-        } else {
-            1
+    fn is_over(&self) -> bool {
+        self.is_settled() || stats::since(self.begun) >= PATIENCE
+    }
+
+    /// Takes their values a frame later; `settled` if the control has no reason to change them.
+    fn look(&mut self, now: F, settled: bool) {
+        self.steady = match (settled, now == self.found) {
+            (true, true) => self.steady + 1,
+            (true, false) => 1,
+            (false, _) => 0,
         };
         self.found = now;
     }
+}
+
+/// Returns the problems, bits of [`Problem`], of a camera that was set up.
+fn problems(registers_differ: bool, well_exposed: bool) -> u32 {
+    let bit = |is_there, problem: Problem| if is_there { problem.bit() } else { 0 };
+    bit(registers_differ, Problem::CameraRegisters) | bit(!well_exposed, Problem::Exposure)
 }
 
 /// The state of a camera, as read back.

@@ -3,11 +3,12 @@
 
 use super::identity::{self, Identity};
 use super::mt9v034_registers::{
-    AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, FOUND, Format, LOCKED, RESET,
-    SHUTTER_WIDTH, rows_for, table,
+    AEC_AGC_ENABLE, ANALOG_GAIN, AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, FOUND, Format, LOCKED, NEEDED,
+    RESET, SHUTTER_WIDTH, rows_for, table,
 };
-use super::registers::Registers;
-use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
+use super::registers::{Demand, Registers};
+use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, problems, store};
+use crate::log;
 use embassy_time::{Duration, Timer};
 pub use hivtac_device::camera::mt9v034::{
     HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
@@ -15,6 +16,7 @@ pub use hivtac_device::camera::mt9v034::{
 use hivtac_device::camera::mt9v034::{longest_exposure, middle_us, rows_in, rows_us};
 use hivtac_terms::camera::{CameraSettings, LEAST_GAIN};
 use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_wire::message::LogLevel;
 
 /// Its identification.
 pub const IDENTITY: Identity = identity::MT9V034;
@@ -42,13 +44,15 @@ pub struct Camera {
     pub pace: Pace,
     /// The registers that keep gain and exposure.
     locked: [(u8, u16); 3],
+    /// The newest search ended with exposure and gain that stay.
+    well_exposed: bool,
 }
 
 impl Camera {
     /// The bus must run at 100 kHz to 400 kHz, and XCLK must already run.
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
         Self {
-            registers: Registers(bus),
+            registers: Registers::new(bus, NEEDED),
             lines,
             settings: CameraSettings::default(),
             pace: Pace::default(),
@@ -57,14 +61,17 @@ impl Camera {
                 (SHUTTER_WIDTH, 0),
                 (AEC_AGC_ENABLE, LOCKED),
             ],
+            well_exposed: true,
         }
     }
 
-    /// Wakes the camera, checks that it is the right one, and resets its registers.
-    pub async fn reset(&mut self) -> Result<(), Error> {
+    /// Wakes the camera, checks that it is the right one, and resets its registers. Until the next
+    /// reset, registers must hold what was written as far as `demand` says.
+    pub async fn reset(&mut self, demand: Demand) -> Result<(), Error> {
+        self.registers.begin(demand);
         self.lines.wake().await;
         Timer::after(SETTLE).await;
-        identity::check(&mut self.registers.0)?;
+        identity::check(&mut self.registers.bus)?;
         self.registers.write(RESET, 1_u16)
     }
 
@@ -86,6 +93,11 @@ impl Camera {
         self.settings = settings;
         self.registers.set(rows_for(settings.rate)).await?;
         self.lock_exposure().await
+    }
+
+    /// Returns the problems of the newest set-up, bits of `Problem`.
+    pub fn problems(&self) -> u32 {
+        problems(self.registers.differ(), self.well_exposed)
     }
 
     /// Time from frame to frame.
@@ -115,7 +127,12 @@ impl Camera {
         while !search.is_over() {
             Timer::after(self.frame_time()).await;
             self.pace.look();
-            search.look(self.exposure()?);
+            search.look(self.exposure()?, true);
+        }
+        self.well_exposed = search.is_settled();
+        if !self.well_exposed {
+            let text = format_args!("exposure: still moving after 1.5 s; steady light is needed");
+            log::say(LogLevel::Warning, text);
         }
         self.take(search.found);
         self.registers.set(&self.locked).await?;
@@ -152,7 +169,7 @@ impl Camera {
         let tables = [table(), rows_for(self.settings.rate), &self.locked];
         let longest = longest_exposure(self.settings.rate);
         Ok(Setting {
-            id: identity::id(&mut self.registers.0)?,
+            id: identity::id(&mut self.registers.bus)?,
             comparison: self.registers.compare(&tables).await?,
             exposure: self.exposed(),
             longest_exposure: Microseconds(rows_us(longest)),

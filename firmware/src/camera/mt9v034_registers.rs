@@ -2,7 +2,7 @@
 //! value after reset.
 //!
 //! Numbers and names are from onsemi's MT9V034 data sheet, and from the drivers of Linux
-//! (`mt9v032.c`) and OpenMV (`mt9v0xx.c`).
+//! (`mt9v032.c`), OpenMV (`mt9v0xx.c`) and PX4Flow (`mt9v34.c`).
 
 use super::{HEIGHT, WIDTH};
 use crate::seeded_bugs;
@@ -36,6 +36,19 @@ const FIRST: [u16; 2] = [1, 4];
 const WINDOW: [u16; 2] = [WIDTH * BINNING, HEIGHT * BINNING];
 /// Shortest horizontal blanking while columns are binned by two, clocks.
 const LEAST_BLANKING: u16 = 71;
+
+/// Registers, and their bits, without which no frame can be read: size, blanking, mode, binning and
+/// signals.
+pub const NEEDED: &[(u8, u16)] = &[
+    (0x03, 0xFFFF),
+    (0x04, 0xFFFF),
+    (0x05, 0xFFFF),
+    (0x06, 0xFFFF),
+    (0x07, 0x0188),
+    (0x0D, 0x003F),
+    (0x72, 0x001F),
+];
+
 /// Registers for the frame rate and the longest exposure, in addition to [`table`].
 pub const fn rows_for(rate: Rate) -> &'static [(u8, u16)] {
     match rate {
@@ -95,8 +108,14 @@ pub fn table() -> &'static [(u8, u16)] {
     }
 }
 
-const fn with_read_mode(read_mode: u16) -> [(u8, u16); 15] {
+const fn with_read_mode(read_mode: u16) -> [(u8, u16); 20] {
     [
+        // Reserved registers, with the values that the data sheet recommends (Rev. G, table 8).
+        (0x13, 0x2D2E),
+        (0x20, 0x03C7),
+        (0x24, 0x001B),
+        (0x2B, 0x0003),
+        (0x2F, 0x0003),
         // Chip control: context A (bit 15 clear), exposure during the readout of the previous frame
         // (bit 8), parallel data (bit 7), endless frames (bit 3). Bit 9, reserved and set after a
         // reset, is cleared as in OpenMV's driver.

@@ -3,18 +3,20 @@
 
 use super::identity::{self, Identity};
 use super::ov7725_registers::{
-    AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, COM7, COM7_RESET, COM8, EXPOSURE, Format, LOCKED, TABLE,
-    clock,
+    AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, COM7, COM7_RESET, COM8, EXPOSURE, Format, LEVEL, LOCKED,
+    MOST_AUTOMATIC_GAIN, NEEDED, RESTS, TABLE, clock,
 };
-use super::registers::Registers;
-use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, store};
+use super::registers::{Demand, Registers};
+use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, problems, store};
+use crate::log;
 use embassy_time::{Duration, Timer};
 pub use hivtac_device::camera::ov7725::{
     HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
 };
-use hivtac_device::camera::ov7725::{LINES, exposed, lines, middle_us};
+use hivtac_device::camera::ov7725::{LINES, LONGEST_EXPOSURE, exposed, lines, middle_us};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_wire::message::LogLevel;
 
 /// Its identification.
 pub const IDENTITY: Identity = identity::OV7725;
@@ -32,7 +34,7 @@ pub const HREF_BLANKING_IS_HIGH: bool = false;
 const SETTLE: Duration = Duration::from_millis(20);
 /// Number of frames after a change of registers that must not be used, by the data sheet.
 const FRAMES_TO_SETTLE: u32 = 10;
-/// Number of successive frames with equal exposure and gain that count as steady.
+/// Number of successive well exposed frames with equal exposure and gain that end the search.
 const STEADY_FRAMES: u32 = 3;
 /// The camera's control side.
 pub struct Camera {
@@ -43,6 +45,8 @@ pub struct Camera {
     pub pace: Pace,
     /// The registers that keep exposure and gain.
     locked: [(u8, u8); 4],
+    /// The newest search found a well exposed picture, or there was nothing to search.
+    well_exposed: bool,
 }
 
 impl Camera {
@@ -50,20 +54,22 @@ impl Camera {
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
         let [gain, low, high] = EXPOSURE;
         Self {
-            registers: Registers(bus),
+            registers: Registers::new(bus, NEEDED),
             lines,
             settings: CameraSettings::default(),
             pace: Pace::default(),
             locked: [(COM8, LOCKED), (gain, 0), (low, 0), (high, 0)],
+            well_exposed: true,
         }
     }
 
     /// Wakes the camera, checks that it is the right one, and resets its registers, which only this
-    /// does.
-    pub async fn reset(&mut self) -> Result<(), Error> {
+    /// does. Until the next reset, registers must hold what was written as far as `demand` says.
+    pub async fn reset(&mut self, demand: Demand) -> Result<(), Error> {
+        self.registers.begin(demand);
         self.lines.wake().await;
         Timer::after(SETTLE).await;
-        identity::check(&mut self.registers.0)?;
+        identity::check(&mut self.registers.bus)?;
         self.registers.write(COM7, COM7_RESET)
     }
 
@@ -92,6 +98,11 @@ impl Camera {
             Timer::after(self.frame_time() * FRAMES_TO_SETTLE).await;
         }
         self.lock_exposure().await
+    }
+
+    /// Returns the problems of the newest set-up, bits of `Problem`.
+    pub fn problems(&self) -> u32 {
+        problems(self.registers.differ(), self.well_exposed)
     }
 
     /// Time from frame to frame.
@@ -124,16 +135,43 @@ impl Camera {
         self.registers.write(COM8, LOCKED | self.automatic())?;
         self.pace = Pace::default();
         let mut search = Search::new(STEADY_FRAMES, self.exposure()?);
+        let mut level = 0;
         while !search.is_over() {
             Timer::after(self.frame_time()).await;
             self.pace.look();
-            search.look(self.exposure()?);
+            let found = self.exposure()?;
+            level = self.registers.read(LEVEL)?;
+            search.look(found, self.is_settled(level, found));
+        }
+        self.well_exposed = self.automatic() == 0 || RESTS.contains(&level);
+        if !self.well_exposed {
+            let (least, most) = (RESTS.start(), RESTS.end());
+            log::say(
+                LogLevel::Warning,
+                format_args!("exposure: level {level}, not {least} to {most}; change the light"),
+            );
         }
         self.take(search.found);
         self.registers.set(&self.locked).await?;
         let middle_us = middle_us(self.lines(), self.settings.rate);
         store(middle_us, self.settings, self.exposed(), self.gain());
         Ok(())
+    }
+
+    /// Returns whether the automatic control rests at a level with these values: it is well exposed,
+    /// or nothing is left to change.
+    fn is_settled(&self, level: u8, [gain, low, high]: [u8; 3]) -> bool {
+        let automatic = self.automatic();
+        let lines = u16::from_le_bytes([low, high]);
+        let at_limit = |bit, is_there| automatic & bit == 0 || is_there;
+        let (exposure, amplified) = match () {
+            () if level < *RESTS.start() => {
+                (lines >= LONGEST_EXPOSURE, gain >= MOST_AUTOMATIC_GAIN)
+            }
+            () if level > *RESTS.end() => (lines <= 1, gain == 0),
+            () => (true, true),
+        };
+        at_limit(AUTOMATIC_EXPOSURE, exposure) && at_limit(AUTOMATIC_GAIN, amplified)
     }
 
     /// The bits of [`COM8`] for the automatic values.
@@ -158,7 +196,7 @@ impl Camera {
         let clock = clock(self.settings.rate);
         let tables = [format.registers(), TABLE, clock, &self.locked];
         Ok(Setting {
-            id: identity::id(&mut self.registers.0)?,
+            id: identity::id(&mut self.registers.bus)?,
             comparison: self.registers.compare(&tables).await?,
             exposure: self.exposed(),
             longest_exposure: Microseconds(self.frame_us()),

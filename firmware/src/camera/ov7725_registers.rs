@@ -4,6 +4,7 @@
 //! Numbers and names: OV7725 data sheet 1.31, table 17. Application note: OV7725 1.04.
 
 use crate::seeded_bugs;
+use core::ops::RangeInclusive;
 use hivtac_terms::camera::Rate;
 use hivtac_terms::threshold::PixelFormat;
 
@@ -77,6 +78,14 @@ pub const AUTOMATIC_GAIN: u8 = 0x04;
 /// Gain, and exposure in lines, low and high byte: the values of the automatic control.
 pub const EXPOSURE: [u8; 3] = [0x00, 0x10, 0x08];
 
+/// Mean level of the newest frame, as the automatic control sees it.
+pub const LEVEL: u8 = 0x2F;
+/// The levels between which the automatic control rests, as in OpenMV's table: a white film is
+/// bright but not saturated.
+pub const RESTS: RangeInclusive<u8> = 0x64..=0x96;
+/// The largest automatic gain.
+pub const MOST_AUTOMATIC_GAIN: u8 = 0x1F;
+
 /// Registers for the frame rate, in addition to [`TABLE`].
 pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
     match rate {
@@ -89,6 +98,20 @@ pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
     }
 }
 const CLKRC: u8 = 0x11;
+
+/// Registers, and their bits, without which no frame can be read: format, byte order, clocks,
+/// signals and size.
+pub const NEEDED: &[(u8, u16)] = &[
+    (COM7, 0xFF),
+    (COM3, 0xFF),
+    (0x0D, 0xC0),
+    (CLKRC, 0x7F),
+    (0x15, 0xFF),
+    (0x18, 0xFF),
+    (0x1A, 0xFF),
+    (0x29, 0xFF),
+    (0x2C, 0xFF),
+];
 
 /// Registers and values, written in this order after a reset and a [`Format`]'s registers, and read
 /// back. It has every register that affects the picture and whose value after a reset differs
@@ -120,10 +143,9 @@ pub const TABLE: &[(u8, u8)] = &[
     // frame.
     (COM8, LOCKED | AUTOMATIC_EXPOSURE | AUTOMATIC_GAIN),
     (0x14, 0x18),
-    // AEW, AEB, VPT: mean luma between 0x64 and 0x96, as in OpenMV's table: a white film is bright
-    // but not saturated.
-    (0x24, 0x96),
-    (0x25, 0x64),
+    // AEW, AEB, VPT: the control rests within RESTS; between 0x10 and 0xA0 it moves in small steps.
+    (0x24, *RESTS.end()),
+    (0x25, *RESTS.start()),
     (0x26, 0xA1),
     // COM12: direct offset of the analog part, as in the tables of OpenMV and gspca.
     (0x3D, 0x03),

@@ -1,10 +1,11 @@
 //! Writes, reads back and compares tables of a camera's registers.
 
 use super::{Bus, Error, IDENTITY};
+use crate::log;
 use embassy_stm32::i2c;
 use embassy_time::{Duration, Timer};
 use heapless::Vec;
-use hivtac_wire::message::{DIFFERENT_REGISTERS, DifferentRegister};
+use hivtac_wire::message::{DIFFERENT_REGISTERS, DifferentRegister, LogLevel};
 
 /// Pause between two register transfers while capture is stopped: lets tasks of lower priority run.
 const PAUSE: Duration = Duration::from_micros(100);
@@ -43,18 +44,56 @@ impl Value for u16 {
 /// Registers and the values that are written to them, in this order.
 pub type Table<V> = [(u8, V)];
 
+/// Which registers must hold what was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Demand {
+    /// All: a camera that just lost its supply has lost each of them.
+    All,
+    /// Those without which no frame can be read. Reserved bits of the others may have values of
+    /// their own.
+    Needed,
+}
+
 /// The registers of the camera in use. All functions return an error if the camera does not answer.
-pub struct Registers(pub Bus);
+pub struct Registers {
+    /// The bus to the camera.
+    pub bus: Bus,
+    /// Registers, and their bits without which no frame can be read.
+    needed: &'static [(u8, u16)],
+    demand: Demand,
+    differ: bool,
+}
 
 impl Registers {
+    /// Demands all registers. `needed` has those, with their bits, without which no frame can be
+    /// read.
+    pub fn new(bus: Bus, needed: &'static [(u8, u16)]) -> Self {
+        Self {
+            bus,
+            needed,
+            demand: Demand::All,
+            differ: false,
+        }
+    }
+
+    /// Begins a set-up of the camera.
+    pub fn begin(&mut self, demand: Demand) {
+        (self.demand, self.differ) = (demand, false);
+    }
+
+    /// Returns whether a register read back otherwise than written since the set-up began.
+    pub fn differ(&self) -> bool {
+        self.differ
+    }
+
     /// Writes one register.
     pub fn write(&mut self, register: u8, value: impl Value) -> Result<(), Error> {
-        Ok(value.write(&mut self.0, IDENTITY.address, register)?)
+        Ok(value.write(&mut self.bus, IDENTITY.address, register)?)
     }
 
     /// Reads one register.
     pub fn read<V: Value>(&mut self, register: u8) -> Result<V, Error> {
-        Ok(V::read(&mut self.0, IDENTITY.address, register)?)
+        Ok(V::read(&mut self.bus, IDENTITY.address, register)?)
     }
 
     /// Writes a table.
@@ -67,16 +106,32 @@ impl Registers {
     }
 
     /// Writes a table and reads it back.
+    ///
+    /// # Errors
+    /// A register that must hold what was written, and does not.
     pub async fn set<V: Value>(&mut self, table: &Table<V>) -> Result<(), Error> {
         self.write_all(table).await?;
         for (address, value) in table {
-            let (address, found) = (*address, self.read::<V>(*address)?);
+            let found = self.read::<V>(*address)?;
             if found != *value {
-                let found = found.into();
-                return Err(Error::Register { address, found });
+                self.judge(*address, (*value).into(), found.into())?;
             }
             Timer::after(PAUSE).await;
         }
+        Ok(())
+    }
+
+    /// Judges a register that reads back otherwise than written.
+    fn judge(&mut self, address: u8, written: u16, found: u16) -> Result<(), Error> {
+        let mut needed = self.needed.iter();
+        let needed = needed.find_map(|(register, bits)| (*register == address).then_some(*bits));
+        let is_needed = (written ^ found) & needed.unwrap_or(0) != 0;
+        let error = Error::Register { address, found };
+        if is_needed || self.demand == Demand::All {
+            return Err(error);
+        }
+        self.differ = true;
+        log::say(LogLevel::Warning, format_args!("camera: {error}; used so"));
         Ok(())
     }
 

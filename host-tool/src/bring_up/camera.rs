@@ -3,19 +3,21 @@
 use super::complaints::hear;
 use super::device::reason;
 use super::report::Step;
+use crate::health;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
 use hivtac_terms::fixed::Q;
+use hivtac_wire::health::Problem;
 use hivtac_wire::message::{DeviceMessage, Inspection, Request};
 use serde_json::{Value, json};
 use std::time::Duration;
 
 /// Longest time to read all registers. A camera that does not answer is tried every half second.
 const INSPECTION: Duration = Duration::from_secs(3);
-/// An exposure beyond this part of the longest, with a gain beyond [`HIGH_GAIN`], is the camera's
-/// limit.
+/// An exposure beyond this part of the longest, with a gain of at least [`HIGH_GAIN`], is the
+/// camera's limit.
 const LONG_EXPOSURE: f64 = 0.95;
-/// 3.9 of the 4 that the firmware allows.
+/// The largest gain of an OV7725 below the 4 that the firmware allows.
 const HIGH_GAIN: Q<4, u16> = Q::from_bits(62);
 
 /// Has the device read the camera's registers back.
@@ -33,8 +35,13 @@ pub fn step(link: &mut Link, patience: Duration) -> Result<(Step, Option<Inspect
         },
     );
     let refused = reason(answer)?;
+    let differ = |it: &Inspection| !it.different.is_empty();
+    let since_set_up = match inspection.as_ref().is_some_and(differ) {
+        true => health::ask(link, patience)?.problems & Problem::CameraRegisters.bit() != 0,
+        false => false,
+    };
     Ok(match (inspection, refused) {
-        (Some(inspection), None) => (judge(&inspection), Some(inspection)),
+        (Some(inspection), None) => (judge(&inspection, since_set_up), Some(inspection)),
         (_, refused) => (silent(refused, complaints.pop()), None),
     })
 }
@@ -51,9 +58,14 @@ fn silent(refused: Option<String>, complaint: Option<String>) -> Step {
     Step::new("camera", found, wrong, Value::Null)
 }
 
-/// Judges an inspection.
-pub fn judge(it: &Inspection) -> Step {
-    let mut wrong: Vec<_> = it.different.iter().map(different).collect();
+/// Judges an inspection. Registers that have differed from what was written since the camera's
+/// set-up are told, but not wrong.
+pub fn judge(it: &Inspection, since_set_up: bool) -> Step {
+    let different: Vec<_> = it.different.iter().map(different).collect();
+    let (own, mut wrong) = match since_set_up {
+        true => (different, Vec::new()),
+        false => (Vec::new(), different),
+    };
     if !wrong.is_empty() {
         wrong.push(
             "the camera lost what was written: its supply dips, or another part answers at its \
@@ -62,10 +74,10 @@ pub fn judge(it: &Inspection) -> Step {
         );
     }
     let part = f64::from(it.exposure_us) / f64::from(it.longest_exposure_us.max(1));
-    if part > LONG_EXPOSURE && it.gain_sixteenths > HIGH_GAIN {
+    if part > LONG_EXPOSURE && it.gain_sixteenths >= HIGH_GAIN {
         wrong.push("longest exposure and highest gain: more light, then `hivtac expose`".into());
     }
-    let found = format!(
+    let mut found = format!(
         "id {:04x}, silicon {}; {} of {} registers hold what was written; exposure {:.1} of \
          {:.1} ms, gain {:.1}",
         it.camera_id,
@@ -76,6 +88,12 @@ pub fn judge(it: &Inspection) -> Step {
         f64::from(it.longest_exposure_us) / 1e3,
         it.gain_sixteenths.to_f64(),
     );
+    if !own.is_empty() {
+        found += &format!(
+            "; since its set-up {}: bits that this revision of the part keeps; used so",
+            own.join(", ")
+        );
+    }
     Step::new("camera", found, wrong, json!(it))
 }
 

@@ -35,7 +35,7 @@ fn inspection() -> Inspection {
 
 #[test]
 fn a_register_that_lost_its_value_is_named() {
-    says(&camera::judge(&inspection()), &[]);
+    says(&camera::judge(&inspection(), false), &[]);
     let mut lost = inspection();
     let green = DifferentRegister {
         address: 3,
@@ -44,24 +44,28 @@ fn a_register_that_lost_its_value_is_named() {
     };
     lost.different.push(green).unwrap();
     says(
-        &camera::judge(&lost),
+        &camera::judge(&lost, false),
         &["register 03 holds 00, 40 was written", "supply"],
     );
+    let own = camera::judge(&lost, true);
+    says(&own, &[]);
+    let told = "since its set-up register 03 holds 00, 40 was written";
+    assert!(own.text().contains(told), "{}", own.text());
 }
 
 #[test]
 fn light_that_asks_for_everything_the_camera_has_is_too_little() {
     let dim = Inspection {
         exposure_us: 6_382,
-        gain_sixteenths: Q::from_bits(63),
+        gain_sixteenths: Q::from_bits(62),
         ..inspection()
     };
-    says(&camera::judge(&dim), &["more light"]);
+    says(&camera::judge(&dim, false), &["more light"]);
     let at_low_gain = Inspection {
         gain_sixteenths: Q::from_bits(32),
         ..dim
     };
-    says(&camera::judge(&at_low_gain), &[]);
+    says(&camera::judge(&at_low_gain, false), &[]);
 }
 
 /// Samples of frames with this period.

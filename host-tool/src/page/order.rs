@@ -3,7 +3,7 @@
 use super::press::Press;
 use crate::contact_shape;
 use crate::failure::{Failure, Kind};
-use crate::reply::KEEP_PATIENCE;
+use crate::reply::{CAMERA_PATIENCE, KEEP_PATIENCE};
 use crate::usual_tare::usual_tare;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
@@ -59,7 +59,7 @@ impl Order {
             Order::Tare => usual_tare(patience),
             Order::Expose => {
                 let done = "exposure and gain found; take a new tare".to_owned();
-                (Request::Expose, patience, done)
+                (Request::Expose, patience.max(CAMERA_PATIENCE), done)
             }
             Order::Threshold(wanted) => {
                 let done = "threshold set".to_owned();

@@ -203,7 +203,7 @@ pub enum SetCommand {
     },
     /// How many frames the camera sends a second, and so how many forces come
     ///
-    /// An OV7725 sends 156, 78 or 39, an MT9V034 244, 122 or 61. A lower rate leaves more time for
+    /// An OV7725 sends 156, 78 or 39, an MT9V034 231, 115 or 57. A lower rate leaves more time for
     /// light.
     ///
     /// Example: hivtac settings set rate 78

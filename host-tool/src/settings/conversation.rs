@@ -12,7 +12,7 @@ use hivtac_host::down::text as text_of_down;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
-use hivtac_host::reply::KEEP_PATIENCE;
+use hivtac_host::reply::{CAMERA_PATIENCE, KEEP_PATIENCE};
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
 use hivtac_terms::camera::CameraSettings;
@@ -71,6 +71,11 @@ impl Conversation {
         send(&mut self.link, request, self.patience)
     }
 
+    fn send_camera(&mut self, settings: CameraSettings) -> Result<(), Failure> {
+        let patience = self.patience.max(CAMERA_PATIENCE);
+        send(&mut self.link, Request::SetCamera(settings), patience)
+    }
+
     fn tell(&self, line: &str, object: Value) -> Result<(), Failure> {
         output::tell(self.json, line, &object)
     }
@@ -117,7 +122,7 @@ impl Conversation {
         let settings = change
             .of(&self.settings()?.camera)
             .map_err(|error| Failure::new(Kind::Input, format!("{error}; nothing was changed")))?;
-        self.send(Request::SetCamera(settings))?;
+        self.send_camera(settings)?;
         let selection = Selection {
             camera: true,
             ..Selection::NONE
@@ -225,8 +230,7 @@ impl Conversation {
                 .map_err(unkept)?;
         }
         if file.camera() != camera {
-            self.send(Request::SetCamera(file.camera()))
-                .map_err(unkept)?;
+            self.send_camera(file.camera()).map_err(unkept)?;
         }
         self.link.set_down(file.down()).map_err(unkept)?;
         self.send(Request::SetTare(tare)).map_err(unkept)?;

@@ -26,7 +26,7 @@ pub struct Simulated {
     #[arg(long, value_name = "FILE")]
     course: Option<String>,
     /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, or mt9v034
-    /// with 244
+    /// with 232
     #[arg(long, value_enum)]
     camera: Option<CameraName>,
     /// The dots on the film of a scene by name, and the model for them: 4 when not given, or 8v

@@ -49,7 +49,7 @@ fn problems_are_told_with_code_and_advice() {
         "{problems:?}"
     );
     assert_eq!(problems.len(), 2);
-    assert!(run.stderr.contains("2 of 13"), "{}", run.stderr);
+    assert!(run.stderr.contains("2 of 14"), "{}", run.stderr);
     let gone = "10  good     camera_registers: not so at the start\n";
     assert!(run.stdout.contains(gone), "{}", run.stdout);
 }

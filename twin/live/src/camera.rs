@@ -18,7 +18,7 @@ pub enum Kind {
     /// OmniVision OV7725: 320 × 240, in colour, rolling shutter, 156 frames a second.
     #[default]
     Ov7725,
-    /// onsemi MT9V034: 160 × 152, mono, global shutter, 244 frames a second.
+    /// onsemi MT9V034: 160 × 152, mono, global shutter, 232 frames a second.
     Mt9v034,
 }
 
@@ -263,7 +263,7 @@ mod tests {
             hz(Kind::Ov7725)
         );
         assert!(
-            (hz(Kind::Mt9v034) - 244.6).abs() < 0.1,
+            (hz(Kind::Mt9v034) - 231.9).abs() < 0.1,
             "{}",
             hz(Kind::Mt9v034)
         );

@@ -27,6 +27,9 @@ pub enum Kind {
     CameraSlow,
     /// A register of the camera goes back to its value after a reset, once.
     CameraForgets,
+    /// The camera's automatic exposure and gain move by a sixteenth every fourth frame, and rest as
+    /// soon as the level is within its limits.
+    CameraHesitant,
     /// The camera sends half of its rows in frames that begin while the fault is on.
     FrameShort,
     /// The camera sends five surplus rows in frames that begin while the fault is on.
@@ -46,7 +49,7 @@ pub enum Kind {
     UsbStuck,
 }
 
-const NAMES: [(&str, Kind); 17] = [
+const NAMES: [(&str, Kind); 18] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),
@@ -56,6 +59,7 @@ const NAMES: [(&str, Kind); 17] = [
     ("camera-silent", Kind::CameraSilent),
     ("camera-slow", Kind::CameraSlow),
     ("camera-forgets", Kind::CameraForgets),
+    ("camera-hesitant", Kind::CameraHesitant),
     ("frame-short", Kind::FrameShort),
     ("frame-long", Kind::FrameLong),
     ("dcmi-overrun", Kind::DcmiOverrun),

@@ -96,7 +96,7 @@ fn another_seed_gives_other_forces() {
     let forces = |seed| {
         let run = undisturbed(Setup {
             seed,
-            ..Setup::new(firmware(), 240)
+            ..Setup::new(firmware(), 420)
         });
         run.samples()
             .iter()

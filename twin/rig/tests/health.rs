@@ -80,7 +80,7 @@ fn a_register_that_does_not_hold_what_was_written_is_told() {
 #[test]
 fn frames_that_take_another_time_than_they_should_are_told() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
-    let setup = Setup::new(firmware(), 340).at(320, asked);
+    let setup = Setup::new(firmware(), 400).at(380, asked);
     let run = setup.fault("camera-slow").run();
     let health = told(&run);
     let clocks = Problem::Clocks.bit();

@@ -25,9 +25,9 @@ pub const XCLK_HZ: u32 = 240_000_000 / 9;
 /// Exposure of its rows: all at once.
 pub const MOTION: Motion = Motion::GLOBAL;
 
-/// Clocks of a row. The converters, one for each column, need this many for any width of the
-/// window.
-pub const ROW_CLOCKS: u16 = 690;
+/// Clocks of a row. The converters, one for each column, need 690 for any width of the window, and
+/// 704 while columns are binned (MT9V024 data sheet); PX4Flow saw distorted rows below 709.
+pub const ROW_CLOCKS: u16 = 710;
 
 /// The limits of its settings.
 pub const LIMITS: CameraLimits = super::limits(
@@ -43,12 +43,13 @@ pub const LIMITS: CameraLimits = super::limits(
     ],
 );
 
-/// Number of blank rows of a frame, at least 4.
+/// Number of blank rows of a frame, at least 10: with fewer, PX4Flow saw dark rows while rows are
+/// binned.
 pub const fn blank_rows(rate: Rate) -> u16 {
     match rate {
-        Rate::Full => 6,
-        Rate::Half => 164,
-        Rate::Quarter => 480,
+        Rate::Full => 10,
+        Rate::Half => 172,
+        Rate::Quarter => 496,
     }
 }
 
@@ -56,7 +57,7 @@ pub const fn blank_rows(rate: Rate) -> u16 {
 /// latency.
 pub const fn longest_exposure(rate: Rate) -> u16 {
     match rate {
-        Rate::Full => 96,
+        Rate::Full => 94,
         Rate::Half => 210,
         Rate::Quarter => 420,
     }

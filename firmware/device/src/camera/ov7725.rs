@@ -24,6 +24,8 @@ pub const XCLK_HZ: u32 = 12_500_000;
 
 /// Lines from frame to frame, blank ones included.
 pub const LINES: u16 = 278;
+/// Longest exposure, lines: the camera clamps what is longer (OmniVision OV7675, maximum exposure).
+pub const LONGEST_EXPOSURE: u16 = LINES - 2;
 /// Exposure of its rows: one after the other.
 pub const MOTION: Motion = Motion::rolling(LINES);
 /// Clocks from frame to frame: lines of 576 pixels of two bytes, one byte per PCLK.
@@ -53,19 +55,19 @@ pub const fn frame_us(rate: Rate) -> u32 {
     (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
 }
 
-/// Shortest and longest exposure: from one line to one frame.
+/// Shortest and longest exposure: from one line to the longest.
 const fn exposures(rate: Rate) -> [Microseconds; 2] {
     [
         Microseconds(frame_us(rate).div_ceil(LINES as u32)),
-        Microseconds(frame_us(rate)),
+        exposed(LONGEST_EXPOSURE as u32, rate),
     ]
 }
 
-/// The number of lines nearest to a time, at least 1 and at most a frame's.
+/// The number of lines nearest to a time, at least 1 and at most [`LONGEST_EXPOSURE`].
 pub fn lines(exposure: Microseconds, rate: Rate) -> u16 {
     let frame_us = frame_us(rate);
     let lines = (exposure.0.min(frame_us) * u32::from(LINES) + frame_us / 2) / frame_us.max(1);
-    (lines as u16).clamp(1, LINES)
+    (lines as u16).clamp(1, LONGEST_EXPOSURE)
 }
 
 /// The exposure of a row, of a number of lines.

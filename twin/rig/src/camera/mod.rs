@@ -102,11 +102,12 @@ impl Camera {
         seed: u64,
     ) -> Self {
         let used = faults.on(Kind::CameraUsed, 0);
+        let hesitant = faults.on(Kind::CameraHesitant, 0);
         Self {
             kind,
             part: match kind {
-                part::Kind::Ov7725 => Box::new(Ov7725::new(seed, used)),
-                part::Kind::Mt9v034 => Box::new(Mt9v034::new(used)),
+                part::Kind::Ov7725 => Box::new(Ov7725::new(seed, used, hesitant)),
+                part::Kind::Mt9v034 => Box::new(Mt9v034::new(used, hesitant)),
             },
             rules,
             supply: Supply::default(),

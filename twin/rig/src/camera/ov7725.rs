@@ -17,21 +17,24 @@ pub struct Ov7725 {
     /// Light of the current frame over the light that exposes it well.
     light: f64,
     seed: u64,
+    hesitant: bool,
 }
 
 impl Ov7725 {
     /// Returns a sensor out of reset. `seed` decides the values on which sources disagree. With
-    /// `used`, the registers have the values of another program.
-    pub fn new(seed: u64, used: bool) -> Self {
+    /// `used`, the registers have the values of another program. With `hesitant`, the automatic
+    /// control moves in small steps.
+    pub fn new(seed: u64, used: bool, hesitant: bool) -> Self {
         let registers = match used {
             true => Registers::used(seed),
             false => Registers::of_seed(seed),
         };
         Self {
-            exposing: Exposure::of(&registers),
+            exposing: Exposure::of(&registers, hesitant),
             registers,
             light: 1.0,
             seed,
+            hesitant,
         }
     }
 }
@@ -85,7 +88,7 @@ impl Part for Ov7725 {
     fn write(&mut self, address: u8, value: u16) -> bool {
         let reset = self.registers.write(address, value as u8);
         if reset {
-            self.exposing = Exposure::of(&self.registers);
+            self.exposing = Exposure::of(&self.registers, self.hesitant);
         }
         reset
     }
@@ -95,6 +98,6 @@ impl Part for Ov7725 {
     }
 
     fn reset(&mut self) {
-        *self = Self::new(self.seed, false);
+        *self = Self::new(self.seed, false, self.hesitant);
     }
 }

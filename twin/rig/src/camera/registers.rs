@@ -22,6 +22,14 @@ pub const AEC: u8 = 0x10;
 pub const COM8: u8 = 0x13;
 /// Largest automatic gain, bits 6:4.
 pub const COM9: u8 = 0x14;
+/// Highest level at which the automatic control rests.
+pub const AEW: u8 = 0x24;
+/// Lowest level at which the automatic control rests.
+pub const AEB: u8 = 0x25;
+/// Levels outside of which the automatic control moves fast: sixteenths, the upper one in bits 7:4.
+pub const VPT: u8 = 0x26;
+/// Mean level of the newest frame; read-only.
+pub const YAVE: u8 = 0x2F;
 /// Lens correction.
 pub const LC_CTR: u8 = 0x46;
 /// White balance: gains applied (bit 7), calculated (6).
@@ -176,8 +184,21 @@ const CONDITIONAL: [(u8, u8, u8, u8); 4] = [
     (SDE, SDE, DSP_CTRL1, 0x20),
 ];
 
+/// Reserved bits. Their values after a reset differ between revisions of the part, and some
+/// revisions keep them.
+const RESERVED: [(u8, u8); 8] = [
+    (0x0E, 0x06),
+    (0x0F, 0x3A),
+    (COM9, 0x09),
+    (0x41, 0xFC),
+    (AWB_CTRL0, 0x20),
+    (0x65, 0xF0),
+    (AWB_CTRL1, 0xF0),
+    (MTX_CTRL, 0x40),
+];
+
 /// Registers that a write does not change: ids and measured averages.
-const READ_ONLY: [u8; 8] = [0x05, 0x06, 0x07, PID, VER, 0x1C, 0x1D, 0x2F];
+const READ_ONLY: [u8; 8] = [0x05, 0x06, 0x07, PID, VER, 0x1C, 0x1D, YAVE];
 
 /// The register file that decides the sensor's output.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -185,6 +206,8 @@ pub struct Registers {
     values: [u8; 256],
     after_reset: [u8; 256],
     written: [bool; 256],
+    /// Bits that a write does not change.
+    fixed: [u8; 256],
 }
 
 impl Default for Registers {
@@ -198,18 +221,23 @@ impl Default for Registers {
             values,
             after_reset: values,
             written: [false; 256],
+            fixed: [0; 256],
         }
     }
 }
 
 impl Registers {
-    /// Returns the values after a reset. Those on which sources disagree depend on the seed.
+    /// Returns the values after a reset. Those on which sources disagree depend on the seed, and so
+    /// do the reserved bits that a write does not change. The part of seed 1 takes all bits.
     pub fn of_seed(seed: u64) -> Self {
         let mut registers = Self::default();
         for address in DISPUTED.into_iter().flat_map(|(first, last)| first..=last) {
             registers.after_reset[usize::from(address)] = random(seed, address);
         }
         registers.values = registers.after_reset;
+        for (address, bits) in RESERVED.into_iter().filter(|_| seed != 1) {
+            registers.fixed[usize::from(address)] = bits & random(!seed, address);
+        }
         registers
     }
 
@@ -236,8 +264,10 @@ impl Registers {
             return true;
         }
         if !READ_ONLY.contains(&address) {
-            self.values[usize::from(address)] = value;
-            self.written[usize::from(address)] = true;
+            let address = usize::from(address);
+            let fixed = self.fixed[address];
+            self.values[address] = value & !fixed | self.after_reset[address] & fixed;
+            self.written[address] = true;
         }
         false
     }
@@ -299,6 +329,21 @@ mod tests {
         assert_ne!(used.get(HSIZE), first.get(HSIZE));
         assert!(used.write(COM7, COM7_RESET));
         assert_eq!(used, first);
+    }
+
+    #[test]
+    fn reserved_bits_keep_their_values_by_seed() {
+        let kept = |seed: u64| {
+            let mut registers = Registers::of_seed(seed);
+            let kept = |&(address, _): &(u8, u8)| {
+                let other = !registers.get(address);
+                registers.write(address, other);
+                registers.get(address) != other
+            };
+            RESERVED.iter().filter(|register| kept(register)).count()
+        };
+        assert_eq!(kept(1), 0);
+        assert!((2..6).all(|seed| kept(seed) > 2));
     }
 
     #[test]
