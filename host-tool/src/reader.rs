@@ -98,7 +98,15 @@ impl Reader {
     /// [`Kind::Lost`] when the connection is lost, or nothing came for 10 s while it streams;
     /// [`Kind::Interrupted`].
     pub fn next_sample(&self) -> Result<Arrived, Failure> {
-        self.wait(|inbox| inbox.samples.pop_front())
+        self.waited(Inbox::next)
+    }
+
+    /// The next sample; `None` if there is none within this time.
+    ///
+    /// # Errors
+    /// Those of [`Reader::next_sample`].
+    pub fn next_within(&self, longest: Duration) -> Result<Option<Arrived>, Failure> {
+        self.wait(Inbox::next, Some(longest))
     }
 
     /// The newest sample that the program has not seen; waits for one if there is none. Those
@@ -107,12 +115,16 @@ impl Reader {
     /// # Errors
     /// Those of [`Reader::next_sample`].
     pub fn newest(&self) -> Result<Arrived, Failure> {
-        self.wait(|inbox| {
-            let newest = inbox.samples.pop_back();
-            inbox.missed += inbox.samples.len() as u64;
-            inbox.samples.clear();
-            newest
-        })
+        self.waited(Inbox::newest)
+    }
+
+    /// The newest sample that the program has not seen; `None` if there is none within this time.
+    /// For loops that must not wait: 0 s is an answer at once.
+    ///
+    /// # Errors
+    /// Those of [`Reader::next_sample`].
+    pub fn newest_within(&self, longest: Duration) -> Result<Option<Arrived>, Failure> {
+        self.wait(Inbox::newest, Some(longest))
     }
 
     /// Samples that arrived and that the program never gets: [`Reader::newest`] or a full queue
@@ -166,16 +178,34 @@ impl Reader {
         }
     }
 
-    fn wait(&self, take: impl Fn(&mut Inbox) -> Option<Arrived>) -> Result<Arrived, Failure> {
+    /// Waits as long as the device sends messages.
+    fn waited(&self, take: fn(&mut Inbox) -> Option<Arrived>) -> Result<Arrived, Failure> {
+        loop {
+            if let Some(arrived) = self.wait(take, None)? {
+                return Ok(arrived);
+            }
+        }
+    }
+
+    fn wait(
+        &self,
+        take: fn(&mut Inbox) -> Option<Arrived>,
+        longest: Option<Duration>,
+    ) -> Result<Option<Arrived>, Failure> {
+        let began = Instant::now();
         let mut inbox = self.shared.inbox();
         loop {
             if let Some(arrived) = take(&mut inbox) {
-                return Ok(arrived);
+                return Ok(Some(arrived));
             }
             if inbox.failure.is_some() {
                 return Err(inbox.failure());
             }
-            let waited = self.shared.news.wait_timeout(inbox, ASK_EVERY);
+            let left = longest.map_or(ASK_EVERY, |longest| longest.saturating_sub(began.elapsed()));
+            if left.is_zero() {
+                return Ok(None);
+            }
+            let waited = self.shared.news.wait_timeout(inbox, left.min(ASK_EVERY));
             drop(waited.unwrap_or_else(PoisonError::into_inner));
             stop::check()?;
             inbox = self.shared.inbox();
@@ -196,6 +226,17 @@ impl Drop for Reader {
 }
 
 impl Inbox {
+    fn next(&mut self) -> Option<Arrived> {
+        self.samples.pop_front()
+    }
+
+    fn newest(&mut self) -> Option<Arrived> {
+        let newest = self.samples.pop_back();
+        self.missed += self.samples.len() as u64;
+        self.samples.clear();
+        newest
+    }
+
     fn take(&mut self, message: DeviceMessage, came_ns: u64) {
         match message {
             DeviceMessage::Sample(sample) => {

@@ -25,6 +25,14 @@ const SERVE: [&str; 3] = [
     "cyclonedds mcap-ros2-support websockets",
 ];
 
+/// The same for LeRobot with the sensors' package; maturin and hatchling build that here. It brings
+/// PyTorch. Python 3.12 and newer have the present LeRobot, 3.10 and 3.11 the last one for them.
+const LEROBOT: [&str; 3] = [
+    "python-lerobot",
+    "maturin, hatchling, lerobot.datasets.lerobot_dataset, lerobot.scripts.lerobot_record",
+    "maturin>=1.9,<2 hatchling>=1.26 lerobot[core_scripts]>=0.4.4",
+];
+
 /// The same for the kit's mechanics, `hardware/`.
 const KIT: [&str; 3] = ["python-kit", "build123d", "build123d>=0.13,<0.14"];
 
@@ -44,6 +52,16 @@ pub fn no_serve() -> Option<&'static str> {
         "pip cannot install cyclonedds, mcap-ros2-support and websockets for Python 3.10 or \
          newer: is there python3 with venv (package python3-venv), and PyPI within reach, and \
          does it have cyclonedds for this Python and computer?",
+    )
+}
+
+/// Makes LeRobot's environment if missing; returns the obstacle, if there is one.
+pub fn no_lerobot() -> Option<&'static str> {
+    obstacle(
+        LEROBOT,
+        "pip cannot install lerobot (8 GB with PyTorch) for Python 3.10 or newer: is there \
+         python3 with venv (package python3-venv), and PyPI within reach? On Linux with Python \
+         3.12 or newer one of its packages is built: gcc, python3-dev and linux-libc-dev",
     )
 }
 
@@ -83,18 +101,25 @@ pub fn pip(python: &Path) -> Command {
     command
 }
 
-/// Installs Python's `hivtac` as a user does, but in the profile of the tests' other programs. Runs
-/// its tests on the firmware in the rig, and checks its annotations.
-pub fn test_package(tally: &mut Tally) -> Result<()> {
-    let python = python(PACKAGE)?;
-    let mut install = pip(&python);
-    install.args("--no-build-isolation --force-reinstall --no-deps ./host-tool/python".split(' '));
+/// Installs packages of this project as a user does, but Rust in the profile of the tests' other
+/// programs.
+fn install(python: &Path, folders: &[&str]) -> Result<()> {
+    let mut install = pip(python);
+    install.args("--no-build-isolation --force-reinstall --no-deps".split(' '));
+    install.args(folders);
     // The build backend finds maturin in this folder.
     let path = std::env::var("PATH").unwrap_or_default();
     let programs = python.with_file_name("");
     install.env("PATH", format!("{}:{path}", programs.display()));
     install.env("MATURIN_PEP517_ARGS", "--profile tools");
-    process::run(install.current_dir(toolchain::at("")))?;
+    process::run(install.current_dir(toolchain::at("")))
+}
+
+/// Installs Python's `hivtac`, runs its tests on the firmware in the rig, and checks its
+/// annotations.
+pub fn test_package(tally: &mut Tally) -> Result<()> {
+    let python = python(PACKAGE)?;
+    install(&python, &["./host-tool/python"])?;
     let mut types = Command::new(&python);
     types.args("-m mypy --strict --cache-dir target/mypy host-tool/python/hivtac".split(' '));
     process::run(types.current_dir(toolchain::at("")))?;
@@ -104,6 +129,16 @@ pub fn test_package(tally: &mut Tally) -> Result<()> {
         &artifacts::host_tool()?,
         tally,
     )
+}
+
+/// Records with LeRobot from the simulated sensor, and loads what was recorded.
+pub fn test_lerobot(tally: &mut Tally) -> Result<()> {
+    let python = python(LEROBOT)?;
+    install(&python, &["./host-tool/python", "./host-tool/lerobot"])?;
+    let mut command = Command::new(python);
+    command.arg("tests/python/test_lerobot.py");
+    command.env("HIVTAC_TOOL", artifacts::host_tool()?);
+    run_tests(command.current_dir(toolchain::at("")), tally)
 }
 
 /// Serves the firmware in the rig, and tests what a receiver gets.

@@ -32,7 +32,7 @@ type Work = fn(&Shared, &mut Tally) -> Result<()>;
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
 /// the microcontroller come first, in their own folder, while the lints hold the common one. Long
 /// steps follow; those after them fill the time until both threads end.
-static STEPS: [Step; 16] = [
+static STEPS: [Step; 17] = [
     ("format", |_, _| format(), None),
     (
         "lints: microcontroller",
@@ -59,6 +59,11 @@ static STEPS: [Step; 16] = [
         "tests: serve",
         |_, tally| python::test_serve(tally),
         Some(python::no_serve),
+    ),
+    (
+        "tests: lerobot",
+        |_, tally| python::test_lerobot(tally),
+        Some(python::no_lerobot),
     ),
     (
         "tests: kit",

@@ -22,7 +22,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -195,7 +195,8 @@ def recording(path: str | os.PathLike[str], *, device: str | None = None) -> Rec
 
 class Sensor:
     """A connection to a sensor: iterates over its samples as they arrive, without an end. Close it,
-    or use it in a `with` statement."""
+    or use it in a `with` statement. Several threads may use it: one takes samples while another
+    waits for a picture."""
 
     def __init__(self, connection: Connection) -> None:
         self._connection = connection
@@ -229,20 +230,25 @@ class Sensor:
             raise StopIteration
         return _sample(*numbers)
 
-    def newest(self) -> Sample:
+    @overload
+    def newest(self) -> Sample: ...
+
+    @overload
+    def newest(self, timeout: float) -> Sample | None: ...
+
+    def newest(self, timeout: float | None = None) -> Sample | None:
         """Returns the newest sample that was not taken yet, and waits for one if there is none.
         Those before it are passed over, which `missed` counts. For control loops that are slower
-        than the sensor.
+        than the sensor. `timeout`: longest wait, s, after which it returns `None`; with 0 the loop
+        never waits.
 
         Raises `LostError` when the connection is lost, `Error` after it was closed.
         """
         try:
-            numbers = self._connection.newest()
+            numbers = self._connection.newest(timeout)
         finally:
             self._tell_log()
-        if numbers is None:
-            raise Error("this connection was closed")
-        return _sample(*numbers)
+        return None if numbers is None else _sample(*numbers)
 
     @property
     def missed(self) -> int:
@@ -311,7 +317,7 @@ class Sensor:
         return np.frombuffer(levels, np.uint8).reshape(height, width, 3).copy()
 
     def close(self) -> None:
-        """Ends the connection."""
+        """Ends the connection, once no other thread waits in one of its calls."""
         self._connection.close()
 
     def _tell_log(self) -> None:

@@ -1,5 +1,5 @@
-//! A conversation with a device. While anything waits, the interpreter's lock is free. It is taken
-//! only after the connection's own lock, and two threads may use one connection.
+//! A conversation with a device. While anything waits, the interpreter's lock is free, and so is the
+//! connection's own: one thread may take samples while another waits for a picture.
 
 use crate::error::{Error, raised};
 use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
@@ -18,7 +18,8 @@ use hivtac_wire::message::{DeviceHello, DeviceMessage, LogLevel, Request};
 use hivtac_wire::settings::Selection;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Time for a tare or for keeping settings, in addition to the frames.
@@ -26,10 +27,10 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Longest time between two frames; an emulated device is slower than a real one.
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 
-/// A connection, open or closed.
+/// A connection, open or closed. A call that is under way in another thread keeps it open.
 #[pyclass(frozen)]
 pub struct Connection {
-    talk: Mutex<Option<Talk>>,
+    talk: Mutex<Option<Arc<Talk>>>,
     hello: DeviceHello,
     patience: Duration,
 }
@@ -37,7 +38,7 @@ pub struct Connection {
 /// An open connection.
 struct Talk {
     reader: Reader,
-    is_streaming: bool,
+    is_streaming: AtomicBool,
 }
 
 /// A log level and a line.
@@ -55,15 +56,17 @@ fn level(level: LogLevel) -> u8 {
 impl Talk {
     /// Waits for a sample with this function, for as long as the device sends messages.
     fn sample(
-        &mut self,
+        &self,
         patience: Duration,
-        wait: impl FnOnce(&Reader) -> Result<Arrived, Failure>,
-    ) -> Result<SampleNumbers, Failure> {
-        if !self.is_streaming {
+        wait: impl FnOnce(&Reader) -> Result<Option<Arrived>, Failure>,
+    ) -> Result<Option<SampleNumbers>, Failure> {
+        // Two threads at once may both ask for the stream, which does no harm.
+        if !self.is_streaming.load(Ordering::Relaxed) {
             self.reader.stream(patience)?;
-            self.is_streaming = true;
+            self.is_streaming.store(true, Ordering::Relaxed);
         }
-        wait(&self.reader).map(|arrived| told::sample(&arrived.sample, arrived.came_ns))
+        let arrived = wait(&self.reader)?;
+        Ok(arrived.map(|arrived| told::sample(&arrived.sample, arrived.came_ns)))
     }
 }
 
@@ -133,8 +136,7 @@ impl Connection {
         device: Option<String>,
         timeout: f64,
     ) -> PyResult<Connection> {
-        let patience = Duration::try_from_secs_f64(timeout)
-            .map_err(|_| Error::new_err(format!("timeout: {timeout} s is no time to wait")))?;
+        let patience = time(timeout)?;
         let (link, hello) = py
             .detach(|| {
                 let address = match (port, device) {
@@ -151,10 +153,10 @@ impl Connection {
             .map_err(raised)?;
         let talk = Talk {
             reader: Reader::start(link),
-            is_streaming: false,
+            is_streaming: AtomicBool::new(false),
         };
         Ok(Connection {
-            talk: Mutex::new(Some(talk)),
+            talk: Mutex::new(Some(Arc::new(talk))),
             hello,
             patience,
         })
@@ -167,17 +169,25 @@ impl Connection {
 
     /// The next sample; `None` once the connection is closed.
     fn next(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
-        self.sample(py, Reader::next_sample)
+        let Some(talk) = self.open_talk() else {
+            return Ok(None);
+        };
+        self.sample(py, talk, |reader| reader.next_sample().map(Some))
     }
 
-    /// The newest sample; `None` once the connection is closed.
-    fn newest(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
-        self.sample(py, Reader::newest)
+    /// The newest sample; `None` if there is none within `timeout`, s.
+    fn newest(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<Option<SampleNumbers>> {
+        let longest = timeout.map(time).transpose()?;
+        let talk = self.open_talk().ok_or_else(|| raised(closed()))?;
+        self.sample(py, talk, |reader| match longest {
+            None => reader.newest().map(Some),
+            Some(longest) => reader.newest_within(longest),
+        })
     }
 
     /// Samples that arrived and were passed over.
-    fn missed(&self, py: Python<'_>) -> u64 {
-        py.detach(|| self.lock().as_ref().map_or(0, |talk| talk.reader.missed()))
+    fn missed(&self) -> u64 {
+        self.open_talk().map_or(0, |talk| talk.reader.missed())
     }
 
     /// Takes a rest position.
@@ -227,37 +237,48 @@ impl Connection {
     }
 
     /// The lines that the device logged since the last call.
-    fn take_lines(&self, py: Python<'_>) -> Vec<LeveledLine> {
-        py.detach(|| {
-            let talk = self.lock();
-            let lines = talk.as_ref().map(|talk| talk.reader.take_lines());
-            let lines = lines.into_iter().flatten();
-            lines
-                .map(|line| (level(line.level), log_text(&line)))
-                .collect()
-        })
+    fn take_lines(&self) -> Vec<LeveledLine> {
+        let lines = self.open_talk().map(|talk| talk.reader.take_lines());
+        let lines = lines.into_iter().flatten();
+        lines
+            .map(|line| (level(line.level), log_text(&line)))
+            .collect()
     }
 
     /// Ends the conversation; further calls have no effect.
     fn close(&self, py: Python<'_>) {
-        py.detach(|| drop(self.lock().take()));
+        let talk = self.lock().take();
+        py.detach(|| drop(talk));
     }
 }
 
+fn time(seconds: f64) -> PyResult<Duration> {
+    Duration::try_from_secs_f64(seconds)
+        .map_err(|_| Error::new_err(format!("timeout: {seconds} s is no time to wait")))
+}
+
+fn closed() -> Failure {
+    Failure::new(Kind::Input, "this connection was closed")
+}
+
 impl Connection {
-    fn lock(&self) -> std::sync::MutexGuard<'_, Option<Talk>> {
+    /// Held for a moment only, and never while the interpreter's lock is waited for.
+    fn lock(&self) -> MutexGuard<'_, Option<Arc<Talk>>> {
         self.talk.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn open_talk(&self) -> Option<Arc<Talk>> {
+        self.lock().clone()
     }
 
     fn sample(
         &self,
         py: Python<'_>,
-        wait: impl FnOnce(&Reader) -> Result<Arrived, Failure> + Send,
+        talk: Arc<Talk>,
+        wait: impl FnOnce(&Reader) -> Result<Option<Arrived>, Failure> + Send,
     ) -> PyResult<Option<SampleNumbers>> {
-        let sample = py.detach(|| match &mut *self.lock() {
-            Some(talk) => talk.sample(self.patience, wait).map(Some),
-            None => Ok(None),
-        });
+        // The last call under way closes the connection, which may wait, too.
+        let sample = py.detach(move || talk.sample(self.patience, wait));
         sample.map_err(raised)
     }
 
@@ -267,9 +288,10 @@ impl Connection {
         py: Python<'_>,
         work: impl FnOnce(&mut Link, Others<'_>) -> Result<T, Failure> + Send + 'static,
     ) -> PyResult<T> {
-        let done = py.detach(|| match &*self.lock() {
+        let talk = self.open_talk();
+        let done = py.detach(move || match talk {
             Some(talk) => talk.reader.with(work),
-            None => Err(Failure::new(Kind::Input, "this connection was closed")),
+            None => Err(closed()),
         });
         done.map_err(raised)
     }

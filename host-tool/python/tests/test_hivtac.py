@@ -77,6 +77,23 @@ class OnTheRig(unittest.TestCase):
             self.assertEqual(
                 sensor.missed, newest.sequence - second.sequence - 1
             )
+            self.assertGreater(sensor.newest(PATIENCE).sequence, newest.sequence)
+            # Until the next sample there is none, whatever the rig's speed.
+            while sensor.newest(timeout=0) is not None:
+                pass
+
+    def test_samples_come_while_another_thread_waits_for_a_picture(self):
+        with Rig("rest") as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:
+            first = next(sensor)
+            pictures = []
+            thread = threading.Thread(target=lambda: pictures.append(sensor.snapshot()))
+            thread.start()
+            while thread.is_alive():
+                sample = next(sensor)
+            thread.join()
+        self.assertEqual(pictures[0].shape, (240, 320, 3))
+        # A snapshot lasts 0.14 s of the device's time.
+        self.assertGreater(sample.sequence, first.sequence + 10)
 
     def test_a_tare_and_a_picture_between_samples(self):
         with Rig("rest") as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:

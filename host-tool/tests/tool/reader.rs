@@ -4,10 +4,10 @@ use crate::fake::*;
 use hivtac_host::failure::Kind;
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
-use hivtac_host::reader::{ROOM, Reader};
+use hivtac_host::reader::{Arrived, ROOM, Reader};
 use hivtac_wire::message::{HostMessage, Request};
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Time between two samples.
@@ -75,6 +75,24 @@ fn the_newest_passes_over_those_before_and_the_queue_has_an_end() {
 }
 
 #[test]
+fn a_wait_has_an_end_and_takes_what_is_there() {
+    let (sent, is_sent) = mpsc::channel();
+    let device = device(3, Duration::ZERO, sent);
+    let reader = reader(&device.port);
+    is_sent.recv_timeout(PATIENCE).unwrap();
+    ask(&reader);
+    let sequence = |arrived: Option<Arrived>| arrived.map(|arrived| arrived.sample.sequence);
+    let none = Duration::ZERO;
+    assert_eq!(sequence(reader.next_within(none).unwrap()), Some(0));
+    assert_eq!(sequence(reader.newest_within(PATIENCE).unwrap()), Some(2));
+    assert_eq!(sequence(reader.newest_within(none).unwrap()), None);
+    let (began, wait) = (Instant::now(), Duration::from_millis(120));
+    assert_eq!(sequence(reader.next_within(wait).unwrap()), None);
+    assert!(began.elapsed() >= wait, "{:?}", began.elapsed());
+    assert_eq!(reader.missed(), 1);
+}
+
+#[test]
 fn a_lost_connection_is_told_after_the_last_sample() {
     let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| {
         assert!(device.answer_one() && device.answer_one());
@@ -84,6 +102,8 @@ fn a_lost_connection_is_told_after_the_last_sample() {
     let reader = reader(&device.port);
     assert_eq!(reader.next_sample().unwrap().sample.sequence, 0);
     assert_eq!(reader.next_sample().unwrap_err().kind, Kind::Lost);
+    let at_once = reader.newest_within(Duration::ZERO);
+    assert_eq!(at_once.unwrap_err().kind, Kind::Lost);
     let asked = reader.with(|link, others| link.request(Request::GetInfo, PATIENCE, others));
     assert_eq!(asked.unwrap_err().kind, Kind::Lost);
 }
