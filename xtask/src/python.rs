@@ -33,6 +33,13 @@ const LEROBOT: [&str; 3] = [
     "maturin>=1.9,<2 hatchling>=1.26 lerobot[core_scripts]>=0.4.4",
 ];
 
+/// The same for Rerun, which reads its own files from Python 3.11 on.
+const RERUN: [&str; 3] = [
+    "python-rerun",
+    "maturin, rerun.chunk",
+    "maturin>=1.9,<2 rerun-sdk>=0.41",
+];
+
 /// The same for the kit's mechanics, `hardware/`.
 const KIT: [&str; 3] = ["python-kit", "build123d", "build123d>=0.13,<0.14"];
 
@@ -62,6 +69,15 @@ pub fn no_lerobot() -> Option<&'static str> {
         "pip cannot install lerobot (8 GB with PyTorch) for Python 3.10 or newer: is there \
          python3 with venv (package python3-venv), and PyPI within reach? On Linux with Python \
          3.12 or newer one of its packages is built: gcc, python3-dev and linux-libc-dev",
+    )
+}
+
+/// Makes Rerun's environment if missing; returns the obstacle, if there is one.
+pub fn no_rerun() -> Option<&'static str> {
+    obstacle(
+        RERUN,
+        "pip cannot install rerun-sdk (0.9 GB) for Python 3.11 or newer: is there python3 with \
+         venv (package python3-venv), and PyPI within reach?",
     )
 }
 
@@ -135,9 +151,22 @@ pub fn test_package(tally: &mut Tally) -> Result<()> {
 pub fn test_lerobot(tally: &mut Tally) -> Result<()> {
     let python = python(LEROBOT)?;
     install(&python, &["./host-tool/python", "./host-tool/lerobot"])?;
+    test_on_twin(&python, "tests/python/test_lerobot.py", tally)
+}
+
+/// Logs the simulated sensor and a recording into files of Rerun, and reads these.
+pub fn test_rerun(tally: &mut Tally) -> Result<()> {
+    let python = python(RERUN)?;
+    install(&python, &["./host-tool/python"])?;
+    test_on_twin(&python, "tests/python/test_rerun.py", tally)
+}
+
+/// Runs tests on the simulated sensor.
+fn test_on_twin(python: &Path, file: &str, tally: &mut Tally) -> Result<()> {
     let mut command = Command::new(python);
-    command.arg("tests/python/test_lerobot.py");
-    command.env("HIVTAC_TOOL", artifacts::host_tool()?);
+    command
+        .arg(file)
+        .env("HIVTAC_TOOL", artifacts::host_tool()?);
     run_tests(command.current_dir(toolchain::at("")), tally)
 }
 

@@ -43,6 +43,7 @@ __all__ = [
     "LostError",
     "Moved",
     "NoDeviceError",
+    "Picture",
     "Recording",
     "RefusedError",
     "Rest",
@@ -169,6 +170,23 @@ class Tare:
     """Motion of the markers during the tare, px."""
     moved: Moved | None
     """Motion from the rest position before; `None` for the first tare."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """A frame as the sensing read it."""
+
+    frame: int
+    """Its number, as of its sample."""
+    time: float
+    """Device time of the middle of its exposure, s."""
+    pixels: npt.NDArray[np.uint8]
+    """(height, width, 3): levels of red, green and blue."""
+    mask: npt.NDArray[np.uint8]
+    """(height, width): 255 where a pixel passes the threshold, 128 where only dilation adds it."""
+    markers: Floats | None
+    """(N, 2): column and row of each marker, px; `None` if not all were found, or the sensor was
+    not asked for samples before."""
 
 
 def open(
@@ -315,6 +333,23 @@ class Sensor:
         finally:
             self._tell_log()
         return np.frombuffer(levels, np.uint8).reshape(height, width, 3).copy()
+
+    def look(self) -> Picture:
+        """Takes the next whole frame as `snapshot` does, with its mask and markers.
+
+        Raises what `snapshot` raises.
+        """
+        try:
+            frame, time, width, height, levels, mask, markers = self._connection.look()
+        finally:
+            self._tell_log()
+        return Picture(
+            frame,
+            time,
+            np.frombuffer(levels, np.uint8).reshape(height, width, 3).copy(),
+            np.frombuffer(mask, np.uint8).reshape(height, width).copy(),
+            np.array([marker[:2] for marker in markers]) if markers else None,
+        )
 
     def close(self) -> None:
         """Ends the connection, once no other thread waits in one of its calls."""

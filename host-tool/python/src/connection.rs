@@ -1,8 +1,8 @@
-//! A conversation with a device. While anything waits, the interpreter's lock is free, and so is the
-//! connection's own: one thread may take samples while another waits for a picture.
+//! A conversation with a device. While anything waits, the interpreter's lock is free, and so is
+//! the connection's own: one thread may take samples while another waits for a picture.
 
 use crate::error::{Error, raised};
-use crate::told::{self, RestNumbers, SampleNumbers, TareNumbers};
+use crate::told::{self, MarkerNumbers, RestNumbers, SampleNumbers, TareNumbers};
 use hivtac_host::contact_shape;
 use hivtac_host::down::direction;
 use hivtac_host::failure::{Failure, Kind};
@@ -40,6 +40,17 @@ struct Talk {
     reader: Reader,
     is_streaming: AtomicBool,
 }
+
+/// What [`Connection::look`] returns.
+type Look<'py> = (
+    u32,
+    f64,
+    u16,
+    u16,
+    Bound<'py, PyBytes>,
+    Bound<'py, PyBytes>,
+    Option<Vec<MarkerNumbers>>,
+);
 
 /// A log level and a line.
 type LeveledLine = (u8, String);
@@ -234,6 +245,24 @@ impl Connection {
         let levels = PyBytes::new(py, &look::levels(&frame));
         let time_s = frame.time_us as f64 / 1e6;
         Ok((frame.number, time_s, frame.width, frame.height, levels))
+    }
+
+    /// Of a whole frame: its number, device time (s), columns, rows, levels of red, green and blue,
+    /// mask (255 passes the threshold, 128 only dilation adds), and column, row and area of each
+    /// marker, px.
+    fn look<'py>(&self, py: Python<'py>) -> PyResult<Look<'py>> {
+        let patience = self.patience;
+        let taken = self.with(py, move |link, others| link.snapshot(patience, others))?;
+        let (frame, dilations) = (taken.frame, self.hello.dilations);
+        let [levels, mask] = py.detach(|| {
+            let mask = look::mask(&frame, dilations).unwrap_or_default();
+            [look::levels(&frame), mask]
+        });
+        let [levels, mask] = [levels, mask].map(|bytes| PyBytes::new(py, &bytes));
+        let time_s = frame.time_us as f64 / 1e6;
+        let (size, markers) = ((frame.width, frame.height), taken.sample);
+        let markers = markers.and_then(|sample| told::markers(&sample));
+        Ok((frame.number, time_s, size.0, size.1, levels, mask, markers))
     }
 
     /// The lines that the device logged since the last call.

@@ -24,15 +24,14 @@ pub type SampleNumbers = (
     u32,
     Vec<&'static str>,
     Option<ForceNumbers>,
-    Option<Vec<(f64, f64, u32)>>,
+    Option<Vec<MarkerNumbers>>,
 );
+
+/// Column, row and area, px.
+pub type MarkerNumbers = (f64, f64, u32);
 
 /// A sample that was received at `came_ns`, ns since 1970.
 pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
-    let markers = sample.found().map(|markers| {
-        let numbers = |marker: &Marker| (px(marker.x), px(marker.y), marker.area);
-        markers.iter().map(numbers).collect()
-    });
     (
         sample.sequence,
         sample.frame,
@@ -41,8 +40,15 @@ pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
         sample.status.0,
         sample.status.names().collect(),
         sample.force.as_ref().map(force),
-        markers,
+        markers(sample),
     )
+}
+
+/// The markers of a sample; `None` if not all were found.
+pub fn markers(sample: &Sample) -> Option<Vec<MarkerNumbers>> {
+    let numbers = |marker: &Marker| (px(marker.x), px(marker.y), marker.area);
+    let found = sample.found()?;
+    Some(found.iter().map(numbers).collect())
 }
 
 fn force(force: &Force) -> ForceNumbers {

@@ -102,6 +102,7 @@ class OnTheRig(unittest.TestCase):
             again = sensor.tare(frames=4)
             rest = sensor.rest()
             picture = sensor.snapshot()
+            look = sensor.look()
             after = next(sensor)
             with self.assertRaisesRegex(hivtac.RefusedError, "outside its range"):
                 sensor.tare(frames=0)
@@ -122,6 +123,11 @@ class OnTheRig(unittest.TestCase):
         for column, row in tare.markers.round().astype(int):
             self.assertGreater(red[row, column], 1.5 * green[row, column])
         self.assertLess(red[120, 160], 1.5 * green[120, 160])
+        self.assertEqual((look.pixels.shape, look.mask.shape), ((240, 320, 3), (240, 320)))
+        np.testing.assert_allclose(look.markers, tare.markers, atol=0.5)
+        for column, row in look.markers.round().astype(int):
+            self.assertEqual(look.mask[row, column], 255)
+        self.assertEqual(look.mask[120, 160], 0)
         with self.assertRaisesRegex(hivtac.Error, "closed"):
             sensor.tare()
         self.assertEqual(list(sensor), [])
