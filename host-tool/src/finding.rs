@@ -5,6 +5,7 @@ use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
 use hivtac_host::marker_fields::MarkerJson;
 use hivtac_host::shown::to_json;
 use hivtac_sensor::markers::blob::Blob;
+use hivtac_sensor::markers::rules::{Finder, Unlike};
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;
@@ -40,6 +41,8 @@ pub struct Finding<'a> {
 
 #[derive(Serialize)]
 struct BlobJson {
+    /// Why it is no marker; `None` if it could be one.
+    no_marker: Option<String>,
     area: u32,
     cx: f64,
     cy: f64,
@@ -49,8 +52,8 @@ struct BlobJson {
     y1: u16,
 }
 
-impl From<&Blob> for BlobJson {
-    fn from(blob: &Blob) -> BlobJson {
+impl BlobJson {
+    fn new(blob: &Blob, finder: &Finder) -> BlobJson {
         let (x, y) = blob.centroid();
         let Blob {
             area,
@@ -61,6 +64,7 @@ impl From<&Blob> for BlobJson {
             ..
         } = *blob;
         BlobJson {
+            no_marker: finder.unlike(blob).map(unlike),
             area,
             cx: x.to_f64(),
             cy: y.to_f64(),
@@ -69,6 +73,16 @@ impl From<&Blob> for BlobJson {
             x1,
             y1,
         }
+    }
+}
+
+/// By what a blob is no marker, and what helps if it should be one.
+fn unlike(why: Unlike) -> String {
+    match why {
+        Unlike::Small(least) => format!("fewer than {least} pixels, or another --preset"),
+        Unlike::Large(most) => format!("more than {most} pixels, or another --preset"),
+        Unlike::Cut => "cut by the picture's border".to_owned(),
+        Unlike::Uneven => "not filled as an ellipse is: cut, holed, or two things".to_owned(),
     }
 }
 
@@ -86,6 +100,7 @@ impl<'a> Finding<'a> {
             all.retain(|marker| !measurement.lost.contains(marker.id));
             all
         });
+        let finder = Finder::new(settings);
         // The paper's features are those of four markers.
         let features = measurement
             .features
@@ -95,7 +110,10 @@ impl<'a> Finding<'a> {
             image,
             width: settings.geometry.width,
             height: settings.geometry.height,
-            blobs: blobs.iter().map(BlobJson::from).collect(),
+            blobs: blobs
+                .iter()
+                .map(|blob| BlobJson::new(blob, &finder))
+                .collect(),
             markers,
             features,
             force: measurement.force.map(ForceJson),
@@ -177,9 +195,12 @@ impl<'a> Finding<'a> {
                 y0,
                 x1,
                 y1,
+                no_marker,
             } = blob;
+            let why = no_marker.as_ref();
+            let why = why.map_or(String::new(), |why| format!("; no marker: {why}"));
             format!(
-                "{area:>10}{:>22}  x {x0}–{x1}, y {y0}–{y1}",
+                "{area:>10}{:>22}  x {x0}–{x1}, y {y0}–{y1}{why}",
                 format!("({cx:.3}, {cy:.3})")
             )
         }));

@@ -75,6 +75,39 @@ impl Picture {
         })
     }
 
+    /// Makes the pixels for which `is_looked_at(column, row)` is false as no marker is: black, in a
+    /// mono camera's picture white.
+    pub fn hide(&mut self, is_looked_at: impl Fn(u16, u16) -> bool) {
+        let words = self.format.row_length(self.width);
+        for (row, pixels) in (0..).zip(self.pixels.chunks_mut(words)) {
+            match self.format {
+                PixelFormat::Rgb565 => blacken(pixels, 0, |column| is_looked_at(column, row)),
+                // Luma 0, and no colour.
+                PixelFormat::Yuv422 => blacken(pixels, 0x8000, |column| is_looked_at(column, row)),
+                PixelFormat::Mono => {
+                    for (pair, word) in (0..).zip(pixels) {
+                        let [left, right] = [2 * pair, 2 * pair + 1];
+                        let shown = |level: u8, column| match is_looked_at(column, row) {
+                            true => level,
+                            false => u8::MAX,
+                        };
+                        let [low, high] = word.to_le_bytes();
+                        *word = u16::from_le_bytes([shown(low, left), shown(high, right)]);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The level of a pixel of a mono picture; 0 outside of it.
+    pub fn level(&self, column: u16, row: u16) -> u8 {
+        let words = PixelFormat::Mono.row_length(self.width);
+        let word = self
+            .pixels
+            .get(usize::from(row) * words + usize::from(column / 2));
+        word.map_or(0, |word| word.to_le_bytes()[usize::from(column % 2)])
+    }
+
     /// Median of the pixels' value (RGB565) or luma, 0 to 255.
     pub fn brightness(&self) -> u8 {
         let mut values: Vec<u8> = match self.format {
@@ -96,6 +129,14 @@ impl Picture {
 
 fn unreadable(path: &str, why: &dyn std::fmt::Display) -> Failure {
     Failure::input(format!("cannot read the picture {path}: {why}"))
+}
+
+fn blacken(pixels: &mut [u16], black: u16, is_looked_at: impl Fn(u16) -> bool) {
+    for (column, pixel) in (0..).zip(pixels) {
+        if !is_looked_at(column) {
+            *pixel = black;
+        }
+    }
 }
 
 /// The channels of a written picture.

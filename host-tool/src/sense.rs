@@ -17,7 +17,7 @@ use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::geometry::Preset;
-use hivtac_terms::threshold::HsvBox;
+use hivtac_terms::threshold::{HsvBox, PixelFormat};
 
 /// The model that is built into the firmware.
 static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
@@ -52,6 +52,12 @@ pub struct SenseArguments {
     /// Model file; the firmware's own when not given
     #[arg(long, value_name = "FILE")]
     model: Option<String>,
+    /// Columns and rows that are looked at, of all pictures; the rest counts as empty
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = region)]
+    region: Option<Region>,
+    /// Picture of the same size that is white where pictures are looked at, and black elsewhere
+    #[arg(long, value_name = "IMAGE")]
+    mask: Option<String>,
     /// Picture of the untouched film, to measure displacements from
     #[arg(long, value_name = "IMAGE")]
     tare: Option<String>,
@@ -71,8 +77,12 @@ pub fn run(arguments: &SenseArguments) -> Result<(), Failure> {
     let name = arguments.model.as_deref().unwrap_or("the built-in model");
     let model = Model::parse(file.as_deref().unwrap_or(MODEL))
         .map_err(|error| Failure::input(format!("{name} is no usable model: {error}")))?;
+    let mask = arguments.mask.as_deref();
     let bench = Bench {
         arguments,
+        mask: mask
+            .map(|path| Picture::load(path, PixelFormat::Mono))
+            .transpose()?,
         model,
         name,
     };
@@ -121,9 +131,39 @@ struct Tare {
     size: (u16, u16),
 }
 
+/// Columns and rows of a picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Region {
+    /// Its upper left pixel.
+    from: [u32; 2],
+    /// Width and height, at least 1.
+    size: [u16; 2],
+}
+
+impl Region {
+    fn contains(&self, at: [u16; 2]) -> bool {
+        (0..2).all(|axis| {
+            let (at, from) = (u32::from(at[axis]), self.from[axis]);
+            (from..from + u32::from(self.size[axis])).contains(&at)
+        })
+    }
+}
+
+fn region(text: &str) -> Result<Region, String> {
+    let numbers: Result<Vec<u16>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok([x, y, width @ (1..), height @ (1..)]) => Ok(Region {
+            from: [(*x).into(), (*y).into()],
+            size: [*width, *height],
+        }),
+        _ => Err("four whole numbers, such as 40,20,240,200: left, top, width, height, px".into()),
+    }
+}
+
 /// The arguments and model that all pictures share.
 struct Bench<'a> {
     arguments: &'a SenseArguments,
+    mask: Option<Picture>,
     model: Model<'a>,
     /// The model's name, for messages.
     name: &'a str,
@@ -155,9 +195,32 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Reads a picture in the format of the model's camera.
+    /// Reads a picture in the format of the model's camera, without what is not looked at.
     fn picture(&self, path: &str) -> Result<Picture, Failure> {
-        Picture::load(path, self.model.conditions.threshold.format())
+        let mut picture = Picture::load(path, self.model.conditions.threshold.format())?;
+        let size = [picture.width, picture.height];
+        if let Some(region) = &self.arguments.region {
+            let Region { from, size: part } = *region;
+            let fits = (0..2).all(|axis| from[axis] + u32::from(part[axis]) <= size[axis].into());
+            if !fits {
+                return Err(Failure::input(format!(
+                    "--region goes beyond the picture {path} of {} × {} px",
+                    size[0], size[1]
+                )));
+            }
+            picture.hide(|x, y| region.contains([x, y]));
+        }
+        if let Some(mask) = &self.mask {
+            let mask_size = [mask.width, mask.height];
+            if mask_size != size {
+                return Err(Failure::input(format!(
+                    "the mask has {} × {} px, and the picture {path} has {} × {}; use one size",
+                    mask_size[0], mask_size[1], size[0], size[1]
+                )));
+            }
+            picture.hide(|x, y| mask.level(x, y) >= 128);
+        }
+        Ok(picture)
     }
 
     /// Finds the rest position in a picture.

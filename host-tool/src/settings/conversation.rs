@@ -269,7 +269,7 @@ fn lines(report: &SettingsReport) -> Vec<String> {
     let seen_px = report.seen.map(MilliPx::to_f64);
     let tare = taken.to_owned() + &rest_text(report.rezeroed.to_f64(), seen_px);
     let found = match report.found {
-        Found::Nothing => "nothing was ever kept",
+        Found::Nothing => "no settings found at the start",
         Found::Settings => "settings found at the start",
         Found::AnotherVersion => {
             "settings of another version of the firmware, which this one does not read; they stay \

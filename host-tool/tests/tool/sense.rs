@@ -119,7 +119,7 @@ fn every_blob_is_measured() {
     let found = json_of(&run(&["sense", "--json", &path]));
     let expected = json!({
         "image": path, "width": 320, "height": 240,
-        "blobs": [{"area": 168, "cx": 24.5, "cy": 45.5, "x0": 19, "y0": 39, "x1": 30, "y1": 52}],
+        "blobs": [{"no_marker": null, "area": 168, "cx": 24.5, "cy": 45.5, "x0": 19, "y0": 39, "x1": 30, "y1": 52}],
         "markers": null, "features": null, "force": null, "contact": null,
         "status": ["markers_missing", "tare_missing", "not_calibrated"],
     });
@@ -137,6 +137,87 @@ fn small_blobs_are_shown_on_request() {
         json_of(&run(&arguments))["blobs"].as_array().unwrap().len()
     };
     assert_eq!((blobs(&[]), blobs(&["--min-area", "1"])), (0, 1));
+}
+
+/// A blob says by what it is no marker.
+#[test]
+fn a_blob_that_is_no_marker_says_why() {
+    let folder = Folder::new();
+    let mut image = picture(320, 240, &[]);
+    let mut fill = |x: std::ops::Range<u32>, y: std::ops::Range<u32>| {
+        for (x, y) in x.flat_map(|x| y.clone().map(move |y| (x, y))) {
+            image.put_pixel(x, y, RED);
+        }
+    };
+    fill(0..12, 60..72);
+    fill(40..46, 20..22);
+    fill(100..220, 100..180);
+    // An L.
+    fill(250..254, 40..60);
+    fill(254..270, 56..60);
+    let path = folder.save("things.png", &image);
+    let found = run(&["sense", "--min-area", "10", &path]);
+    for why in [
+        "fewer than",
+        "cut by the picture's border",
+        "more than",
+        "two things",
+    ] {
+        assert!(found.stdout.contains(why), "{why}: {found:?}");
+    }
+    assert_eq!(
+        found.stdout.matches("; no marker: ").count(),
+        4,
+        "{found:?}"
+    );
+}
+
+/// A fifth dot beside the film is left out by a region, and by a mask.
+#[test]
+fn what_is_not_looked_at_is_left_out() {
+    let folder = Folder::new();
+    let mut image = photograph(&frame(false));
+    let clean = folder.save("clean.png", &image);
+    for (x, y) in (300..312).flat_map(|x| (6..18).map(move |y| (x, y))) {
+        image.put_pixel(x, y, RED);
+    }
+    let mask = RgbImage::from_fn(320, 240, |x, _| {
+        image::Rgb([if x < 290 { 255 } else { 0 }; 3])
+    });
+    let (path, mask) = (
+        folder.save("five.png", &image),
+        folder.save("mask.png", &mask),
+    );
+    let found = |path: &str, arguments: &[&str]| {
+        let mut found = json_of(&run(&[&["sense", "--json", path], arguments].concat()));
+        found["image"] = "".into();
+        found
+    };
+    let blobs = |found: &Value| found["blobs"].as_array().unwrap().len();
+    assert_eq!(
+        (blobs(&found(&path, &[])), blobs(&found(&clean, &[]))),
+        (5, 4)
+    );
+    for arguments in [["--region", "0,0,290,240"], ["--mask", &mask]] {
+        assert_eq!(
+            found(&path, &arguments),
+            found(&clean, &[]),
+            "{arguments:?}"
+        );
+    }
+    let refused = run(&["sense", &path, "--region", "100,0,221,240"]);
+    assert!(
+        refused.stderr.contains("--region goes beyond the picture"),
+        "{refused:?}"
+    );
+    let refused = run(&["sense", &path, "--region", "1,2,0,4"]);
+    assert!(refused.stderr.contains("four whole numbers"), "{refused:?}");
+    let small = folder.save("small.png", &picture(10, 10, &[]));
+    let refused = run(&["sense", &path, "--mask", &small]);
+    assert!(
+        refused.stderr.contains("the mask has 10 × 10 px"),
+        "{refused:?}"
+    );
 }
 
 /// Measures a frame with the sensing code and this shape of what presses.

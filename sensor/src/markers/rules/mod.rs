@@ -99,6 +99,19 @@ impl Found {
     }
 }
 
+/// By what a blob is no marker's image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unlike {
+    /// It has fewer pixels than this.
+    Small(u32),
+    /// It has more pixels than this.
+    Large(u32),
+    /// It touches the picture's border, which cuts it.
+    Cut,
+    /// It is not filled as an ellipse is: cut, holed, or two things that touch.
+    Uneven,
+}
+
 /// The properties of a marker's image that are compared with a rest position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Image {
@@ -189,7 +202,7 @@ impl Finder {
     pub fn find(&self, blobs: &[Blob]) -> Result<Found, Status> {
         let mut candidates = Vec::<Shape, MAX_CANDIDATES>::new();
         for blob in blobs {
-            if let Some(shape) = self.candidate(blob) {
+            if let Ok(shape) = self.candidate(blob) {
                 let pushed = candidates.push(shape);
                 pushed.map_err(|_| Status::MARKERS_AMBIGUOUS)?;
             }
@@ -214,21 +227,31 @@ impl Finder {
         found.ok_or(reason)
     }
 
-    fn candidate(&self, blob: &Blob) -> Option<Shape> {
-        if !self.may_be_marker(blob) {
-            return None;
-        }
-        Shape::of_blob(blob, self.centroid).filter(|shape| shape.fill >= LEAST_FILL)
+    /// Returns by what a blob is no marker's image; `None` if it could be one.
+    pub fn unlike(&self, blob: &Blob) -> Option<Unlike> {
+        self.candidate(blob).err()
     }
 
-    /// Whether its area is plausible and it has no pixel on the border: a blob that touches the
-    /// border is cut.
-    fn may_be_marker(&self, blob: &Blob) -> bool {
-        (self.areas.0..=self.areas.1).contains(&blob.area)
-            && blob.x0 > 0
-            && blob.y0 > 0
-            && blob.x1 + 1 < self.size[0]
-            && blob.y1 + 1 < self.size[1]
+    fn candidate(&self, blob: &Blob) -> Result<Shape, Unlike> {
+        let (least, most) = self.areas;
+        if blob.area < least {
+            return Err(Unlike::Small(least));
+        }
+        if blob.area > most {
+            return Err(Unlike::Large(most));
+        }
+        let [width, height] = self.size;
+        let ends = [(blob.x0, blob.x1, width), (blob.y0, blob.y1, height)];
+        if ends
+            .iter()
+            .any(|(from, to, side)| *from == 0 || to + 1 >= *side)
+        {
+            return Err(Unlike::Cut);
+        }
+        let shape = Shape::of_blob(blob, self.centroid);
+        shape
+            .filter(|shape| shape.fill >= LEAST_FILL)
+            .ok_or(Unlike::Uneven)
     }
 
     /// Whether four shapes are the markers.

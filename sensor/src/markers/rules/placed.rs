@@ -78,7 +78,7 @@ impl Finder {
 
     /// The images that are as full and even as markers'.
     fn whole(&self, blobs: &[Blob]) -> impl Iterator<Item = Shape> {
-        let candidates = blobs.iter().filter_map(|blob| self.candidate(blob));
+        let candidates = blobs.iter().filter_map(|blob| self.candidate(blob).ok());
         candidates.filter(|shape| self.is_whole(shape))
     }
 

@@ -38,7 +38,7 @@ impl Finder {
     pub fn find_three(&self, blobs: &[Blob], rest: &[Marker; 4], trust: &Trust) -> Option<Three> {
         let (mut markers, mut shapes) = (*rest, [None; 4]);
         for blob in blobs {
-            let Some(shape) = self.candidate(blob) else {
+            let Ok(shape) = self.candidate(blob) else {
                 continue;
             };
             let identity = nearest((shape.x, shape.y), rest);
