@@ -1,8 +1,8 @@
-// The first stage: what the microcontroller starts after a reset, alone in the flash's first sector,
-// which an update does not write. Starts the microcontroller's own loader if the program requested
-// it (loader.rs), or if the program's checksum is wrong (hivtac-image, header.rs): then its update
-// was interrupted. Starts the program otherwise. A program as an ELF has it, flashed by a debug
-// probe, has no checksum and is started.
+// The first stage: what the microcontroller starts after a reset, alone in the flash's first
+// sector, which an update does not write. Starts the microcontroller's own loader if the program
+// requested it (loader.rs), or if the program's checksum is wrong (hivtac-image, header.rs): then
+// its update was interrupted. Starts the program otherwise. A program as an ELF has it, flashed by
+// a debug probe, has no checksum and is started.
 
     .syntax unified
 
@@ -40,8 +40,9 @@ first_stage:
     str     r1, [r0]
     b       start_loader
 
-    // The supply is the internal regulator, and no memory may be written before it is valid (RM0433,
-    // 6.4.1): a fault writes. PWR_CR3 is written once after power-on; later writes do nothing.
+    // The supply is the internal regulator, and no memory may be written before it is valid
+    // (RM0433, 6.4.1): a fault writes. PWR_CR3 is written once after power-on; later writes do
+    // nothing.
 1:  ldr     r0, =0x5802480C         // PWR_CR3
     ldr     r1, [r0]
     orr     r1, #0x00000002         // LDOEN

@@ -27,7 +27,6 @@ mod condition;
 mod dtcm_table;
 mod faults;
 mod flash;
-mod image;
 mod info;
 mod led;
 mod loader;
@@ -66,6 +65,7 @@ use dtcm_table::Sensor;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{interrupt, peripherals};
+use hivtac_image::header::{Header, Mark};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::kept::Record;
 use memory::Memory;
@@ -76,6 +76,16 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 core::arch::global_asm!(include_str!("first_stage.s"));
 core::arch::global_asm!(include_str!("start.s"));
+
+/// By this mark and the next an update knows what the image is for, at places that `memory.x`
+/// fixes.
+#[used]
+#[unsafe(link_section = ".first_stage.mark")]
+static FIRST_STAGE: Mark = Mark::of_first_stage(board::NAME);
+/// Without length and checksum, which an image gets when it is made of the ELF.
+#[used]
+#[unsafe(link_section = ".image_header")]
+static HEADER: Header = Header::unsealed(board::NAME, env!("CARGO_PKG_VERSION"));
 
 static CAPTURE_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 static USB_EXECUTOR: InterruptExecutor = InterruptExecutor::new();

@@ -35,7 +35,7 @@ const NEVER: [&str; 7] = [
 
 /// Functions that may panic: a part of their mangled names, the most sites, and why none is
 /// reached. The first that fits counts.
-const REASONS: [(&str, usize, &str); 20] = [
+const REASONS: [(&str, usize, &str); 19] = [
     (
         "embassy_usb_synopsys_otg",
         40,
@@ -76,12 +76,6 @@ const REASONS: [(&str, usize, &str); 20] = [
         "hivtac_firmware13pipeline_task",
         1,
         "a queue's cell, in a critical section and so never borrowed twice",
-    ),
-    (
-        "hivtac_firmware8commands",
-        4,
-        "the USB tasks wait for each answer once: what has ended is not polled again; a queue's \
-         cell is borrowed in a critical section",
     ),
     (
         "hivtac_firmware..flash",

@@ -2,8 +2,8 @@
 //! core that the emulator lacks.
 //!
 //! The emulator itself is not patched. [`Chip`] wraps the part and handles eight slots itself:
-//! DCMI, MDMA, CRC, CRS, the flash, and the three blocks of OTG2. All other accesses go to the part's
-//! own models.
+//! DCMI, MDMA, CRC, CRS, the flash, and the three blocks of OTG2. All other accesses go to the
+//! part's own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::{Access, Memory};
