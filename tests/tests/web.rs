@@ -316,8 +316,8 @@ fn what_hinders_a_connection_is_said() {
         .unwrap();
 }
 
-/// WebUSB with the loader of an STM32H743, of 16 sectors. It answers as AN3156 says, and counts what
-/// it is not to be asked. `loader.wrong` flips a bit of what is kept, `loader.end` pulls the cable
+/// WebUSB with the loader of an STM32H743, of 16 sectors. It answers as AN3156 says, and keeps what
+/// it may not be asked. `loader.wrong` flips a bit of what is kept, `loader.end` pulls the cable
 /// after so many blocks.
 const LOADER: &str = r#"
 const loader = globalThis.loader = { wrong: false, end: Infinity, misuse: [] };
