@@ -11,6 +11,8 @@ use crate::view::part;
 use crate::view_twin::{PAGE, press};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use hivtac_host::recording::Recording;
 use hivtac_image::{Image, examples};
 use hivtac_live::camera::Kind;
@@ -412,9 +414,13 @@ fn write(browser: &mut Browser, words: &str) {
 #[test]
 #[ignore = "slow, and needs Chromium: run by cargo xtask test --all"]
 fn firmware_is_checked_written_and_read_back() {
-    let mut browser = open(LOADER);
-    browser.until("document.getElementById('image')").unwrap();
     let image = examples::image("weact-h743", "1.2.3", 200_000, 7);
+    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+    packed.write_all(image.bytes()).unwrap();
+    let packed = STANDARD.encode(packed.finish().unwrap());
+    let carried = format!("globalThis.FIRMWARE = {{ 'weact-h743': '{packed}' }};");
+    let mut browser = open(&(LOADER.to_owned() + &carried));
+    browser.until("document.getElementById('image')").unwrap();
     let said =
         |words: &str| format!("document.getElementById('flashed').textContent.includes('{words}')");
     let mut damaged = image.bytes().to_vec();
@@ -423,6 +429,13 @@ fn firmware_is_checked_written_and_read_back() {
     browser.until(&said("damaged.bin: damaged")).unwrap();
     let is_off = "document.getElementById('flash').disabled";
     assert_eq!(browser.value(is_off).unwrap(), true);
+    // The page carries firmware, too.
+    let own = "[...document.querySelectorAll('#firmware button')].find((it) => \
+               it.textContent.includes('weact-h743'))";
+    browser.value(&format!("{own}.click(); 0")).unwrap();
+    browser
+        .until(&said("page\\'s: firmware 1.2.3 for weact-h743"))
+        .unwrap();
     choose_in(&mut browser, "image", "good.bin", image.bytes());
     browser
         .until(&said("good.bin: firmware 1.2.3 for weact-h743"))

@@ -39,6 +39,13 @@ async function write(loader, look, firmwareParts, say) {
   await loader.leave(FLASH);
 }
 
+/** Unpacks what the page carries: gzip, as base64. */
+function carried(text) {
+  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}
+
 /** The panel for firmware. */
 export function updates({ element, firmware, firmwareParts, startLoader }) {
   const said = element("span", { role: "status", id: "flashed" });
@@ -51,15 +58,22 @@ export function updates({ element, firmware, firmwareParts, startLoader }) {
   const restart = button("restart", "1. Restart the sensor into its loader");
   const flash = button("flash", "2. Choose the loader and write");
   const file = element("input", { type: "file", id: "image" });
-  file.addEventListener("change", async () => {
-    const [given] = file.files;
-    if (!given) return;
-    chosen = await firmware(new Uint8Array(await given.arrayBuffer()));
+  const choose = async (name, buffer) => {
+    chosen = await firmware(new Uint8Array(buffer));
     const { why, board, version } = chosen;
-    say(`${given.name}: ${why ?? `firmware ${version} for ${board}`}`);
+    say(`${name}: ${why ?? `firmware ${version} for ${board}`}`);
     restart.disabled = why !== undefined;
     flash.disabled = why !== undefined;
+  };
+  file.addEventListener("change", async () => {
+    const [given] = file.files;
+    if (given) await choose(given.name, await given.arrayBuffer());
     file.value = "";
+  });
+  const own = Object.entries(globalThis.FIRMWARE).map(([board, text]) => {
+    const it = element("button", { type: "button", textContent: `This page's for ${board}` });
+    it.addEventListener("click", async () => choose("this page's", await carried(text)));
+    return it;
   });
   restart.addEventListener("click", async () => {
     const { done, text } = await startLoader();
@@ -83,6 +97,7 @@ export function updates({ element, firmware, firmwareParts, startLoader }) {
     flash.disabled = false;
   });
   const label = element("label", {}, "A release's .bin, or an ELF: ", file);
+  const choice = element("p", {}, ...own, label);
   return element("details", { id: "firmware" },
-    element("summary", { textContent: "New firmware" }), label, restart, flash, said);
+    element("summary", { textContent: "New firmware" }), choice, restart, flash, said);
 }

@@ -1,11 +1,13 @@
 //! Builds the programs that demo and tests run; cargo reports the paths of the files.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result, ensure};
+use hivtac_image::Image;
 use serde_json::Value;
 
 use crate::process;
@@ -71,6 +73,17 @@ pub fn firmware(board: Board) -> Result<PathBuf> {
     build(&mut firmware_command(board, ""), "hivtac-firmware")
 }
 
+/// Builds all boards' firmware, as it is written into flash. The usual board's is last: its ELF
+/// stays where [`firmware`] has it.
+pub fn images() -> Result<[Image; 2]> {
+    let image = |board| -> Result<Image> {
+        let elf = firmware(board)?;
+        let file = fs::read(&elf).with_context(|| format!("reading {}", elf.display()))?;
+        Image::of_elf(&file).with_context(|| elf.display().to_string())
+    };
+    Ok([image(Board::OpenmvH7)?, image(Board::Weact)?])
+}
+
 /// The cargo command that builds the firmware for a board, with `feature` unless it is empty.
 pub fn firmware_command(board: Board, feature: &str) -> Command {
     let mut command = build_for_target("");
@@ -124,7 +137,7 @@ fn kept(mut command: Command, folder: &str) -> Result<PathBuf> {
     // Under another name first: a running program's file cannot be overwritten.
     let fresh = kept.with_extension("new");
     copy(&build(&mut command, "hivtac")?, &fresh)?;
-    std::fs::rename(&fresh, &kept).with_context(|| format!("renaming {}", fresh.display()))?;
+    fs::rename(&fresh, &kept).with_context(|| format!("renaming {}", fresh.display()))?;
     Ok(kept)
 }
 
@@ -262,7 +275,7 @@ fn for_each_message(command: &mut Command, mut each: impl FnMut(&Value)) -> Resu
 }
 
 fn copy(from: &Path, to: &Path) -> Result<()> {
-    let copied = std::fs::copy(from, to);
+    let copied = fs::copy(from, to);
     copied.with_context(|| format!("copying {} to {}", from.display(), to.display()))?;
     Ok(())
 }

@@ -8,8 +8,7 @@ use clap::Args;
 use hivtac_image::Image;
 use serde_json::Value;
 
-use crate::artifacts::{self, Board};
-use crate::{process, python, toolchain};
+use crate::{artifacts, process, python, toolchain, web};
 
 /// Options of `cargo xtask release`.
 #[derive(Args)]
@@ -55,6 +54,9 @@ impl Release {
         if names.is_empty() {
             names.extend(LINUX);
         }
+        let built = artifacts::images()?;
+        let images = write_images(&folder, &built)?;
+        web_page(&folder, &built)?;
         for name in names {
             let target = Target {
                 name,
@@ -63,9 +65,8 @@ impl Release {
             };
             let program = target.build()?;
             target.archive(&program)?;
-            target.wheel(&program)?;
+            target.wheel(&program, &images)?;
         }
-        images(&folder)?;
         bill_of_materials(&folder)?;
         install(&folder)?;
         let sums = process::output(
@@ -130,13 +131,19 @@ impl Target<'_> {
         process::run(tar.arg(toolchain::at("")).args(BESIDE))
     }
 
-    /// Builds Python's package, with the program in it.
-    fn wheel(&self, program: &Path) -> Result<()> {
+    /// Builds Python's package, with the program and both boards' firmware in it.
+    fn wheel(&self, program: &Path, images: &[PathBuf]) -> Result<()> {
         let package = toolchain::at("host-tool/python");
-        // The folder's other files are the project's own.
+        // The other files of `hivtac.data` are the project's own.
         let scripts = package.join("hivtac.data/scripts");
+        let firmware = package.join("hivtac.data/data/share/hivtac/firmware");
         std::fs::create_dir_all(&scripts)?;
+        std::fs::create_dir_all(&firmware)?;
         std::fs::copy(program, scripts.join("hivtac"))?;
+        for image in images {
+            let name = image.file_name().context("an image has a name")?;
+            std::fs::copy(image, firmware.join(name))?;
+        }
         let is_musl = self.name.ends_with("-musl");
         let system = if is_musl {
             "musllinux_1_2"
@@ -151,18 +158,30 @@ impl Target<'_> {
             .arg(self.folder);
         let built = process::run(&mut self.with_builders(maturin)?);
         std::fs::remove_dir_all(scripts)?;
+        std::fs::remove_dir_all(firmware)?;
         built
     }
 }
 
-/// Writes both boards' firmware as it lies in flash, with its checksum.
-fn images(folder: &Path) -> Result<()> {
-    for (board, name) in [(Board::Weact, "weact-h743"), (Board::OpenmvH7, "openmv-h7")] {
-        let elf = std::fs::read(artifacts::firmware(board)?)?;
-        let file = folder.join(format!("hivtac-firmware-{VERSION}-{name}.bin"));
-        std::fs::write(file, Image::of_elf(&elf)?.bytes())?;
+/// Writes firmware: the images, and as other tools for DFU take them.
+fn write_images(folder: &Path, images: &[Image]) -> Result<Vec<PathBuf>> {
+    let mut files = Vec::new();
+    for image in images {
+        let file = folder.join(format!("hivtac-firmware-{VERSION}-{}.bin", image.board()));
+        std::fs::write(&file, image.bytes())?;
+        std::fs::write(file.with_extension("dfu"), image.dfuse())?;
+        files.push(file);
     }
-    Ok(())
+    Ok(files)
+}
+
+/// Writes the page that needs no server.
+fn web_page(folder: &Path, images: &[Image]) -> Result<()> {
+    let page = web::page(images)?;
+    let mut tar = Command::new("tar");
+    tar.arg("-czf")
+        .arg(folder.join(format!("hivtac-page-{VERSION}.tar.gz")));
+    process::run(tar.arg("-C").arg(page).arg("."))
 }
 
 /// Writes what the host tool is made of, as CycloneDX. Each wheel has its own list.

@@ -237,7 +237,7 @@ fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
             artifacts::host_program("hivtac-calibrate")?,
         );
         command.env("HIVTAC_CHROMIUM", packages::chromium()?);
-        command.env("HIVTAC_WEB", web::page()?);
+        command.env("HIVTAC_WEB", web::page(&[])?);
     }
     shared.run(command, tally)
 }

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use hivtac_image::Image;
 
 use crate::{artifacts, process, toolchain};
 
@@ -23,12 +24,13 @@ const WORKER: &str = "engine";
 const LOADS: &str = r#"<script type="module" src="main.js"></script>"#;
 /// What takes its place. Nothing is loaded from elsewhere but what is beside the page.
 const LOADS_WHOLE: &str = r#"<script defer src="sensing.js"></script>
+<script defer src="firmware.js"></script>
 <script defer src="page.js"></script>"#;
 /// What is said until the first sensor is there.
 const WAITS: [&str; 2] = ["connecting to hivtac …", "starting the simulated sensor …"];
 
-/// Builds the page; returns its folder.
-pub fn page() -> Result<PathBuf> {
+/// Builds the page, with these images for devices; returns its folder.
+pub fn page(images: &[Image]) -> Result<PathBuf> {
     let module = artifacts::web_module()?;
     let wasm = fs::read(&module).with_context(|| format!("reading {}", module.display()))?;
     let mut scripts = scripts()?;
@@ -54,6 +56,7 @@ pub fn page() -> Result<PathBuf> {
         ("style.css", style),
         ("page.js", bundle(&scripts)?),
         ("sensing.js", sensing),
+        ("firmware.js", firmware(images)?),
     ] {
         let file = folder.join(name);
         fs::write(&file, text).with_context(|| format!("writing {}", file.display()))?;
@@ -61,9 +64,21 @@ pub fn page() -> Result<PathBuf> {
     Ok(folder)
 }
 
-/// Builds the page, and prints where it is and how large.
+/// The script with the images, by their boards, packed as the module is.
+fn firmware(images: &[Image]) -> Result<String> {
+    let packed: Result<BTreeMap<String, String>> = images
+        .iter()
+        .map(|image| Ok((image.board(), base64(&packed(image.bytes())?))))
+        .collect();
+    let json = serde_json::to_string(&packed?)?;
+    Ok(format!(
+        "// Firmware for sensors.\nglobalThis.FIRMWARE ??= {json};\n"
+    ))
+}
+
+/// Builds the page with both boards' firmware, and prints where it is and how large.
 pub fn run() -> Result<()> {
-    let folder = page()?;
+    let folder = page(&artifacts::images()?)?;
     let sizes = fs::read_dir(&folder)?.map(|file| Ok(file?.metadata()?.len()));
     let bytes: u64 = sizes.sum::<std::io::Result<u64>>()?;
     println!(

@@ -10,6 +10,8 @@
 #![forbid(unsafe_code)]
 
 #[cfg(feature = "read")]
+mod dfuse;
+#[cfg(feature = "read")]
 pub mod examples;
 pub mod header;
 #[cfg(feature = "read")]
