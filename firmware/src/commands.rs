@@ -33,6 +33,9 @@ async fn greet(prefix: HelloPrefix) {
     session::begin(prefix.is_ours());
     outbox::clear();
     outbox::answer(DeviceMessage::Hello(info::hello())).await;
+    if prefix == HelloPrefix::START_LOADER {
+        loader::start().await;
+    }
 }
 
 async fn obey(Command { id, request }: Command) {

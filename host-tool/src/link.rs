@@ -42,9 +42,28 @@ impl Link {
     /// [`Kind::NoDevice`] when the port cannot be opened or no hello comes within `patience`;
     /// [`Kind::Version`] when the device has another version of the protocol.
     pub fn connect(address: &Address, patience: Duration) -> Result<(Link, DeviceHello), Failure> {
+        let mut link = Link::open(address)?;
+        let hello = link.exchange_hellos(patience)?;
+        Ok((link, hello))
+    }
+
+    /// Has a device that speaks another version of the protocol start its own loader.
+    ///
+    /// # Errors
+    /// [`Kind::NoDevice`] when the port cannot be opened; [`Kind::Lost`] when it takes no bytes.
+    pub fn start_loader(address: &Address, patience: Duration) -> Result<(), Failure> {
+        let mut link = Link::open(address)?;
+        link.write(&[0])?;
+        link.send(&HostMessage::Hello(HelloPrefix::START_LOADER.into()))?;
+        // Its hello, which is of that version: then it has read ours.
+        let _ = link.receive(Instant::now() + patience);
+        Ok(())
+    }
+
+    fn open(address: &Address) -> Result<Link, Failure> {
         let (port, name) = address.open()?;
         let decoder = Decoder::new();
-        let mut link = Link {
+        Ok(Link {
             port,
             name,
             decoder,
@@ -52,9 +71,7 @@ impl Link {
             decoded: 0,
             last_id: 0,
             came: 0,
-        };
-        let hello = link.exchange_hellos(patience)?;
-        Ok((link, hello))
+        })
     }
 
     fn exchange_hellos(&mut self, patience: Duration) -> Result<DeviceHello, Failure> {

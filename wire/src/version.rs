@@ -28,6 +28,13 @@ impl HelloPrefix {
         schema: SCHEMA_HASH,
     };
 
+    /// A host's hello at which a device of any version starts its own loader, for new firmware: a
+    /// device of another version ignores commands.
+    pub const START_LOADER: HelloPrefix = HelloPrefix {
+        protocol: u16::MAX,
+        schema: u64::from_le_bytes(*b"firmware"),
+    };
+
     /// Reads the prefix of a message body (without COBS and checksum), whatever follows it. Returns
     /// `None` if it is not a hello.
     pub fn of(body: &[u8]) -> Option<HelloPrefix> {

@@ -67,14 +67,7 @@ pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
         json,
     } = arguments;
     let image = read(file)?;
-    let (found, address, before) = match connect(device) {
-        Ok((link, hello, address)) => {
-            let found = into_loader(arguments, link, &hello, &image)?;
-            (found, address, Some(hello))
-        }
-        Err(failure) if failure.kind == Kind::NoDevice => (waiting(failure)?, Address::Find, None),
-        Err(failure) => return Err(failure),
-    };
+    let (found, address, before) = reach(arguments, &image)?;
     note("the device is in its loader; keep it plugged in");
     let written = write::write(usb::open(&found)?, &image, say);
     written.inspect_err(|failure| {
@@ -86,10 +79,36 @@ pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
     report(*json, &image, before.as_ref(), &after)
 }
 
-fn connect(device: &Device) -> Result<(Link, DeviceHello, Address), Failure> {
-    let address = device.address()?;
-    let (link, hello) = Link::connect(&address, device.timeout)?;
-    Ok((link, hello, address))
+/// The device's loader, the address at which the device comes back, and its hello if it could be
+/// understood.
+fn reach(
+    arguments: &FirmwareArguments,
+    image: &Image,
+) -> Result<(Found, Address, Option<DeviceHello>), Failure> {
+    let device = &arguments.device;
+    let connected = device.address().and_then(|address| {
+        let connected = match Link::connect(&address, device.timeout) {
+            Err(failure) if failure.kind == Kind::Version => None,
+            connected => Some(connected?),
+        };
+        Ok((address, connected))
+    });
+    match connected {
+        Ok((address, Some((link, hello)))) => {
+            let found = into_loader(arguments, link, &hello, image)?;
+            Ok((found, address, Some(hello)))
+        }
+        Ok((address, None)) => {
+            note("the device speaks another version; its board is checked in its loader");
+            let before = usb::loaders()?;
+            Link::start_loader(&address, device.timeout)?;
+            Ok((usb::appears(&before, arguments.wait)?, address, None))
+        }
+        Err(failure) if failure.kind == Kind::NoDevice => {
+            Ok((waiting(failure)?, Address::Find, None))
+        }
+        Err(failure) => Err(failure),
+    }
 }
 
 fn read(path: &str) -> Result<Image, Failure> {

@@ -68,7 +68,9 @@ impl Conversation {
                 Ok(0) => return None,
                 Ok(_) => match self.decoder.push(byte[0]) {
                     Some(Received::Message(message)) => return Some(message),
-                    Some(Received::ForeignHello(hello)) => panic!("{hello:?}"),
+                    Some(Received::ForeignHello(hello)) => {
+                        return Some(HostMessage::Hello(hello.into()));
+                    }
                     None => (),
                 },
                 Err(_) => return None,

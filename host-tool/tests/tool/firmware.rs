@@ -5,6 +5,7 @@ use crate::fake::*;
 use crate::run::*;
 use hivtac_image::examples;
 use hivtac_wire::message::*;
+use hivtac_wire::version::HelloPrefix;
 
 const LENGTH: usize = 0x1000;
 
@@ -46,6 +47,38 @@ fn a_loader_that_does_not_appear_is_no_device() {
     let port = ["--port", &device.port, "--wait", "0.5"];
     let run = run(&[&["update", "firmware", &file], &port[..]].concat());
     assert_eq!(run.code, Some(3));
+    assert!(
+        run.stderr.contains("did not appear with its loader"),
+        "{}",
+        run.stderr
+    );
+}
+
+/// A device of another version ignores commands, and is asked by the frozen part of a hello.
+#[test]
+fn a_device_of_another_version_is_asked_for_its_loader() {
+    let directory = tempfile::tempdir().unwrap();
+    let answers = |wanted: HelloPrefix| -> Script {
+        Box::new(move |device: &mut Conversation| {
+            let Some(HostMessage::Hello(came)) = device.next() else {
+                panic!("a hello is needed");
+            };
+            assert_eq!(came, wanted.into());
+            let protocol = PROTOCOL_VERSION + 1;
+            let other = DeviceHello {
+                protocol,
+                ..hello()
+            };
+            device.send(DeviceMessage::Hello(other));
+            device.end_after_what_was_sent();
+        })
+    };
+    let scripts = [HelloPrefix::OURS, HelloPrefix::START_LOADER].map(answers);
+    let device = FakeDevice::on_tcp(scripts);
+    let file = image(&directory, "fake board");
+    let port = ["--port", &device.port, "--wait", "0.5"];
+    let run = run(&[&["update", "firmware", &file], &port[..]].concat());
+    assert_eq!(run.code, Some(3), "{}", run.stderr);
     assert!(
         run.stderr.contains("did not appear with its loader"),
         "{}",

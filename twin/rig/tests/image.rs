@@ -1,13 +1,14 @@
 //! Tests of the first stage, on images of the flashed ELF as an update writes them: whole, damaged
 //! and cut. The loader's stand-in is absent from USB, and starts the flash again after 0.3 s.
 
-use crate::common::{Setup, command, elf, firmware, other};
+use crate::common::{Setup, command, elf, firmware, hello_of, other};
 use hivtac_image::header::CRC_AT;
 use hivtac_image::{FLASH, HEADER_AT, Image, PROGRAM, SECTOR_BYTES};
 use hivtac_rig::report::Report;
 use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
 use hivtac_wire::message::{Outcome, Request};
+use hivtac_wire::version::HelloPrefix;
 
 const BEGIN: usize = (PROGRAM - FLASH.start) as usize;
 const HEADER: usize = BEGIN + HEADER_AT as usize;
@@ -58,6 +59,34 @@ fn a_whole_image_is_started_and_starts_the_loader() {
     assert_eq!(run.report.resets, 1);
     assert_eq!(run.report.usb.enumerations, 2, "{:?}", run.report.usb_log);
     assert!(run.report.refused.is_empty(), "{:?}", run.report.refused);
+}
+
+/// A host of another version cannot send commands, and yet update the firmware.
+#[test]
+fn a_hello_of_any_version_starts_the_loader() {
+    let wanted = Action::Send(hello_of(HelloPrefix::START_LOADER));
+    let other = Action::Send(hello_of(HelloPrefix {
+        protocol: u16::MAX,
+        schema: 1,
+    }));
+    let run = |hello: Action| {
+        let setup = Setup::new(firmware(), 900).fault("camera-absent");
+        setup.at(300, hello).run().report
+    };
+    let report = run(wanted);
+    assert_eq!(
+        (report.resets, report.usb.enumerations),
+        (1, 2),
+        "{:?}",
+        report.usb_log
+    );
+    let report = run(other);
+    assert_eq!(
+        (report.resets, report.usb.enumerations),
+        (0, 1),
+        "{:?}",
+        report.usb_log
+    );
 }
 
 /// Runs flash with these bytes.

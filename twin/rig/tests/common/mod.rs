@@ -294,7 +294,12 @@ pub fn elf(base: u32, bytes: &[u8]) -> Vec<u8> {
 
 /// Returns a host's hello, with a zero byte before it.
 pub fn hello() -> Vec<u8> {
-    frame(&HostMessage::Hello(HelloPrefix::OURS.into()))
+    hello_of(HelloPrefix::OURS)
+}
+
+/// Returns the hello of a host of any version.
+pub fn hello_of(prefix: HelloPrefix) -> Vec<u8> {
+    frame(&HostMessage::Hello(prefix.into()))
 }
 
 /// Returns a command.
