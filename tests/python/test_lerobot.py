@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 import unittest
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from unittest import mock
@@ -108,6 +109,25 @@ def robot(**fingers):
     return make_robot_from_config(config(fingers=fingers))
 
 
+@contextmanager
+def silent():
+    """Keeps what others print out of the test's own lines, and shows it if they fail."""
+    own = [os.dup(number) for number in (1, 2)]
+    with tempfile.TemporaryFile() as said:
+        for number in (1, 2):
+            os.dup2(said.fileno(), number)
+        try:
+            yield
+        except BaseException:
+            said.seek(0)
+            os.write(own[1], said.read())
+            raise
+        finally:
+            for number, before in zip((1, 2), own, strict=True):
+                os.dup2(before, number)
+                os.close(before)
+
+
 class Recorded(unittest.TestCase):
     def record(self, thumb, index, folder):
         """Records by LeRobot's command; returns what the robot observed."""
@@ -130,7 +150,7 @@ class Recorded(unittest.TestCase):
             return observed[-1]
 
         with mock.patch.object(sys, "argv", ["lerobot-record", *words]):
-            with mock.patch.object(Hivtac, "get_observation", spy):
+            with mock.patch.object(Hivtac, "get_observation", spy), silent():
                 lerobot_record.main()
         return observed
 

@@ -40,6 +40,13 @@ const RERUN: [&str; 3] = [
     "maturin>=1.9,<2 rerun-sdk>=0.41",
 ];
 
+/// The same for the simulated sensor inside MuJoCo.
+const MUJOCO: [&str; 3] = [
+    "python-mujoco",
+    "maturin, mujoco",
+    "maturin>=1.9,<2 mujoco>=3.3",
+];
+
 /// The same for the kit's mechanics, `hardware/`.
 const KIT: [&str; 3] = ["python-kit", "build123d", "build123d>=0.13,<0.14"];
 
@@ -78,6 +85,15 @@ pub fn no_rerun() -> Option<&'static str> {
         RERUN,
         "pip cannot install rerun-sdk (0.9 GB) for Python 3.11 or newer: is there python3 with \
          venv (package python3-venv), and PyPI within reach?",
+    )
+}
+
+/// Makes MuJoCo's environment if missing; returns the obstacle, if there is one.
+pub fn no_mujoco() -> Option<&'static str> {
+    obstacle(
+        MUJOCO,
+        "pip cannot install mujoco for Python 3.10 or newer: is there python3 with venv (package \
+         python3-venv), and PyPI within reach?",
     )
 }
 
@@ -159,6 +175,15 @@ pub fn test_rerun(tally: &mut Tally) -> Result<()> {
     let python = python(RERUN)?;
     install(&python, &["./host-tool/python"])?;
     test_on_twin(&python, "tests/python/test_rerun.py", tally)
+}
+
+/// Presses the simulated sensor in a program's own time, and in a simulation of MuJoCo.
+pub fn test_mujoco(tally: &mut Tally) -> Result<()> {
+    let python = python(MUJOCO)?;
+    install(&python, &["./host-tool/python"])?;
+    let mut command = Command::new(python);
+    command.args(["-W", "error", "tests/python/test_twin.py"]);
+    run_tests(command.current_dir(toolchain::at("")), tally)
 }
 
 /// Runs tests on the simulated sensor.

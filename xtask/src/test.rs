@@ -32,7 +32,7 @@ type Work = fn(&Shared, &mut Tally) -> Result<()>;
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
 /// the microcontroller come first, in their own folder, while the lints hold the common one. Long
 /// steps follow; those after them fill the time until both threads end.
-static STEPS: [Step; 18] = [
+static STEPS: [Step; 19] = [
     ("format", |_, _| format(), None),
     (
         "lints: microcontroller",
@@ -69,6 +69,11 @@ static STEPS: [Step; 18] = [
         "tests: rerun",
         |_, tally| python::test_rerun(tally),
         Some(python::no_rerun),
+    ),
+    (
+        "tests: mujoco",
+        |_, tally| python::test_mujoco(tally),
+        Some(python::no_mujoco),
     ),
     (
         "tests: kit",

@@ -6,6 +6,7 @@ mod error;
 mod interrupt;
 mod reader;
 mod told;
+mod twin;
 
 use pyo3::prelude::*;
 
@@ -17,6 +18,8 @@ mod _hivtac {
     use crate::error::{Error, LostError, NoDeviceError, RefusedError, VersionError};
     #[pymodule_export]
     use crate::reader::Reader;
+    #[pymodule_export]
+    use crate::twin::Twin;
 
     use super::*;
 

@@ -44,16 +44,35 @@ impl Touch {
 
 /// A hand that another thread moves.
 #[derive(Clone, Debug, Default)]
-pub struct Hand(Arc<Mutex<Option<Touch>>>);
+pub struct Hand {
+    wanted: Arc<Mutex<Option<Touch>>>,
+    is_at_once: bool,
+}
 
 impl Hand {
+    /// A hand whose press is there in the next frame, as a simulation tells it: nothing follows.
+    pub fn at_once() -> Hand {
+        Hand {
+            is_at_once: true,
+            ..Hand::default()
+        }
+    }
+
     /// Presses in this way from now on; `None` releases the film.
     pub fn set(&self, touch: Option<Touch>) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = touch;
+        *self.wanted.lock().unwrap_or_else(PoisonError::into_inner) = touch;
     }
 
     fn wants(&self) -> Option<Touch> {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+        *self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The part of the way to what is wanted that a press goes in this time.
+    fn part(&self, step_s: f64) -> f64 {
+        match self.is_at_once {
+            true => 1.0,
+            false => 1.0 - libm::exp(-step_s / FOLLOWS_S),
+        }
     }
 }
 
@@ -85,7 +104,7 @@ impl Following {
         self.step_s = (at_s - self.at_s).max(0.0);
         self.at_s = at_s;
         self.before = self.now;
-        let part = 1.0 - libm::exp(-self.step_s / FOLLOWS_S);
+        let part = self.hand.part(self.step_s);
         let toward = |from: f64, to: f64| from + (to - from) * part;
         self.now = match (self.now, self.hand.wants()) {
             // A new touch begins where the hand is, from no force.
@@ -161,6 +180,19 @@ mod tests {
         let pressed = steps.filter(|step| following.advance(0.01 * f64::from(*step)));
         assert!((5..30).contains(&pressed.count()));
         assert_eq!(following.load(0.0), Load::REST);
+    }
+
+    #[test]
+    fn a_press_at_once_is_there_with_the_next_frame_and_gone_with_it() {
+        let hand = Hand::at_once();
+        let mut following = Following::new(hand.clone());
+        hand.set(Some(TOUCH));
+        assert!(following.advance(0.01));
+        assert!((following.load(0.0).magnitude_n() - 0.1).abs() < 1e-9);
+        // Half a frame earlier it was half there.
+        assert!((following.load(-0.005).magnitude_n() - 0.05).abs() < 1e-9);
+        hand.set(None);
+        assert!(!following.advance(0.02));
     }
 
     #[test]

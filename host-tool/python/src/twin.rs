@@ -1,0 +1,166 @@
+//! The simulated sensor in a program's own time: it is pressed as the program says, and gives the
+//! samples of the frames that are whole by then.
+
+use crate::error::Error;
+use crate::told::{self, SampleNumbers};
+use hivtac_host::contact_shape;
+use hivtac_live::camera::Kind;
+use hivtac_live::device::Device;
+use hivtac_live::eye::{Disturbances, Eye, Presses};
+use hivtac_live::hand::{Hand, Touch};
+use hivtac_live::run::{Due, Frames, device_id};
+use hivtac_twin::{Layout, Scene};
+use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
+use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request};
+use hivtac_wire::version::HelloPrefix;
+use pyo3::prelude::*;
+use std::sync::{Mutex, PoisonError};
+
+/// Number of the nominal unit.
+const NOMINAL: u64 = 0;
+/// Frames of the tare that it begins with.
+const TARE_FRAMES: u16 = 32;
+/// Time for the tare and what is untouched before it, µs.
+const BEGINNING_US: u64 = 1_000_000;
+
+/// A simulated sensor.
+#[pyclass(frozen)]
+pub struct Twin(Mutex<Simulated>);
+
+struct Simulated {
+    device: Device,
+    frames: Frames,
+    hand: Hand,
+    /// The device's time, µs, and when that of the program began.
+    now_us: u64,
+    begun_us: u64,
+    last_id: u16,
+}
+
+#[pymethods]
+impl Twin {
+    /// A sensor with a camera, `ov7725` or `mt9v034`, told what presses it; nothing does yet. The
+    /// seed decides its noise.
+    #[new]
+    fn start(py: Python<'_>, camera: &str, contact: &str, seed: u64) -> PyResult<Twin> {
+        let kinds = [Kind::Ov7725, Kind::Mt9v034];
+        let kind = kinds.into_iter().find(|kind| kind.name() == camera);
+        let no_camera = || Error::new_err(format!("camera {camera:?}: use ov7725 or mt9v034"));
+        let kind = kind.ok_or_else(no_camera)?;
+        let shape = contact_shape::parse(contact).map_err(Error::new_err)?;
+        let started = py.detach(|| {
+            let mut twin = Simulated::start(kind, seed)?;
+            twin.command(Request::SetContactShape(shape));
+            twin.command(Request::Tare {
+                frames: TARE_FRAMES,
+            });
+            twin.advance(BEGINNING_US);
+            twin.begun_us = twin.now_us;
+            Ok(twin)
+        });
+        Ok(Twin(Mutex::new(
+            started.map_err(|why: String| Error::new_err(why))?,
+        )))
+    }
+
+    /// Presses the film from now on: place, mm, |F|, N, α and β, degrees. `None` releases it.
+    fn press(&self, touch: Option<([f64; 2], f64, [f64; 2])>) -> PyResult<()> {
+        let touch = touch.map(|(place_mm, force_n, angles_deg)| Touch {
+            place_mm,
+            force_n,
+            angles_deg,
+        });
+        if touch.is_some() && touch.and_then(Touch::in_range) != touch {
+            return Err(Error::new_err(
+                "a press out of the sensor's range: up to 0.25 N, within ±4 mm, α and β within ±12°",
+            ));
+        }
+        self.lock().hand.set(touch);
+        Ok(())
+    }
+
+    /// The samples of the frames that are whole at this time, s since the start.
+    fn advance(&self, py: Python<'_>, to_s: f64) -> PyResult<Vec<SampleNumbers>> {
+        if !(0.0..1e9).contains(&to_s) {
+            return Err(Error::new_err(format!("{to_s} s is no time")));
+        }
+        Ok(py.detach(|| {
+            let mut twin = self.lock();
+            let to_us = twin.begun_us + (to_s * 1e6).round() as u64;
+            twin.advance(to_us)
+        }))
+    }
+}
+
+impl Twin {
+    fn lock(&self) -> std::sync::MutexGuard<'_, Simulated> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Simulated {
+    fn start(kind: Kind, seed: u64) -> Result<Simulated, String> {
+        let [width, height] = kind.size().map(u32::from);
+        let scene = Scene::preset("rest", kind.preset(), width, height, seed)
+            .map_err(|error| error.to_string())?;
+        let hand = Hand::at_once();
+        let usual = Disturbances::default();
+        let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
+            .map_err(|error| error.to_string())?;
+        let device = Device::new(kind, Layout::default(), device_id(kind, NOMINAL), 1.0);
+        let frames = Frames::new(eye, &device.camera(), 0);
+        let mut twin = Simulated {
+            device,
+            frames,
+            hand,
+            now_us: 0,
+            begun_us: 0,
+            last_id: 0,
+        };
+        twin.send(&HostMessage::Hello(HelloPrefix::OURS.into()));
+        twin.command(Request::StartWithMarkers);
+        Ok(twin)
+    }
+
+    fn send(&mut self, message: &HostMessage) {
+        let mut buffer = [0; MAX_HOST_FRAME];
+        match encode(message, &mut buffer) {
+            Ok(frame) => self.device.receive(frame, self.now_us),
+            Err(error) => unreachable!("{error:?}: MAX_HOST_FRAME holds every message"),
+        }
+    }
+
+    fn command(&mut self, request: Request) {
+        self.last_id += 1;
+        let id = self.last_id;
+        self.send(&HostMessage::Command(Command { id, request }));
+    }
+
+    /// Takes each frame when it is whole; what else the device says is left out.
+    fn advance(&mut self, to_us: u64) -> Vec<SampleNumbers> {
+        let mut samples = Vec::new();
+        loop {
+            let camera = self.device.camera();
+            match self.frames.due(&camera, self.now_us) {
+                Due::In(wait_us) if self.now_us + wait_us > to_us => break,
+                Due::In(wait_us) => self.now_us += wait_us,
+                Due::Now(_) => self.take(&mut samples),
+            }
+        }
+        self.now_us = self.now_us.max(to_us);
+        samples
+    }
+
+    fn take(&mut self, samples: &mut Vec<SampleNumbers>) {
+        let (captured, _, missed) = self.frames.take(self.device.camera());
+        let now_us = self.now_us;
+        self.device.frame(&captured, missed, || now_us);
+        while let Some(message) = self.device.message() {
+            if let DeviceMessage::Sample(mut sample) = message {
+                sample.time_us = sample.time_us.saturating_sub(self.begun_us);
+                let whole_us = now_us - self.begun_us.min(now_us);
+                samples.push(told::sample(&sample, 1000 * whole_us));
+            }
+        }
+    }
+}
