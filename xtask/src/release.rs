@@ -64,7 +64,7 @@ impl Release {
                 folder: &folder,
             };
             let program = target.build()?;
-            target.archive(&program)?;
+            target.archive(&program, &images)?;
             target.wheel(&program, &images)?;
         }
         bill_of_materials(&folder)?;
@@ -123,12 +123,20 @@ impl Target<'_> {
         Ok(built.join("release/hivtac"))
     }
 
-    fn archive(&self, program: &Path) -> Result<()> {
-        let name = format!("hivtac-{VERSION}-{}.tar.gz", self.name);
+    /// Packs the program, with both boards' firmware beside it.
+    fn archive(&self, program: &Path, images: &[PathBuf]) -> Result<()> {
+        let name = format!("hivtac-{VERSION}-{}", self.name);
+        let packed = toolchain::work_folder("release")?.join(&name);
+        copy_into(&packed, &[program])?;
+        let beside = BESIDE.map(toolchain::at);
+        copy_into(&packed, &beside.each_ref().map(PathBuf::as_path))?;
+        copy_into(&packed.join("firmware"), images)?;
         let mut tar = Command::new("tar");
-        tar.arg("-czf").arg(self.folder.join(name)).arg("-C");
-        tar.arg(program.with_file_name("")).arg("hivtac").arg("-C");
-        process::run(tar.arg(toolchain::at("")).args(BESIDE))
+        tar.arg("-czf")
+            .arg(self.folder.join(format!("{name}.tar.gz")));
+        let folder = packed.with_file_name("");
+        process::run(tar.arg("-C").arg(folder).arg(&name))?;
+        Ok(std::fs::remove_dir_all(packed)?)
     }
 
     /// Builds Python's package, with the program and both boards' firmware in it.
@@ -137,13 +145,8 @@ impl Target<'_> {
         // The other files of `hivtac.data` are the project's own.
         let scripts = package.join("hivtac.data/scripts");
         let firmware = package.join("hivtac.data/data/share/hivtac/firmware");
-        std::fs::create_dir_all(&scripts)?;
-        std::fs::create_dir_all(&firmware)?;
-        std::fs::copy(program, scripts.join("hivtac"))?;
-        for image in images {
-            let name = image.file_name().context("an image has a name")?;
-            std::fs::copy(image, firmware.join(name))?;
-        }
+        copy_into(&scripts, &[program])?;
+        copy_into(&firmware, images)?;
         let is_musl = self.name.ends_with("-musl");
         let system = if is_musl {
             "musllinux_1_2"
@@ -161,6 +164,18 @@ impl Target<'_> {
         std::fs::remove_dir_all(firmware)?;
         built
     }
+}
+
+/// Copies files into a folder, which is made if missing.
+fn copy_into(folder: &Path, files: &[impl AsRef<Path>]) -> Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for file in files {
+        let file = file.as_ref();
+        let name = file.file_name().context("a file has a name")?;
+        let copied = std::fs::copy(file, folder.join(name));
+        copied.with_context(|| format!("copying {}", file.display()))?;
+    }
+    Ok(())
 }
 
 /// Writes firmware: the images, and as other tools for DFU take them.
@@ -215,25 +230,60 @@ fn bill_of_materials(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Installs the wheel that runs here into an environment of its own, and asks the program and the
-/// package for forces of a simulated sensor.
+/// What is asked of an installed package: forces of a simulated sensor, by the program that came
+/// with it, and firmware for both boards.
+const ASK: &str = r#"
+import glob, json, subprocess, sys
+import hivtac
+
+program, firmware, version = sys.argv[1:]
+assert len(glob.glob(f"{firmware}/hivtac-firmware-{version}-*.bin")) == 2, firmware
+twin = subprocess.Popen([program, "twin", "--json", "--scene", "static"], stdout=subprocess.PIPE)
+try:
+    with hivtac.open(json.loads(twin.stdout.readline())["port"]) as sensor:
+        forces = sum(next(sensor).force is not None for _ in range(200))
+finally:
+    twin.kill()
+assert forces > 150, forces
+print(f"{program}: {forces} of 200 samples have a force")
+"#;
+
+/// Installs the wheel that runs here into an environment of its own, unpacks the archives, and asks
+/// their programs.
 fn install(folder: &Path) -> Result<()> {
-    let environment = toolchain::work_folder("release")?.join("installed");
+    let work = toolchain::work_folder("release")?;
+    let environment = work.join("installed");
     process::run(process::command("python3 -m venv --clear").arg(&environment))?;
     let programs = environment.join("bin");
-    let mut pip = python::pip(&programs.join("python"));
-    process::run(
-        pip.arg("--find-links")
-            .arg(folder)
-            .arg(format!("hivtac=={VERSION}")),
-    )?;
-    let version = process::output(Command::new(programs.join("hivtac")).arg("--version"))?;
-    ensure!(
-        version.trim() == format!("hivtac {VERSION}"),
-        "installed: {version}"
-    );
-    let mut import = Command::new(programs.join("python"));
-    process::run(import.args(["-I", "-c", "import hivtac; print(hivtac.open)"]))
+    let python = programs.join("python");
+    let mut pip = python::pip(&python);
+    pip.arg("--find-links").arg(folder);
+    process::run(pip.arg(format!("hivtac=={VERSION}")))?;
+    let ask = |program: &Path, firmware: &Path| {
+        let mut ask = Command::new(&python);
+        ask.args(["-I", "-c", ASK]).arg(program).arg(firmware);
+        process::run(ask.arg(VERSION))
+    };
+    let firmware = environment.join("share/hivtac/firmware");
+    ask(&programs.join("hivtac"), &firmware)?;
+    for target in LINUX {
+        let name = format!("hivtac-{VERSION}-{target}");
+        let archive = folder.join(format!("{name}.tar.gz"));
+        if !archive.is_file() || !target.starts_with(std::env::consts::ARCH) {
+            continue;
+        }
+        process::run(
+            Command::new("tar")
+                .arg("-xzf")
+                .arg(archive)
+                .arg("-C")
+                .arg(&work),
+        )?;
+        let unpacked = work.join(name);
+        ask(&unpacked.join("hivtac"), &unpacked.join("firmware"))?;
+        std::fs::remove_dir_all(unpacked)?;
+    }
+    Ok(())
 }
 
 #[cfg(test)]

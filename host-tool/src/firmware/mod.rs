@@ -1,6 +1,7 @@
 //! `hivtac update firmware`: checks an image, starts the device's own loader, writes the image by
 //! it, and looks which version came back.
 
+mod carried;
 mod dfuse;
 #[cfg(test)]
 mod simulated;
@@ -42,9 +43,10 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub struct FirmwareArguments {
     #[command(flatten)]
     device: Device,
-    /// The .bin of a release, or the ELF that cargo builds
+    /// The .bin of a release, or the ELF that cargo builds; what this program came with when not
+    /// given
     #[arg(value_name = "FILE")]
-    file: String,
+    file: Option<String>,
     /// Longest wait for the device's loader, and for the device to come back, s
     #[arg(long, value_name = "S", default_value = "30", value_parser = seconds)]
     wait: Duration,
@@ -66,8 +68,12 @@ pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
         wait,
         json,
     } = arguments;
-    let image = read(file)?;
-    let (found, address, before) = reach(arguments, &image)?;
+    let file = match file {
+        Some(file) => file.clone(),
+        None => carried::image(device)?,
+    };
+    let image = read(&file)?;
+    let (found, address, before) = reach(arguments, &file, &image)?;
     note("the device is in its loader; keep it plugged in");
     let written = write::write(usb::open(&found)?, &image, say);
     written.inspect_err(|failure| {
@@ -83,6 +89,7 @@ pub fn update(arguments: &FirmwareArguments) -> Result<(), Failure> {
 /// understood.
 fn reach(
     arguments: &FirmwareArguments,
+    file: &str,
     image: &Image,
 ) -> Result<(Found, Address, Option<DeviceHello>), Failure> {
     let device = &arguments.device;
@@ -95,7 +102,9 @@ fn reach(
     });
     match connected {
         Ok((address, Some((link, hello)))) => {
-            let found = into_loader(arguments, link, &hello, image)?;
+            let fits = image.fits(&shown(&hello.board));
+            fits.map_err(|refusal| Failure::of_file(file, refusal))?;
+            let found = into_loader(arguments, link)?;
             Ok((found, address, Some(hello)))
         }
         Ok((address, None)) => {
@@ -123,14 +132,7 @@ fn read(path: &str) -> Result<Image, Failure> {
 }
 
 /// Has the device start its loader; returns that.
-fn into_loader(
-    arguments: &FirmwareArguments,
-    mut link: Link,
-    hello: &DeviceHello,
-    image: &Image,
-) -> Result<Found, Failure> {
-    let fits = image.fits(&shown(&hello.board));
-    fits.map_err(|refusal| Failure::of_file(&arguments.file, refusal))?;
+fn into_loader(arguments: &FirmwareArguments, mut link: Link) -> Result<Found, Failure> {
     let before = usb::loaders()?;
     send(&mut link, Request::StartLoader, arguments.device.timeout)?;
     drop(link);
