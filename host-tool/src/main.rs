@@ -39,6 +39,7 @@ mod threshold_command;
 mod twin;
 mod update;
 mod view;
+mod white;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
@@ -69,6 +70,7 @@ enum Command {
     #[command(subcommand)]
     Update(update::UpdateCommand),
     Expose(expose::ExposeArguments),
+    White(white::WhiteArguments),
     Snapshot(snapshot::SnapshotArguments),
     Focus(focus_command::FocusArguments),
     BringUp(bring_up::BringUpArguments),
@@ -97,6 +99,7 @@ impl Command {
             Command::Settings(command) => command.run(),
             Command::Update(command) => update::run(&command),
             Command::Expose(arguments) => expose::run(&arguments),
+            Command::White(arguments) => white::run(&arguments),
             Command::Snapshot(arguments) => snapshot::run(&arguments),
             Command::Focus(arguments) => focus_command::run(&arguments),
             Command::BringUp(arguments) => bring_up::run(&arguments),

@@ -1,6 +1,6 @@
 //! Tests of `hivtac bring-up` with the firmware in the rig: on a good board, and with each fault.
 
-use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, tool_waiting};
+use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, tool, tool_waiting};
 use hivtac_tests::artifact;
 use serde_json::Value;
 use std::path::Path;
@@ -8,6 +8,8 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::{Duration, Instant};
 
+/// A seed with the light of an office.
+const OFFICE: &str = "18";
 /// Longest run.
 const PATIENCE: Duration = Duration::from_secs(240);
 
@@ -112,6 +114,29 @@ fn a_register_that_the_camera_forgot_is_named() {
         "camera",
         &words,
     );
+}
+
+/// In a light that is not that of the first gains, `white` finds the camera's own, and bring-up
+/// finds the white right.
+#[test]
+fn white_is_made_white() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("report.json");
+    let rig = Rig::start(&["--scene", "rest", "--seed", OFFICE]).unwrap();
+    let found = tool(&rig, "white", &["--json"]).unwrap();
+    assert_eq!(found.code, Some(0), "{found:?}");
+    let white: Value = serde_json::from_str(&found.out).unwrap();
+    let gain = |name: &str| white[name].as_u64().unwrap();
+    // The light asks for 76 and 131; the scene's film has less blue than a card.
+    assert!((70..80).contains(&gain("red_64ths")), "{white}");
+    assert!((125..165).contains(&gain("blue_64ths")), "{white}");
+    let settings = tool(&rig, "settings get", &[]).unwrap();
+    assert!(settings.out.contains("white      red 1."), "{settings:?}");
+    tool(&rig, "bring-up", &[file.to_str().unwrap()]).unwrap();
+    rig.finish().unwrap();
+    let report = report(&file);
+    let steps = steps(&report);
+    assert!(steps.contains(&("white", true)), "{report}");
 }
 
 #[test]

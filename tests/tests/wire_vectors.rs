@@ -2,7 +2,7 @@
 //! shares no code with the Rust one made them. They equal what `hivtac-wire` writes and reads, and
 //! what `docs/wire.md` quotes.
 
-use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits, White};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
@@ -299,6 +299,7 @@ const CAMERA: CameraSettings = CameraSettings {
     exposure: Some(Microseconds(2_500)),
     gain: None,
     rate: Rate::Half,
+    white: Some(White { red: 76, blue: 132 }),
 };
 
 fn camera() -> CameraReport {

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x3F03FBB3CE5B85CF
+SCHEMA = 0x816491E573F1F27B
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -106,6 +106,7 @@ CAMERA = [
     unsigned("exposure_us", 2_500),
     raw("gain: None", [0]),
     raw("rate: Half", [1]),
+    raw("white: Some; red 76, blue 132", [1, 76, 132]),
 ]
 
 
@@ -423,7 +424,8 @@ HOST = {
     "start-loader": COMMAND + [unsigned("id", 22), raw("StartLoader", [21])],
     "set-camera": COMMAND + [unsigned("id", 23), raw("SetCamera", [22]), *CAMERA],
     "set-camera-automatic": COMMAND + [unsigned("id", 23), raw("SetCamera", [22])]
-    + [raw("exposure: None", [0]), raw("gain: None", [0]), raw("rate: Full", [0])],
+    + [raw("exposure: None", [0]), raw("gain: None", [0]), raw("rate: Full", [0])]
+    + [raw("white: None", [0])],
     "set-contact-shape-needle": COMMAND
     + [unsigned("id", 24), raw("SetContactShape", [23]), raw("Needle", [0])],
     "set-contact-shape-round": COMMAND

@@ -5,7 +5,7 @@ use crate::message::*;
 use crate::settings::*;
 use crate::version::SCHEMA_HASH;
 use heapless::{String, Vec as Bytes};
-use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits};
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits, White};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
@@ -217,6 +217,10 @@ pub fn longest_camera() -> CameraSettings {
         exposure: Some(Microseconds(u32::MAX)),
         gain: Some(Sixteenths(u16::MAX)),
         rate: Rate::Quarter,
+        white: Some(White {
+            red: u8::MAX,
+            blue: u8::MAX,
+        }),
     }
 }
 
@@ -694,12 +698,13 @@ pub fn any_contact_shape() -> impl Strategy<Value = ContactShape> {
 /// Any camera settings.
 pub fn any_camera() -> impl Strategy<Value = CameraSettings> {
     let rate = any::<prop::sample::Index>().prop_map(|nth| *nth.get(&Rate::ALL));
-    (any::<(Option<u32>, Option<u16>)>(), rate).prop_map(|((exposure, gain), rate)| {
-        CameraSettings {
-            exposure: exposure.map(Microseconds),
-            gain: gain.map(Sixteenths),
-            rate,
-        }
+    let white = any::<Option<(u8, u8)>>();
+    let numbers = any::<(Option<u32>, Option<u16>)>();
+    (numbers, rate, white).prop_map(|((exposure, gain), rate, white)| CameraSettings {
+        exposure: exposure.map(Microseconds),
+        gain: gain.map(Sixteenths),
+        rate,
+        white: white.map(|(red, blue)| White { red, blue }),
     })
 }
 

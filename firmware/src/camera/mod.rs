@@ -49,6 +49,7 @@ static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
             exposure: None,
             gain: None,
             rate: Rate::Full,
+            white: None,
         },
         exposure: Microseconds(0),
         gain: Sixteenths(0),

@@ -157,6 +157,7 @@ impl Camera {
             exposure,
             gain,
             rate,
+            ..
         } = self.settings;
         let [(_, kept_gain), (_, kept_rows), _] = &mut self.locked;
         *kept_gain = gain.map_or(found_gain, |gain| gain.0).max(LEAST_GAIN.0);

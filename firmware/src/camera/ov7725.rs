@@ -4,7 +4,7 @@
 use super::identity::{self, Identity};
 use super::ov7725_registers::{
     AUTOMATIC_EXPOSURE, AUTOMATIC_GAIN, COM7, COM7_RESET, COM8, EXPOSURE, Format, LEVEL, LOCKED,
-    MOST_AUTOMATIC_GAIN, NEEDED, RESTS, TABLE, clock,
+    MOST_AUTOMATIC_GAIN, NEEDED, RESTS, TABLE, clock, white,
 };
 use super::registers::{Demand, Registers};
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, problems, store};
@@ -86,6 +86,7 @@ impl Camera {
         for table in [clock(settings.rate), format.registers(), TABLE] {
             self.registers.set(table).await?;
         }
+        self.registers.set(&self.white()).await?;
         self.lock_exposure().await
     }
 
@@ -95,6 +96,11 @@ impl Camera {
         let before = core::mem::replace(&mut self.settings, settings);
         if settings.rate != before.rate {
             self.registers.set(clock(settings.rate)).await?;
+        }
+        if settings.white != before.white {
+            self.registers.set(&self.white()).await?;
+        }
+        if (settings.rate, settings.white) != (before.rate, before.white) {
             Timer::after(self.frame_time() * FRAMES_TO_SETTLE).await;
         }
         self.lock_exposure().await
@@ -108,6 +114,11 @@ impl Camera {
     /// Time from frame to frame.
     pub fn frame_time(&self) -> Duration {
         frame_time(self.settings.rate)
+    }
+
+    /// The registers of white.
+    fn white(&self) -> [(u8, u8); 2] {
+        white(self.settings.white.unwrap_or_default())
     }
 
     fn frame_us(&self) -> u32 {
@@ -194,7 +205,8 @@ impl Camera {
     /// Reads the camera's state, while frames of `format` are captured.
     pub async fn setting(&mut self, format: Format) -> Result<Setting, Error> {
         let clock = clock(self.settings.rate);
-        let tables = [format.registers(), TABLE, clock, &self.locked];
+        let white = self.white();
+        let tables = [format.registers(), TABLE, clock, &white, &self.locked];
         Ok(Setting {
             id: identity::id(&mut self.registers.bus)?,
             comparison: self.registers.compare(&tables).await?,

@@ -5,7 +5,7 @@
 
 use crate::seeded_bugs;
 use core::ops::RangeInclusive;
-use hivtac_terms::camera::Rate;
+use hivtac_terms::camera::{Rate, White};
 use hivtac_terms::threshold::PixelFormat;
 
 /// Output format, size and register reset.
@@ -77,6 +77,11 @@ pub const AUTOMATIC_EXPOSURE: u8 = 0x01;
 pub const AUTOMATIC_GAIN: u8 = 0x04;
 /// Gain, and exposure in lines, low and high byte: the values of the automatic control.
 pub const EXPOSURE: [u8; 3] = [0x00, 0x10, 0x08];
+
+/// Registers for the gains with which white is white: blue, red.
+pub const fn white(White { red, blue }: White) -> [(u8, u8); 2] {
+    [(0x01, blue), (0x02, red)]
+}
 
 /// Mean level of the newest frame, as the automatic control sees it.
 pub const LEVEL: u8 = 0x2F;
@@ -160,9 +165,9 @@ pub const TABLE: &[(u8, u8)] = &[
     // AWB_CTRL0, AWB_CTRL1: fixed gains are applied, none are calculated; 0x40 is a gain of one.
     (0x63, 0xA0),
     (0x69, 0x5E),
-    // BLUE, RED, GREEN: gains of one. A white measured on a real unit would go here.
-    (0x01, 0x40),
-    (0x02, 0x40),
+    // FIXGAIN: red one step above green, blue two, as in the tables of OpenMV and esp32-camera, to
+    // which the maker's presets of white belong. GREEN: a gain of one.
+    (0x4D, 0x09),
     (0x03, 0x40),
     // DSP_CTRL1: FIFO, colour matrix, interpolation, and correction of defective pixels. No gamma:
     // levels stay in proportion to light, by which the sensing weighs a marker's rim. No special

@@ -2,7 +2,7 @@
 
 mod camera;
 mod clocks;
-mod colours;
+pub mod colours;
 mod complaints;
 mod device;
 mod noise;

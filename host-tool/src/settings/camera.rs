@@ -1,7 +1,7 @@
 //! Exposure, gain and rate of the camera as JSON, as lines, and as changes by `settings set`.
 
 use super::temporal::thousandths;
-use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
+use hivtac_terms::camera::{CameraSettings, LEAST_GAIN, MOST_GAIN, Rate, White};
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
 use serde::{Deserialize, Serialize};
@@ -13,6 +13,16 @@ pub struct CameraJson {
     exposure_us: Option<u32>,
     gain_sixteenths: Option<Sixteenths>,
     rate: RateJson,
+    /// Null for gains in the middle of the maker's presets.
+    #[serde(default)]
+    white: Option<WhiteJson>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WhiteJson {
+    red_64ths: u8,
+    blue_64ths: u8,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,6 +52,10 @@ impl CameraJson {
                 Rate::Half => RateJson::Half,
                 Rate::Quarter => RateJson::Quarter,
             },
+            white: settings.white.map(|White { red, blue }| WhiteJson {
+                red_64ths: red,
+                blue_64ths: blue,
+            }),
         }
     }
 
@@ -55,6 +69,10 @@ impl CameraJson {
                 RateJson::Half => Rate::Half,
                 RateJson::Quarter => Rate::Quarter,
             },
+            white: self.white.map(|white| White {
+                red: white.red_64ths,
+                blue: white.blue_64ths,
+            }),
         }
     }
 }
@@ -75,7 +93,7 @@ fn frames_per_second(report: &CameraReport) -> u16 {
 }
 
 /// Name and text of each setting, for a person.
-pub fn texts(report: &CameraReport) -> [(&'static str, String); 3] {
+pub fn texts(report: &CameraReport) -> Vec<(&'static str, String)> {
     let automatic = |is_automatic| {
         if is_automatic {
             ", as the light needs"
@@ -96,7 +114,10 @@ pub fn texts(report: &CameraReport) -> [(&'static str, String); 3] {
         ],
     };
     let rate = format!("{} frames a second", frames_per_second(report));
-    [("exposure", exposed), ("gain", amplified), ("rate", rate)]
+    let white = report.settings.white;
+    let white = white.map(|white| ("white", white.to_string()));
+    let texts = [("exposure", exposed), ("gain", amplified), ("rate", rate)];
+    texts.into_iter().chain(white).collect()
 }
 
 /// A change of one setting.
@@ -204,6 +225,7 @@ mod tests {
                 exposure: Some(Microseconds(2_500)),
                 gain: None,
                 rate,
+                white: Some(White { red: 76, blue: 132 }),
             };
             let text = serde_json::to_string(&CameraJson::new(&settings)).unwrap();
             let read: CameraJson = serde_json::from_str(&text).unwrap();
@@ -238,15 +260,21 @@ mod tests {
             exposure: Some(Microseconds(2_500)),
             ..CameraSettings::default()
         };
-        let text = texts(&report(settings)).map(|(_, text)| text);
+        let text = |report: &CameraReport| -> Vec<String> {
+            texts(report).into_iter().map(|(_, text)| text).collect()
+        };
         let expected = ["2.512 ms", "1.5, as the light needs", "156 frames a second"];
-        assert_eq!(text, expected);
+        assert_eq!(text(&report(settings)), expected);
+        let white = CameraSettings {
+            white: Some(White { red: 76, blue: 132 }),
+            ..settings
+        };
+        assert_eq!(text(&report(white))[3], "red 1.19, blue 2.06");
         let unknown = CameraReport {
             exposure: Microseconds(0),
             ..report(settings)
         };
-        let [_, (_, gain), _] = texts(&unknown);
-        assert_eq!(gain, "not known before the camera answers");
+        assert_eq!(text(&unknown)[1], "not known before the camera answers");
     }
 
     #[test]

@@ -417,6 +417,7 @@ mod tests {
                 exposure: Some(Microseconds(2_500)),
                 gain: None,
                 rate: Rate::Quarter,
+                white: None,
             },
             exposure: Microseconds(2_512),
             gain: Sixteenths(16),

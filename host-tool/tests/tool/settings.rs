@@ -459,6 +459,7 @@ fn a_file_with_an_exposure_that_the_camera_has_not_changes_nothing() {
         exposure: Some(Microseconds(9_000)),
         gain: None,
         rate: Rate::Half,
+        white: None,
     });
     assert_eq!(commands(&device)[1], set);
 }

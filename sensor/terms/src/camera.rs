@@ -17,7 +17,44 @@ pub struct CameraSettings {
     pub gain: Option<Sixteenths>,
     /// Frame rate.
     pub rate: Rate,
+    /// Gains with which white is white; `None` for [`White::default`]. A camera without colours has
+    /// no use for them.
+    pub white: Option<White>,
 }
+
+/// Gains of the colours over that of green, in 64ths, at least [`LEAST_WHITE`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct White {
+    /// Gain of red.
+    pub red: u8,
+    /// Gain of blue.
+    pub blue: u8,
+}
+
+impl Default for White {
+    /// Returns gains in the middle between OmniVision's presets for sunlight (0x5C, 0x5A) and for
+    /// an office (0x4C, 0x84).
+    fn default() -> White {
+        White {
+            red: 0x54,
+            blue: 0x6D,
+        }
+    }
+}
+
+impl fmt::Display for White {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [red, blue] = [self.red, self.blue].map(|gain| f64::from(gain) / 64.0);
+        write!(f, "red {red:.2}, blue {blue:.2}")
+    }
+}
+
+/// Smallest gain of a colour over that of green.
+pub const LEAST_WHITE: u8 = 64;
 
 /// Frame rate of a camera, relative to its highest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -70,6 +107,8 @@ pub enum CameraError {
     Exposure(RateLimits),
     /// [`CameraSettings::gain`] is out of range.
     Gain,
+    /// A gain of [`CameraSettings::white`] is too small.
+    White,
 }
 
 impl Rate {
@@ -122,6 +161,10 @@ impl CameraLimits {
         if !settings.gain.is_none_or(can) {
             return Err(CameraError::Gain);
         }
+        let can = |white: White| white.red.min(white.blue) >= LEAST_WHITE;
+        if !settings.white.is_none_or(can) {
+            return Err(CameraError::White);
+        }
         Ok(())
     }
 }
@@ -135,6 +178,7 @@ impl fmt::Display for CameraError {
                 limits.frames_per_second, limits.shortest, limits.longest
             ),
             CameraError::Gain => f.write_str("a gain is 1 to 4"),
+            CameraError::White => f.write_str("a gain of red or blue is at least 1"),
         }
     }
 }
@@ -193,5 +237,17 @@ mod tests {
             };
             assert_eq!(LIMITS.check(&settings), expected, "{gain}");
         }
+    }
+
+    #[test]
+    fn a_gain_of_a_colour_is_at_least_1() {
+        for (red, blue, is_good) in [(64, 64, true), (63, 90, false), (92, 63, false)] {
+            let settings = CameraSettings {
+                white: Some(White { red, blue }),
+                ..CameraSettings::default()
+            };
+            assert_eq!(LIMITS.check(&settings).is_ok(), is_good, "{red} {blue}");
+        }
+        assert_eq!(White::default().to_string(), "red 1.31, blue 1.70");
     }
 }

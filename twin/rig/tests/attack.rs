@@ -6,7 +6,7 @@
 
 use crate::common::{Run, Setup, command, firmware, hello};
 use hivtac_rig::script::Action;
-use hivtac_terms::camera::{CameraSettings, Rate};
+use hivtac_terms::camera::{CameraSettings, Rate, White};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
@@ -88,7 +88,7 @@ fn setup_packet(numbers: &mut Numbers) -> [u8; 8] {
     packet
 }
 
-/// Returns settings of exposure, gain and rate: possible ones, impossible ones, or none.
+/// Returns settings of exposure, gain, rate and white: possible ones, impossible ones, or none.
 fn camera_settings(numbers: &mut Numbers) -> CameraSettings {
     let exposure = Microseconds(numbers.below(30_000) as u32);
     let gain = Sixteenths(numbers.below(80) as u16);
@@ -96,6 +96,10 @@ fn camera_settings(numbers: &mut Numbers) -> CameraSettings {
         exposure: (numbers.below(2) == 0).then_some(exposure),
         gain: (numbers.below(2) == 0).then_some(gain),
         rate: numbers.one_of(&Rate::ALL),
+        white: (numbers.below(4) == 0).then(|| White {
+            red: numbers.next() as u8,
+            blue: numbers.next() as u8,
+        }),
     }
 }
 

@@ -43,6 +43,7 @@ fn exposed(us: u32, gain: Option<u16>) -> CameraSettings {
         exposure: Some(Microseconds(us)),
         gain: gain.map(Sixteenths),
         rate: Rate::Full,
+        white: None,
     }
 }
 
@@ -292,6 +293,7 @@ fn the_global_shutter_camera_takes_exposure_gain_and_rate() {
         exposure: Some(Microseconds(1_000)),
         gain: Some(Sixteenths(32)),
         rate: Rate::Half,
+        white: None,
     };
     // Its forces come some frames later than the other board's.
     let run = openmv(460)

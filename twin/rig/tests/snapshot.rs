@@ -21,13 +21,13 @@ fn take(id: u16) -> Action {
 }
 
 /// One snapshot: its header, and its bytes that came in order.
-struct Taken {
+pub struct Taken {
     header: Snapshot,
-    bytes: Vec<u8>,
+    pub bytes: Vec<u8>,
 }
 
 /// Returns all snapshots that were begun.
-fn snapshots(run: &Run) -> Vec<Taken> {
+pub fn snapshots(run: &Run) -> Vec<Taken> {
     let mut all: Vec<Taken> = Vec::new();
     for message in &run.messages {
         match message {

@@ -1,8 +1,8 @@
 //! The effect of the OV7725's registers on brightness and colours.
 //!
-//! The scene's pixels are those of the sensor at the settings of OmniVision's application note:
-//! equal gains, its colour matrix, levels in proportion to light, well exposed. Other settings
-//! change the pixels relative to these. Gains act before the matrix, which gives Cr and Cb from
+//! The scene's pixels are those of the sensor with gains that make its light white, the colour
+//! matrix of OmniVision's application note, levels in proportion to light, well exposed. Other
+//! settings change the pixels relative to these. Gains act before the matrix, which gives Cr and Cb from
 //! red, green and blue; luma follows from them by BT.601. Not simulated: the sensor's own filters
 //! and noise, automatic white balance, lens correction, edges, hue and special effects.
 
@@ -45,11 +45,13 @@ pub struct Colour {
 }
 
 impl Colour {
-    /// Returns the map for the registers. `exposed` is the light of the picture over the light that
-    /// exposes it well.
-    pub fn of(registers: &Registers, exposed: f64) -> Self {
+    /// Returns the map for the registers. `response` is the sensor's own to white light in red, green
+    /// and blue with the fixed gains of 0x09; `exposed` is the light of the picture over the light
+    /// that exposes it well.
+    pub fn of(registers: &Registers, response: [f64; 3], exposed: f64) -> Self {
         let control = registers.get(reg::DSP_CTRL1);
-        let gains = gains(registers);
+        let (gains, fixed) = (gains(registers), fixed_gains(registers));
+        let gains: [f64; 3] = std::array::from_fn(|i| gains[i] * fixed[i] * response[i]);
         let mut raw = product(&inverse(&from_raw(&APPLICATION_NOTE)), &BT601);
         for (row, gain) in raw.iter_mut().zip(gains) {
             *row = row.map(|term| term * gain * exposed);
@@ -148,6 +150,14 @@ fn gains(registers: &Registers) -> [f64; 3] {
         _ => 64.0,
     };
     [reg::RED, reg::GREEN, reg::BLUE].map(|gain| f64::from(registers.get(gain)) / unity)
+}
+
+/// Returns the fixed gains of red, green and blue, relative to those of 0x09. The size of a step is
+/// not documented; it is a quarter here.
+fn fixed_gains(registers: &Registers) -> [f64; 3] {
+    let code = registers.get(reg::FIXGAIN);
+    let gain = |steps: u8| 1.0 + f64::from(steps & 3) / 4.0;
+    [gain(code) / gain(1), 1.0, gain(code >> 2) / gain(2)]
 }
 
 /// Returns coefficients 1 to 6 of the colour matrix with their signs, on which all sources agree.
@@ -257,9 +267,10 @@ mod tests {
             (reg::DSP_CTRL1, 0x98),
             (reg::AWB_CTRL0, 0xE0),
             (reg::AWB_CTRL1, 0x5E),
-            (reg::RED, 0x40),
+            (reg::FIXGAIN, 0x09),
+            (reg::RED, 0x54),
             (reg::GREEN, 0x40),
-            (reg::BLUE, 0x40),
+            (reg::BLUE, 0x6D),
         ] {
             registers.write(address, value);
         }
@@ -273,16 +284,31 @@ mod tests {
             coding: Coding::Rgb565,
             pixels: vec![pixel; 2],
         };
-        Colour::of(registers, exposed).apply(picture).pixels[0]
+        Colour::of(registers, LIGHT, exposed).apply(picture).pixels[0]
     }
 
+    /// The response of which the gains above make white.
+    const LIGHT: [f64; 3] = [64.0 / 84.0, 1.0, 64.0 / 109.0];
     const GREY: u16 = 16 << 11 | 32 << 5 | 16;
     const RED: u16 = 24 << 11 | 10 << 5 | 5;
 
     #[test]
     fn the_scenes_colours_are_those_of_the_application_note() {
-        assert!(Colour::of(&application_note(), 1.0).is_plain());
+        assert!(Colour::of(&application_note(), LIGHT, 1.0).is_plain());
         assert_eq!(sent(&application_note(), 1.0, RED), RED);
+    }
+
+    #[test]
+    fn with_equal_gains_a_neutral_film_is_green() {
+        let mut registers = application_note();
+        for (address, value) in [(reg::FIXGAIN, 0), (reg::RED, 0x40), (reg::BLUE, 0x40)] {
+            registers.write(address, value);
+        }
+        let [red, green, blue] = rgb(sent(&registers, 1.0, GREY));
+        assert!(
+            green > 1.5 * red && green > 1.5 * blue,
+            "{red} {green} {blue}"
+        );
     }
 
     #[test]
@@ -316,7 +342,7 @@ mod tests {
         let [red, ..] = rgb(sent(&application_note(), 0.5, GREY));
         assert!((red - 66.0).abs() < 5.0, "{red}");
         let mut pair = [u16::from_le_bytes([120, 128]); 2];
-        Colour::of(&application_note(), 0.5).apply_to_pair(&mut pair);
+        Colour::of(&application_note(), LIGHT, 0.5).apply_to_pair(&mut pair);
         assert_eq!(pair, [u16::from_le_bytes([60, 128]); 2]);
     }
 

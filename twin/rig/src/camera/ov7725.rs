@@ -71,7 +71,8 @@ impl Part for Ov7725 {
             _ => Coding::Rgb565,
         };
         let picture = source.picture(exposed, wanted);
-        Colour::of(&self.registers, self.light).apply(picture)
+        let response = registers::response(self.seed);
+        Colour::of(&self.registers, response, self.light).apply(picture)
     }
 
     fn read(&self, address: u8) -> u16 {

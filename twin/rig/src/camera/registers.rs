@@ -30,6 +30,8 @@ pub const AEB: u8 = 0x25;
 pub const VPT: u8 = 0x26;
 /// Mean level of the newest frame; read-only.
 pub const YAVE: u8 = 0x2F;
+/// Fixed gains of blue (bits 3:2) and red (1:0).
+pub const FIXGAIN: u8 = 0x4D;
 /// Lens correction.
 pub const LC_CTR: u8 = 0x46;
 /// White balance: gains applied (bit 7), calculated (6).
@@ -297,6 +299,20 @@ impl Registers {
     }
 }
 
+/// Returns the sensor's response to white light in red, green and blue, with the fixed gains of the
+/// maker's presets ([`FIXGAIN`] 0x09). It depends on the light: between sunlight and an office's by
+/// seed, for seed 1 such that 0x54 and 0x6D make it white.
+pub(super) fn response(seed: u64) -> [f64; 3] {
+    let of = |[red, blue]: [f64; 2]| [64.0 / red, 1.0, 64.0 / blue];
+    if seed == 1 {
+        return of([84.0, 109.0]);
+    }
+    // The presets' gains, 64ths.
+    let [sun, office] = [[92.0, 90.0], [76.0, 132.0]].map(of);
+    let towards_office = f64::from(random(seed, FIXGAIN)) / 255.0;
+    std::array::from_fn(|i| sun[i] + towards_office * (office[i] - sun[i]))
+}
+
 /// Returns a value that depends only on the seed and the register's address.
 fn random(seed: u64, address: u8) -> u8 {
     let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(address) << 32;
@@ -329,6 +345,14 @@ mod tests {
         assert_ne!(used.get(HSIZE), first.get(HSIZE));
         assert!(used.write(COM7, COM7_RESET));
         assert_eq!(used, first);
+    }
+
+    #[test]
+    fn white_light_differs_by_seed_within_the_makers_presets() {
+        let blues: Vec<f64> = (2..20).map(|seed| response(seed)[2]).collect();
+        let [least, most] =
+            [f64::min, f64::max].map(|of| blues.iter().copied().reduce(of).unwrap());
+        assert!(least > 0.48 && least < 0.53 && most > 0.65, "{blues:?}");
     }
 
     #[test]
