@@ -13,6 +13,8 @@ out of the film, away from the camera; a press has a negative force along z.
 
 A failure raises `Error` or a subclass, with the text that the tool would print. Ctrl-C works during
 every wait. Lines that a sensor logs go to the logger `hivtac`.
+
+`hivtac.rerun` shows a sensor in Rerun, `hivtac.twin` is a simulated one inside a simulation.
 """
 
 from __future__ import annotations

@@ -4,4 +4,5 @@ mod dependencies;
 mod links;
 mod shared_state;
 mod unsafe_code;
+mod versions;
 mod width;
