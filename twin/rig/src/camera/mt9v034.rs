@@ -410,7 +410,9 @@ mod tests {
                 width: 376,
                 height: 240,
                 coding: Coding::Mono,
-                pixels: (0..376 * 240).map(|at| 1 + at % 376 % 200).collect(),
+                pixels: (0..240)
+                    .flat_map(|_| (0..376).map(|x| 1 + x % 200))
+                    .collect(),
             };
             part.disturb(&mut picture);
             let at = |x: usize, y: usize| picture.pixels[y * 376 + x];

@@ -359,7 +359,7 @@ mod tests {
     fn reserved_bits_keep_their_values_by_seed() {
         let kept = |seed: u64| {
             let mut registers = Registers::of_seed(seed);
-            let kept = |&(address, _): &(u8, u8)| {
+            let mut kept = |&(address, _): &(u8, u8)| {
                 let other = !registers.get(address);
                 registers.write(address, other);
                 registers.get(address) != other
