@@ -53,7 +53,7 @@ impl Kind {
             Kind::Refused => "the device refused a command or did not answer it",
             Kind::Rate => "`check`: fewer samples a second than --min-rate",
             Kind::Loss => "`check`: more frames lost than --max-loss",
-            Kind::NotRight => "`bring-up`, `threshold auto`: something is not right",
+            Kind::NotRight => "`bring-up`, `threshold auto`, `white`: something is not right",
             Kind::Interrupted => {
                 "interrupted (Ctrl-C, SIGTERM, SIGHUP); the summary is printed all the same"
             }

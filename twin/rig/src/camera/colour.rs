@@ -2,9 +2,9 @@
 //!
 //! The scene's pixels are those of the sensor with gains that make its light white, the colour
 //! matrix of OmniVision's application note, levels in proportion to light, well exposed. Other
-//! settings change the pixels relative to these. Gains act before the matrix, which gives Cr and Cb from
-//! red, green and blue; luma follows from them by BT.601. Not simulated: the sensor's own filters
-//! and noise, automatic white balance, lens correction, edges, hue and special effects.
+//! settings change the pixels relative to these. Gains act before the matrix, which gives Cr and Cb
+//! from red, green and blue; luma follows from them by BT.601. Not simulated: the sensor's own
+//! filters and noise, automatic white balance, lens correction, edges, hue and special effects.
 
 use super::registers::{self as reg, Registers};
 use crate::frame_source::{Coding, Picture};
@@ -45,9 +45,9 @@ pub struct Colour {
 }
 
 impl Colour {
-    /// Returns the map for the registers. `response` is the sensor's own to white light in red, green
-    /// and blue with the fixed gains of 0x09; `exposed` is the light of the picture over the light
-    /// that exposes it well.
+    /// Returns the map for the registers. `response` is the sensor's own to white light in red,
+    /// green and blue with the fixed gains of 0x09; `exposed` is the light of the picture over the
+    /// light that exposes it well.
     pub fn of(registers: &Registers, response: [f64; 3], exposed: f64) -> Self {
         let control = registers.get(reg::DSP_CTRL1);
         let (gains, fixed) = (gains(registers), fixed_gains(registers));
