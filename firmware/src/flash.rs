@@ -12,8 +12,8 @@
 //! speculatively nor delays writes to it.
 
 use crate::block_move::{BlockMove, End};
-use embassy_stm32::pac::FLASH;
 use embassy_stm32::pac::flash::Bank;
+use embassy_stm32::pac::{FLASH, PWR};
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::{Duration, Timer};
 use hivtac_storage::flash::{Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
@@ -30,6 +30,9 @@ const SECTOR_BYTES: u32 = 128 << 10;
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// 64 bits at once: the fastest setting at the boards' supply voltage.
 const PARALLELISM: u8 = 0b11;
+/// The voltage detector's level under which nothing is written: 2.76 V when it falls (DS12110). A
+/// supply that falls may be gone before a word is programmed.
+const LOWEST_SUPPLY: u8 = 6;
 /// Time of programming a word, and interval of checks for its end.
 const WORD_TIME: Duration = Duration::from_micros(100);
 /// Interval of checks for the end of erasing a sector.
@@ -63,6 +66,10 @@ impl SecondBank {
         flash: Peri<'static, peripherals::FLASH>,
         channel: Peri<'static, peripherals::MDMA_CH2>,
     ) -> Self {
+        PWR.cr1().modify(|w| {
+            w.set_pls(LOWEST_SUPPLY);
+            w.set_pvde(true);
+        });
         Self {
             _flash: flash,
             _channel: channel,
@@ -97,6 +104,10 @@ impl SecondBank {
         looks: u32,
     ) -> Result<(), Failed> {
         self.block = None;
+        if PWR.csr1().read().pvdo() {
+            defmt::error!("the supply is too low to write flash");
+            return Err(Failed);
+        }
         let bank = registers();
         if bank.cr().read().lock() {
             for key in KEYS {

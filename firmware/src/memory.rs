@@ -273,7 +273,7 @@ impl Memory {
 }
 
 fn say_worn() {
-    let text = format_args!("the flash is worn: settings cannot be kept any more");
+    let text = format_args!("the flash is worn or the supply low: settings cannot be kept");
     log::say(LogLevel::Error, text);
 }
 

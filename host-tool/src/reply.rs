@@ -104,8 +104,8 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
             "its camera does not answer, or is another one; `hivtac bring-up` says what to do"
         }
         Outcome::Worn => {
-            "its flash is worn and keeps nothing new; it works on, with what it kept before at \
-             each start"
+            "its flash is worn, or its supply is under 2.8 V, and keeps nothing new; it works on, \
+             with what it kept before at each start"
         }
         Outcome::ModelUnusable => {
             "it cannot use this model file; the one in use goes on, and the device's line above \

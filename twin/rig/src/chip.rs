@@ -17,7 +17,7 @@ use crate::board::{self, Wiring};
 use crate::camera::{Sccb, SharedCamera, TwoWire, part};
 use crate::control_bus::{ControlBus, HeldBus};
 use crate::dma_requests;
-use crate::faults::Faults;
+use crate::faults::{Faults, Kind};
 use crate::late_enable::LateEnable;
 use crate::late_flags::LateFlags;
 use crate::late_line::LateLine;
@@ -33,6 +33,8 @@ use crate::usb_host::SharedHost;
 
 /// The board's supply, mV.
 const SUPPLY_MV: u32 = 3300;
+/// The same while it sags, mV.
+const LOW_SUPPLY_MV: u32 = 2700;
 /// Temperature of the part, hundredths of a degree Celsius.
 const TEMPERATURE: i32 = 6_000;
 
@@ -75,6 +77,8 @@ pub struct Chip {
     pub mdma: Mdma,
     /// The registers of an MPU that is not enforced.
     pub mpu: Option<Mpu>,
+    faults: Faults,
+    is_supply_low: bool,
     crc: Crc,
     crs: Crs,
     flash: Flash,
@@ -158,6 +162,8 @@ impl Chip {
             late: LateLine::default(),
             late_flags,
             late_enable: LateEnable::new(seed),
+            faults,
+            is_supply_low: false,
             crc: Crc::default(),
             crs: Crs::default(),
             mpu,
@@ -238,10 +244,20 @@ impl Chip {
     /// Handles the effects of an access: on the camera's control bus, on lines that fall late, and
     /// on blocks of the MDMA that ended.
     pub fn settle(&mut self, at: VirtualNanos, memory: &mut dyn Memory) {
+        self.sag(at);
         self.mdma.settle(memory);
         self.control_bus.settle(&mut self.part, at);
         self.late.settle(&mut self.part, at);
         self.late_flags.settle(&mut self.part, at);
+    }
+
+    /// Sets the supply, which a fault lowers.
+    fn sag(&mut self, at: VirtualNanos) {
+        let is_low = self.faults.on(Kind::SupplyLow, at.0);
+        if is_low != std::mem::replace(&mut self.is_supply_low, is_low) {
+            let supply = if is_low { LOW_SUPPLY_MV } else { SUPPLY_MV };
+            self.part.set_supply(supply);
+        }
     }
 
     /// Handles an access by the core: a read or a write.

@@ -47,6 +47,8 @@ pub enum Kind {
     UsbStaleSuspend,
     /// The USB core sends no bulk or interrupt packet any more until it disconnects.
     UsbStuck,
+    /// The board's supply sags to 2.7 V, at which the microcontroller still runs.
+    SupplyLow,
 }
 
 const NAMES: [(&str, Kind); 18] = [
@@ -68,6 +70,7 @@ const NAMES: [(&str, Kind); 18] = [
     ("cable-pulled", Kind::CablePulled),
     ("usb-stale-suspend", Kind::UsbStaleSuspend),
     ("usb-stuck", Kind::UsbStuck),
+    ("supply-low", Kind::SupplyLow),
 ];
 
 /// Longest time, ms: a thousand days.

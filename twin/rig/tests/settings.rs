@@ -383,3 +383,21 @@ fn a_rest_position_that_is_none_is_refused_and_nothing_changes() {
     let last = run.samples().last().unwrap().status;
     assert!(last.contains(Status::TARE_MISSING), "{last:?}");
 }
+
+/// What is written while the supply falls may be torn: it is refused. A sector whose word was
+/// refused is erased before the next one.
+#[test]
+fn nothing_is_written_while_the_supply_is_low() {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("flash");
+    let only_name = Selection {
+        name: true,
+        ..Selection::NONE
+    };
+    let low = naming(&flash, "thumb", 1_800).fault("supply-low@180-200");
+    let low = low.at(300, send(KEEP + 1, Request::Keep(only_name)));
+    let run = low.run();
+    assert_eq!(run.outcome(KEEP), Outcome::Worn);
+    assert_eq!(run.outcome(KEEP + 1), Outcome::Done, "the supply is back");
+    assert_eq!(run.settings().name, name("thumb"));
+}
