@@ -51,7 +51,7 @@ pub enum Kind {
     SupplyLow,
 }
 
-const NAMES: [(&str, Kind); 18] = [
+const NAMES: [(&str, Kind); 19] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),

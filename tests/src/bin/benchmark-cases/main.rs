@@ -4,6 +4,7 @@
 //! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
 //! board can hold of them it writes as `board.rs`, too, for `tests/board`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
@@ -37,6 +38,8 @@ const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
 
 /// Columns of the largest frames that fit a board's flash beside everything else.
 const WIDEST_ON_BOARD: u16 = 320;
+/// Most bytes of a file in the second bank.
+const LARGEST_IN_SECOND_BANK: usize = 200_000;
 
 fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
@@ -47,7 +50,7 @@ fn main() -> Result<()> {
     let cases = cases()?;
     for (number, case) in cases.iter().enumerate() {
         println!("{}", case.write(&folder, number)?);
-        board.add(&folder, number, case)?;
+        board.add(&folder, case)?;
     }
     write(&folder.join("board.rs"), board.source().as_bytes())
 }
@@ -219,53 +222,74 @@ fn stepping(steps: u8) -> Result<Case> {
 /// Rust source that includes what a board can hold, and the files that it includes.
 #[derive(Default)]
 struct Board {
+    /// The files, each once, and the names of their statics.
+    files: BTreeMap<Vec<u8>, String>,
+    statics: String,
     frames: String,
     networks: String,
 }
 
 impl Board {
-    fn add(&mut self, folder: &Path, number: usize, case: &Case) -> Result<()> {
-        let file = |name: &str| folder.join(format!("{number}.{name}"));
-        let (model, pixels) = (file("model"), file("rgb565"));
+    fn add(&mut self, folder: &Path, case: &Case) -> Result<()> {
         match &case.work {
-            Work::Steps(..) | Work::Table => return Ok(()),
-            // The board's program measures single frames.
-            Work::Frame { before, .. } if !before.is_empty() => return Ok(()),
-            Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => return Ok(()),
-            // The board's program reads RGB565.
-            Work::Frame { .. } if case.format != PixelFormat::Rgb565 => return Ok(()),
+            Work::Steps(..) | Work::Table => {}
+            // The board's program measures single frames of RGB565.
+            Work::Frame { before, .. } if !before.is_empty() => {}
+            Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => {}
+            Work::Frame { .. } if case.format != PixelFormat::Rgb565 => {}
             Work::Frame {
-                special,
-                pixels: frame,
-                ..
+                special, pixels, ..
             } => {
-                let swapped = frame.iter().flat_map(|pixel| pixel.to_be_bytes());
-                write(&pixels, &swapped.collect::<Vec<_>>())?;
-                let size = case.size;
+                let swapped: Vec<u8> = pixels.iter().flat_map(|it| it.to_be_bytes()).collect();
+                let (size, pixels) = (case.size, self.file(folder, &swapped)?);
+                let model = self.file(folder, &case.model)?;
                 self.frames += &format!(
-                    "Frame {{ size: {size:?}, special: {special:?}, pixels: {{\n\
-                     #[unsafe(link_section = \".bank2\")]\n\
-                     static PIXELS: [u8; include_bytes!({pixels:?}).len()] = \
-                     *include_bytes!({pixels:?});\n&PIXELS }}, \
-                     model: &AlignedFile(*include_bytes!({model:?})).0 }},\n"
+                    "Frame {{ size: {size:?}, special: {special:?}, pixels: &{pixels}.0, model: \
+                     &{model}.0 }},\n"
                 );
             }
             Work::Network(widths) => {
                 let widths: Vec<String> = widths.iter().map(u16::to_string).collect();
-                let name = widths.join("-");
-                self.networks += &format!(
-                    "Network {{ name: {name:?}, model: &AlignedFile(*include_bytes!({model:?})).0 \
-                     }},\n"
-                );
+                let (name, model) = (widths.join("-"), self.file(folder, &case.model)?);
+                self.networks += &format!("Network {{ name: {name:?}, model: &{model}.0 }},\n");
             }
         }
-        write(&model, &case.model)
+        Ok(())
+    }
+
+    /// Writes a file, if it is new; returns the name of the static that includes it.
+    fn file(&mut self, folder: &Path, bytes: &[u8]) -> Result<String> {
+        if let Some(name) = self.files.get(bytes) {
+            return Ok(name.clone());
+        }
+        let number = self.files.len();
+        let (file, name) = (
+            folder.join(format!("{number}.board")),
+            format!("FILE_{number}"),
+        );
+        write(&file, bytes)?;
+        // The first bank has the code, and room for one large model.
+        let section = match bytes.len() {
+            ..=LARGEST_IN_SECOND_BANK => "#[unsafe(link_section = \".bank2\")]\n",
+            _ => "",
+        };
+        self.statics += &format!(
+            "{section}static {name}: AlignedFile<[u8; include_bytes!({file:?}).len()]> = \
+             AlignedFile(*include_bytes!({file:?}));\n"
+        );
+        self.files.insert(bytes.to_vec(), name.clone());
+        Ok(name)
     }
 
     fn source(&self) -> String {
-        let Board { frames, networks } = self;
+        let Board {
+            statics,
+            frames,
+            networks,
+            ..
+        } = self;
         format!(
-            "/// What is measured.\npub static FRAMES: &[Frame] = &[\n{frames}];\n\n\
+            "{statics}\n/// What is measured.\npub static FRAMES: &[Frame] = &[\n{frames}];\n\n\
              /// What is measured by itself.\npub static NETWORKS: &[Network] = &[\n{networks}];\n"
         )
     }
