@@ -29,8 +29,8 @@ static AT_START: AtomicU32 = AtomicU32::new(0);
 /// by the memory task.
 static CAMERA_PROBLEM: AtomicU32 = AtomicU32::new(0);
 
-/// Highest temperature of the junction, where the sensor is, hundredths of a degree: 20 °C below the
-/// absolute maximum of 125 °C (DS12110 Rev. 5, table 22), as the core runs at its highest voltage.
+/// Highest temperature of the junction, where the sensor is, hundredths of a degree: 20 °C below
+/// the absolute maximum of 125 °C (DS12110 Rev. 5, table 22), as the core has its highest voltage.
 const HOTTEST: i16 = 10_500;
 
 /// A clock is wrong if frames are longer or shorter than one part in this many. Crystals differ by

@@ -169,8 +169,8 @@ impl Camera {
         Ok(())
     }
 
-    /// Returns whether the automatic control rests at a level with these values: the picture is well
-    /// exposed, or nothing is left to change.
+    /// Returns whether the automatic control rests at a level with these values: the picture is
+    /// well exposed, or nothing is left to change.
     fn is_settled(&self, level: u8, [gain, low, high]: [u8; 3]) -> bool {
         let automatic = self.automatic();
         let lines = u16::from_le_bytes([low, high]);

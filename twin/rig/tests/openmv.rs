@@ -112,7 +112,7 @@ fn a_camera_with_another_version_is_refused() {
 
 #[test]
 fn an_absent_camera_is_reported_and_found_later() {
-    let run = openmv(1_300).fault("camera-absent@0-700").run();
+    let run = openmv(1_340).fault("camera-absent@0-700").run();
     assert!(run.log().contains("no MT9V034"), "{}", run.log());
     assert!(run.samples().len() >= 6, "{:?}", run.stats());
 }
