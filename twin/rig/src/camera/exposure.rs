@@ -193,7 +193,7 @@ mod tests {
             registers.write(address, value);
         }
         let lights = lights_of(&mut registers, 120, true);
-        assert!(lights[2] == lights[1] && lights[30] < 0.7, "{lights:?}");
+        assert!(lights[2] == lights[1] && lights[16] < 0.7, "{lights:?}");
         assert!((0.7..0.8).contains(&lights[119]), "{lights:?}");
         assert!((100..=106).contains(&registers.get(reg::YAVE)));
     }
