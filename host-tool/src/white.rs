@@ -29,6 +29,9 @@ const EXPONENT: f64 = 0.75;
 /// the sun to a lamp at home, have 64 to 96 and 88 to 150.
 const REDS: RangeInclusive<f64> = 64.0..=128.0;
 const BLUES: RangeInclusive<f64> = 64.0..=192.0;
+/// Changes of a colour's part of green below this are noise. Gains change while the card is not
+/// white: by a twentieth and more.
+const UNCHANGED: f64 = 0.004;
 /// Largest standard deviation of an even surface's brightness, as a part of it.
 const MOST_UNEVEN: f64 = 0.1;
 
@@ -87,6 +90,7 @@ fn set(link: &mut Link, patience: Duration, settings: CameraSettings) -> Result<
 /// Changes the gains from picture to picture until the card is white.
 fn find(link: &mut Link, patience: Duration, before: CameraSettings) -> Result<White, Failure> {
     let mut white = before.white.unwrap_or_default();
+    let mut last: Option<[f64; 3]> = None;
     for _ in 0..ROUNDS {
         let settings = CameraSettings {
             white: Some(white),
@@ -94,6 +98,13 @@ fn find(link: &mut Link, patience: Duration, before: CameraSettings) -> Result<W
         };
         set(link, patience, settings)?;
         let middle = Middle::of(&snapshot(link, patience)?.frame);
+        let colours = middle.mean.map(|level| level / middle.mean[1].max(1.0));
+        if last.is_some_and(|last| are_alike(last, colours)) {
+            let text = "the gains change nothing in the picture: this camera, such as a twin's, \
+                        has none";
+            return Err(Failure::new(Kind::Refused, text));
+        }
+        last = Some(colours);
         match next(&middle, white).map_err(|what| refuse(&middle, &what))? {
             None => return Ok(white),
             Some(next) => white = next,
@@ -101,6 +112,14 @@ fn find(link: &mut Link, patience: Duration, before: CameraSettings) -> Result<W
     }
     let text = format!("the card was not white after {ROUNDS} pictures: does the light change?");
     Err(Failure::new(Kind::NotRight, text))
+}
+
+/// Whether colours, relative to green, differ by less than any change of the gains makes.
+fn are_alike(these: [f64; 3], others: [f64; 3]) -> bool {
+    let pairs = these.into_iter().zip(others);
+    pairs
+        .into_iter()
+        .all(|(this, other)| (this - other).abs() < UNCHANGED)
 }
 
 fn refuse(middle: &Middle, what: &str) -> Failure {

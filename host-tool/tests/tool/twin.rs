@@ -392,12 +392,9 @@ fn what_cannot_be_simulated_is_said() {
 #[test]
 fn a_twin_has_no_loader() {
     let twin = Twin::of(&["--scene", "rest"]);
-    // The begin of a program for the device: its stack, then where it starts.
-    let program = [0x2000_9e00_u32, 0x0800_0301]
-        .map(u32::to_le_bytes)
-        .concat();
     let file = text(&twin.folder, "firmware.bin");
-    std::fs::write(&file, [program, vec![0; 4096]].concat()).unwrap();
+    let image = hivtac_image::examples::image("weact-h743", "1.2", 5_000, 1);
+    std::fs::write(&file, image.bytes()).unwrap();
     let refused = twin.run(&["update", "firmware", &file]);
     assert_eq!(refused.code, Some(6), "{refused:?}");
     assert!(

@@ -21,10 +21,17 @@ fn assert_good(run: &Run) {
     assert_forces(run, 0);
 }
 
-/// Asserts that samples have forces but for a twentieth, and one. Noise makes a frame in dozens
-/// `unexplained` where the light is not that of seed 1.
+/// Asserts that at most a fifth of the samples, and one, have no force. Where the light is not that
+/// of seed 1, rims have other colours until `hivtac white` was run, and some frames are
+/// `unexplained`.
 fn assert_good_in_other_light(run: &Run) {
-    assert_forces(run, 1 + run.samples().len() / 20);
+    let samples = run.samples();
+    let without = samples
+        .iter()
+        .filter(|sample| sample.force.is_none())
+        .count();
+    println!("{without} of {} samples have no force", samples.len());
+    assert_forces(run, 1 + samples.len() / 5);
 }
 
 fn assert_forces(run: &Run, missing: usize) {

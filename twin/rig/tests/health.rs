@@ -13,7 +13,7 @@ use hivtac_wire::message::{Outcome, Request};
 const ASKED: u16 = 40;
 const ASKED_MS: u64 = 200;
 /// The time is within the read-back of written registers.
-const FORGETS: &str = "camera-forgets@103";
+const FORGETS: &str = "camera-forgets@97";
 
 fn ask(request: Request, virtual_ms: u64) -> Setup {
     let asked = Action::Send(command(ASKED, request));

@@ -47,7 +47,7 @@ pub fn snapshots(run: &Run) -> Vec<Taken> {
 }
 
 /// Returns the camera's picture of that frame, byte for byte.
-fn shown(run: &Run, frame: u32) -> Vec<u8> {
+fn shown(run: &Run, scene: &str, frame: u32) -> Vec<u8> {
     let line = run.truth.iter().find(|line| line["frame"] == frame);
     let line = line.unwrap_or_else(|| panic!("frame {frame} was never exposed"));
     let number = |key: &str| line[key].as_f64().unwrap();
@@ -55,7 +55,7 @@ fn shown(run: &Run, frame: u32) -> Vec<u8> {
         exposure_s: number("exposure_s"),
         readout_s: number("readout_s"),
     };
-    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, 1).unwrap();
+    let scene = Scene::preset(scene, Preset::Ov7725, 320, 240, 1).unwrap();
     let exposure = line["exposure"].as_u64().unwrap();
     let pixels = scene.frame_by(&shutter, exposure, number("time_s")).pixels;
     pixels
@@ -65,9 +65,12 @@ fn shown(run: &Run, frame: u32) -> Vec<u8> {
 }
 
 /// Asserts that a snapshot is complete and equals the camera's picture.
-fn assert_shown(run: &Run, taken: &Taken) {
+fn assert_shown(run: &Run, scene: &str, taken: &Taken) {
     assert_eq!(taken.bytes.len(), 153_600);
-    assert!(taken.bytes == shown(run, taken.header.frame), "every byte");
+    assert!(
+        taken.bytes == shown(run, scene, taken.header.frame),
+        "every byte"
+    );
 }
 
 /// Returns the answers to a command.
@@ -81,7 +84,12 @@ fn outcomes(run: &Run, id: u16) -> Vec<Outcome> {
 /// snapshot are refused.
 #[test]
 fn a_frame_is_sent_as_it_was_shown_and_forces_go_on() {
-    let run = setup(440)
+    // A force that stays: another one needs other times for its steps.
+    let setup = Setup {
+        scene: "static",
+        ..setup(440)
+    };
+    let run = setup
         .at(ASKED_MS + 1, take(8))
         .at(ASKED_MS + 60, take(9))
         .run();
@@ -89,7 +97,7 @@ fn a_frame_is_sent_as_it_was_shown_and_forces_go_on() {
     assert_eq!(taken.len(), 1, "{}", run.log());
     let header = &taken[0].header;
     assert_eq!((header.width, header.height), (320, 240));
-    assert_shown(&run, &taken[0]);
+    assert_shown(&run, "static", &taken[0]);
     assert_eq!(outcomes(&run, ID), [Outcome::Done]);
     assert_eq!(outcomes(&run, 8), [Outcome::Busy]);
     assert_eq!(outcomes(&run, 9), [Outcome::Busy]);
@@ -137,7 +145,7 @@ fn an_overrun_costs_a_frame_and_a_busy_bus_nothing() {
     assert_eq!(run.report.dcmi.overruns, 1);
     let taken = snapshots(&run);
     assert_eq!(taken.len(), 1);
-    assert_shown(&run, &taken[0]);
+    assert_shown(&run, "demo", &taken[0]);
     assert_eq!(run.frames_after_a_loss(), [taken[0].header.frame]);
     assert_eq!(run.missing_frames().len(), 1);
 }
@@ -162,7 +170,7 @@ fn a_host_that_does_not_read_ends_it() {
     assert_eq!(taken.len(), 2);
     assert!(taken[0].bytes.len() < 153_600);
     assert_eq!(outcomes(&run, ID), [Outcome::NotRead]);
-    assert_shown(&run, &taken[1]);
+    assert_shown(&run, "demo", &taken[1]);
     assert_eq!(outcomes(&run, 8), [Outcome::Done]);
     let after = |sample: &&&hivtac_wire::message::Sample| sample.time_us > 450_000;
     assert!(run.samples().iter().filter(after).count() > 20);
@@ -193,7 +201,7 @@ fn a_new_conversation_ends_it_and_can_have_its_own() {
         "{:?}",
         after[1]
     );
-    assert_shown(&run, &taken[1]);
+    assert_shown(&run, "demo", &taken[1]);
     assert_eq!(outcomes(&run, 8), [Outcome::Done]);
 }
 
@@ -210,7 +218,7 @@ fn a_pulled_cable_ends_it() {
     let taken = snapshots(&run);
     assert_eq!(taken.len(), 2);
     assert!(taken[0].bytes.len() < 153_600);
-    assert_shown(&run, &taken[1]);
+    assert_shown(&run, "demo", &taken[1]);
     assert_eq!(outcomes(&run, 8), [Outcome::Done]);
     assert_eq!(run.report.resets, 0);
     let dropped = run
