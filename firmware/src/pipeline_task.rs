@@ -150,6 +150,10 @@ impl PipelineTask {
         stats::DROPPED_OVERRUN.add(tally.overrun);
         stats::DROPPED_SIZE.add(tally.size);
         stats::DROPPED_SETUP.add(tally.passed);
+        if tally.passed > 0 {
+            // Frames of a set-up are exposed otherwise.
+            self.sensor.forget_frame();
+        }
         if tally.overrun + tally.size > 0 {
             condition::set(Condition::NoForce);
         }

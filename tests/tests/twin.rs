@@ -21,7 +21,7 @@ use hivtac_wire::settings::SettingsReport;
 use hivtac_wire::version::HelloPrefix;
 use serde_json::Value;
 
-const SEED: u64 = 5;
+const SEED: u64 = 1;
 /// Samples that are compared.
 const SAMPLES: usize = 24;
 const PATIENCE: Duration = Duration::from_secs(TIMEOUT_S as u64);

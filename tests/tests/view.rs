@@ -80,7 +80,7 @@ impl Drop for View {
 
 fn rig(link: &Path) -> Rig {
     let link = link.to_str().unwrap();
-    Rig::start(&["--scene", "demo", "--seed", "5", "--pty-link", link]).unwrap()
+    Rig::start(&["--scene", "demo", "--seed", "1", "--pty-link", link]).unwrap()
 }
 
 /// Returns the folder for screenshots; `None` if none are wanted.
