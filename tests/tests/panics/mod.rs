@@ -107,7 +107,7 @@ const REASONS: [(&str, usize, &str); 19] = [
     ),
     (
         "embassy_stm32",
-        58,
+        66,
         "clocks, pins and timings that are constants, at the start; the time driver's cells, in \
          a critical section and so never borrowed twice",
     ),
