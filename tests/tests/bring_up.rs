@@ -119,6 +119,7 @@ fn a_register_that_the_camera_forgot_is_named() {
 /// In a light that is not that of the first gains, `white` finds the camera's own, and bring-up
 /// finds the white right.
 #[test]
+#[ignore = "slow: ten pictures and a whole bring-up"]
 fn white_is_made_white() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("report.json");

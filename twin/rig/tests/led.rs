@@ -134,6 +134,7 @@ fn shown(setup: Setup) -> Pattern {
 }
 
 #[test]
+#[ignore = "20 s: 4 s of virtual time"]
 fn it_breathes_while_frames_give_forces() {
     shown(openmv(4_300)).assert_is(&Pattern::Breathes(4.0), 0.1);
 }
@@ -155,6 +156,7 @@ fn it_blinks_five_times_a_second_without_a_camera() {
 
 /// The kept settings have another version, which the start detects, while frames give forces.
 #[test]
+#[ignore = "20 s: 4 s of virtual time"]
 fn it_flashes_three_times_when_the_self_test_found_something() {
     let device = Device::new();
     of_another_version(&device.flash);
