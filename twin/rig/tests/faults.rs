@@ -30,7 +30,7 @@ fn a_camera_with_another_id_is_refused() {
 /// clocks free it.
 #[test]
 fn a_camera_that_holds_sda_is_freed() {
-    let run = Setup::new(firmware(), 240).fault("sda-stuck").run();
+    let run = Setup::new(firmware(), 280).fault("sda-stuck").run();
     assert!(run.samples().len() >= 3, "{}", run.log());
     assert_eq!(run.report.resets, 0);
 }
