@@ -3,7 +3,8 @@
 use crate::output::note;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
-use hivtac_host::reply::{KEEP_PATIENCE, log_text};
+use hivtac_host::reply::{CAMERA_PATIENCE, KEEP_PATIENCE, log_text};
+use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::message::{DeviceMessage, Request};
 use hivtac_wire::settings::Selection;
 use std::time::Duration;
@@ -14,6 +15,19 @@ use std::time::Duration;
 /// When the device refuses or does not answer.
 pub fn keep(link: &mut Link, selection: Selection) -> Result<(), Failure> {
     send(link, Request::Keep(selection), KEEP_PATIENCE)
+}
+
+/// Sets the camera; waits at least as long as its search for exposure takes.
+///
+/// # Errors
+/// When the device refuses or does not answer.
+pub fn set_camera(
+    link: &mut Link,
+    settings: CameraSettings,
+    patience: Duration,
+) -> Result<(), Failure> {
+    let patience = patience.max(CAMERA_PATIENCE);
+    send(link, Request::SetCamera(settings), patience)
 }
 
 /// Sends a command and waits at most `wait` for its reply.

@@ -18,6 +18,7 @@ use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::{HsvBox, PixelFormat};
+use std::ops::Range;
 
 /// The model that is built into the firmware.
 static MODEL: &[u8] = include_bytes!("../../calibration/models/default.hvtm");
@@ -132,29 +133,25 @@ struct Tare {
 }
 
 /// Columns and rows of a picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 struct Region {
-    /// Its upper left pixel.
-    from: [u32; 2],
-    /// Width and height, at least 1.
-    size: [u16; 2],
+    columns: Range<u32>,
+    rows: Range<u32>,
 }
 
 impl Region {
-    fn contains(&self, at: [u16; 2]) -> bool {
-        (0..2).all(|axis| {
-            let (at, from) = (u32::from(at[axis]), self.from[axis]);
-            (from..from + u32::from(self.size[axis])).contains(&at)
-        })
+    fn contains(&self, column: u16, row: u16) -> bool {
+        self.columns.contains(&column.into()) && self.rows.contains(&row.into())
     }
 }
 
 fn region(text: &str) -> Result<Region, String> {
     let numbers: Result<Vec<u16>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    let range = |from: u16, length: u16| from.into()..u32::from(from) + u32::from(length);
     match numbers.as_deref() {
-        Ok([x, y, width @ (1..), height @ (1..)]) => Ok(Region {
-            from: [(*x).into(), (*y).into()],
-            size: [*width, *height],
+        Ok(&[x, y, width @ (1..), height @ (1..)]) => Ok(Region {
+            columns: range(x, width),
+            rows: range(y, height),
         }),
         _ => Err("four whole numbers, such as 40,20,240,200: left, top, width, height, px".into()),
     }
@@ -200,15 +197,18 @@ impl<'a> Bench<'a> {
         let mut picture = Picture::load(path, self.model.conditions.threshold.format())?;
         let size = [picture.width, picture.height];
         if let Some(region) = &self.arguments.region {
-            let Region { from, size: part } = *region;
-            let fits = (0..2).all(|axis| from[axis] + u32::from(part[axis]) <= size[axis].into());
-            if !fits {
+            let ends = [region.columns.end, region.rows.end];
+            if ends
+                .into_iter()
+                .zip(size)
+                .any(|(end, size)| end > size.into())
+            {
                 return Err(Failure::input(format!(
                     "--region goes beyond the picture {path} of {} × {} px",
                     size[0], size[1]
                 )));
             }
-            picture.hide(|x, y| region.contains([x, y]));
+            picture.hide(|x, y| region.contains(x, y));
         }
         if let Some(mask) = &self.mask {
             let mask_size = [mask.width, mask.height];

@@ -3,16 +3,14 @@
 use crate::bring_up::colours::{BRIGHTNESS, Middle};
 use crate::device::Target;
 use crate::output;
-use crate::request::send;
+use crate::request::{keep, set_camera};
 use crate::settings::ask;
 use crate::snapshot::snapshot;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
-use hivtac_host::reply::{CAMERA_PATIENCE, KEEP_PATIENCE};
 use hivtac_terms::camera::{CameraSettings, White};
 use hivtac_terms::threshold::PixelFormat;
-use hivtac_wire::message::Request;
 use hivtac_wire::settings::Selection;
 use serde_json::json;
 use std::ops::RangeInclusive;
@@ -62,15 +60,14 @@ pub fn run(arguments: &WhiteArguments) -> Result<(), Failure> {
     let before = ask(&mut link, device.timeout)?.camera.settings;
     let found = find(&mut link, device.timeout, before);
     if found.is_err() {
-        set(&mut link, device.timeout, before)?;
+        set_camera(&mut link, before, device.timeout)?;
     }
     let white = found?;
     let selection = Selection {
         camera: true,
         ..Selection::NONE
     };
-    let patience = device.timeout.max(KEEP_PATIENCE);
-    send(&mut link, Request::Keep(selection), patience)?;
+    keep(&mut link, selection)?;
     let line = format!(
         "white set and kept: {white}; put the film back, then `hivtac expose` and a new tare"
     );
@@ -82,11 +79,6 @@ pub fn run(arguments: &WhiteArguments) -> Result<(), Failure> {
     output::tell(*json, &line, &object)
 }
 
-fn set(link: &mut Link, patience: Duration, settings: CameraSettings) -> Result<(), Failure> {
-    let patience = patience.max(CAMERA_PATIENCE);
-    send(link, Request::SetCamera(settings), patience)
-}
-
 /// Changes the gains from picture to picture until the card is white.
 fn find(link: &mut Link, patience: Duration, before: CameraSettings) -> Result<White, Failure> {
     let mut white = before.white.unwrap_or_default();
@@ -96,7 +88,7 @@ fn find(link: &mut Link, patience: Duration, before: CameraSettings) -> Result<W
             white: Some(white),
             ..before
         };
-        set(link, patience, settings)?;
+        set_camera(link, settings, patience)?;
         let middle = Middle::of(&snapshot(link, patience)?.frame);
         let colours = middle.mean.map(|level| level / middle.mean[1].max(1.0));
         if last.is_some_and(|last| are_alike(last, colours)) {

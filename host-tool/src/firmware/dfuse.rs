@@ -116,7 +116,7 @@ impl<Io: Usb> Loader<Io> {
         self.command(ERASE, sector)
     }
 
-    /// Writes bytes to blank flash; `each` gets the count of each block that was written.
+    /// Writes bytes to blank flash; `each` is called after each block.
     ///
     /// # Errors
     /// If the loader refuses, or is gone; those of `each`.
@@ -124,7 +124,7 @@ impl<Io: Usb> Loader<Io> {
         &self,
         mut address: u32,
         bytes: &[u8],
-        mut each: impl FnMut(usize) -> Result<(), E>,
+        mut each: impl FnMut() -> Result<(), E>,
     ) -> Result<(), E> {
         for block in bytes.chunks(self.block_bytes) {
             // Before each block, as other tools do: no loader's counting of blocks matters.
@@ -132,7 +132,7 @@ impl<Io: Usb> Loader<Io> {
             self.download(FIRST_BLOCK, block)?;
             self.settle()?;
             address += block.len() as u32;
-            each(block.len())?;
+            each()?;
         }
         Ok(())
     }

@@ -35,43 +35,34 @@ pub fn write<Io: Usb>(
     let parts = image
         .parts(&found)
         .map_err(|why| Failure::input(format!("the device in its loader is another one: {why}")))?;
-    let mut written = 0;
-    for part in &parts {
-        let is_first_stage = part.address == FIRST_STAGE;
-        if is_first_stage {
-            tell(Progress::FirstStage);
-        }
-        fill(&loader, part, &mut |bytes| written += bytes)?;
-        if is_first_stage {
-            verify(&loader, part)?;
-            written = 0;
-        } else {
-            tell(Progress::Written(written, image.program().len()));
-        }
+    let is_first_stage = |part: &Part<'_>| part.address == FIRST_STAGE;
+    let (first_stage, program): (Vec<_>, Vec<_>) = parts.into_iter().partition(is_first_stage);
+    for part in &first_stage {
+        tell(Progress::FirstStage);
+        fill(&loader, part)?;
+        verify(&loader, part)?;
     }
-    let program = parts.iter().filter(|part| part.address != FIRST_STAGE);
-    program
-        .into_iter()
-        .try_for_each(|part| verify(&loader, part))?;
+    let mut written = 0;
+    for part in &program {
+        fill(&loader, part)?;
+        written += part.bytes.len();
+        tell(Progress::Written(written, image.program().len()));
+    }
+    for part in &program {
+        verify(&loader, part)?;
+    }
     tell(Progress::ReadBack);
     let left = loader.leave(FIRST_STAGE);
     left.map_err(|why| broken("starting the program".to_owned(), why))
 }
 
 /// Erases a sector, and writes these bytes to its begin.
-fn fill<Io: Usb>(
-    loader: &Loader<Io>,
-    part: &Part<'_>,
-    each: &mut dyn FnMut(usize),
-) -> Result<(), Failure> {
+fn fill<Io: Usb>(loader: &Loader<Io>, part: &Part<'_>) -> Result<(), Failure> {
     let sector = part.address;
     stop::check().map_err(interrupted)?;
     let erased = loader.erase(sector);
     erased.map_err(|why| broken(format!("erasing at {sector:#010x}"), why))?;
-    let written = loader.write(sector, part.bytes, |bytes| {
-        each(bytes);
-        stop::check().map_err(Stopped::Asked)
-    });
+    let written = loader.write(sector, part.bytes, || stop::check().map_err(Stopped::Asked));
     written.map_err(|stopped| match stopped {
         Stopped::Asked(failure) => interrupted(failure),
         Stopped::Broken(why) => broken(format!("writing at {sector:#010x}"), why),

@@ -6,13 +6,13 @@ use super::name::name;
 use super::temporal::{self, Change};
 use crate::device::Target;
 use crate::output::{self, note};
-use crate::request::{keep, send, show_log};
+use crate::request::{keep, send, set_camera, show_log};
 use hivtac_host::contact_shape::text as text_of_shape;
 use hivtac_host::down::text as text_of_down;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
-use hivtac_host::reply::{CAMERA_PATIENCE, KEEP_PATIENCE};
+use hivtac_host::reply::KEEP_PATIENCE;
 use hivtac_host::shown::shown;
 use hivtac_host::threshold::text;
 use hivtac_terms::camera::CameraSettings;
@@ -71,11 +71,6 @@ impl Conversation {
         send(&mut self.link, request, self.patience)
     }
 
-    fn send_camera(&mut self, settings: CameraSettings) -> Result<(), Failure> {
-        let patience = self.patience.max(CAMERA_PATIENCE);
-        send(&mut self.link, Request::SetCamera(settings), patience)
-    }
-
     fn tell(&self, line: &str, object: Value) -> Result<(), Failure> {
         output::tell(self.json, line, &object)
     }
@@ -122,7 +117,7 @@ impl Conversation {
         let settings = change
             .of(&self.settings()?.camera)
             .map_err(|error| Failure::new(Kind::Input, format!("{error}; nothing was changed")))?;
-        self.send_camera(settings)?;
+        set_camera(&mut self.link, settings, self.patience)?;
         let selection = Selection {
             camera: true,
             ..Selection::NONE
@@ -230,7 +225,7 @@ impl Conversation {
                 .map_err(unkept)?;
         }
         if file.camera() != camera {
-            self.send_camera(file.camera()).map_err(unkept)?;
+            set_camera(&mut self.link, file.camera(), self.patience).map_err(unkept)?;
         }
         self.link.set_down(file.down()).map_err(unkept)?;
         self.send(Request::SetTare(tare)).map_err(unkept)?;
