@@ -5,7 +5,7 @@
 //! normal, non-cacheable memory. So no cache line can hold a stale pixel, and no code has to
 //! invalidate one. DTCM is never cached.
 
-use crate::flash;
+use crate::{flash, seeded_bugs};
 use cortex_m::Peripherals;
 use cortex_m::peripheral::MPU;
 
@@ -120,6 +120,9 @@ fn set_regions(mpu: &mut MPU) {
     unsafe {
         mpu.ctrl.write(0);
         for (number, region) in (0..).zip(REGIONS) {
+            if is_left_out(number) {
+                continue;
+            }
             mpu.rnr.write(number);
             mpu.rbar.write(region.base);
             mpu.rasr.write(region.attributes());
@@ -128,6 +131,15 @@ fn set_regions(mpu: &mut MPU) {
     }
     cortex_m::asm::dsb();
     cortex_m::asm::isb();
+}
+
+/// Returns whether a seeded bug leaves a region out.
+fn is_left_out(number: u32) -> bool {
+    match number {
+        0 => seeded_bugs::allows_external_memory(),
+        2 => seeded_bugs::caches_dma_buffers(),
+        _ => false,
+    }
 }
 
 impl Region {

@@ -10,6 +10,7 @@
 //! | 5 | USB tasks | answer the host while a frame is being processed |
 //! | thread | processing, health | takes milliseconds and may be interrupted by all above |
 
+use crate::seeded_bugs;
 use embassy_stm32::interrupt::{self, InterruptExt, Priority};
 
 /// Interrupt whose vector runs the capture executor. The UART itself is not used.
@@ -22,7 +23,11 @@ pub const CAPTURE: Priority = Priority::P1;
 
 /// Sets every other priority. Call once, before any of these interrupts is enabled.
 pub fn set() {
-    interrupt::EXTI9_5.set_priority(Priority::P0);
+    interrupt::EXTI9_5.set_priority(if seeded_bugs::lowers_vsync() {
+        Priority::P4
+    } else {
+        Priority::P0
+    });
     interrupt::TIM2.set_priority(Priority::P2);
     CAPTURE_EXECUTOR.set_priority(Priority::P3);
     interrupt::OTG_FS.set_priority(Priority::P4);

@@ -12,6 +12,11 @@ enum Bug {
     CameraRegister = 3,
     HalfBands = 4,
     UsbClock = 5,
+    CacheableBuffers = 6,
+    ExternalMemory = 7,
+    FlashErrors = 8,
+    VsyncPriority = 9,
+    KeptToggles = 10,
 }
 
 #[cfg(not(feature = "seeded-bugs"))]
@@ -58,3 +63,29 @@ pub fn band_divisor() -> u16 {
 pub fn usb_from_hsi48() -> bool {
     is_chosen(Bug::UsbClock)
 }
+
+/// True if the DMA's buffers stay cacheable, as all SRAM is without their region.
+pub fn caches_dma_buffers() -> bool {
+    is_chosen(Bug::CacheableBuffers)
+}
+
+/// True if the region that forbids external memory is missing.
+pub fn allows_external_memory() -> bool {
+    is_chosen(Bug::ExternalMemory)
+}
+
+/// True if errors of flash operations are ignored.
+pub fn ignores_flash_errors() -> bool {
+    is_chosen(Bug::FlashErrors)
+}
+
+/// True if USB's handler may delay the stamp of a VSYNC edge.
+pub fn lowers_vsync() -> bool {
+    is_chosen(Bug::VsyncPriority)
+}
+
+/// True if endpoints keep their data toggles when a host configures the device anew.
+pub fn keeps_toggles() -> bool {
+    is_chosen(Bug::KeptToggles)
+}
+

@@ -6,7 +6,7 @@
 //! part's own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
-use rigless::emulator::{Access, Memory};
+use rigless::emulator::{Access, AccessKind, Memory};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
 use rigless::soc::stm32h743::generated::dbgmcu;
@@ -20,7 +20,7 @@ use crate::dma_requests;
 use crate::faults::{Faults, Kind};
 use crate::late_enable::LateEnable;
 use crate::late_flags::LateFlags;
-use crate::late_line::LateLine;
+use crate::late_line::{self, LateLine};
 use crate::mpu::{Mpu, Protection};
 use crate::peripherals::crc::Crc;
 use crate::peripherals::crs::Crs;
@@ -102,6 +102,9 @@ pub struct Chip {
     crs_slot: usize,
     flash_slot: usize,
     vsync: Level,
+    /// Time of its last change, and the longest time from one to its handler, ns.
+    vsync_at_ns: u64,
+    latest_stamp_ns: u64,
     wiring: Wiring,
 }
 
@@ -130,8 +133,9 @@ impl Chip {
         part.adc[2].set_temperature(TEMPERATURE);
         let mpu = match protection {
             Protection::Enforced => None,
-            Protection::Ignored => Some(Mpu::fit(part.bus_mut())?),
+            Protection::Ignored => Some(Mpu::fit(part.bus_mut(), rules.clone())?),
         };
+        let types = mpu.as_ref().map(|mpu| mpu.types().clone());
         let kind = camera.lock().kind();
         match kind {
             part::Kind::Ov7725 => part.i2c[0].attach(Sccb::new(camera.clone())),
@@ -152,8 +156,8 @@ impl Chip {
             dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone(), seed),
             control_bus: ControlBus::new(faults.clone(), slots.vsync_port(), i2c_slot),
             held_bus: HeldBus,
-            mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), seed),
-            flash: Flash::new(bank, rules.clone()),
+            mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), types, seed),
+            flash: Flash::new(bank, rules.clone(), faults.clone()),
             flash_slot,
             rules,
             board,
@@ -178,6 +182,8 @@ impl Chip {
             crc_slot,
             crs_slot,
             vsync: Level::Low,
+            vsync_at_ns: 0,
+            latest_stamp_ns: 0,
             wiring: Wiring::default(),
         };
         chip.identify();
@@ -212,6 +218,11 @@ impl Chip {
     /// Returns the count of words that the firmware wrote into full USB FIFOs.
     pub fn lost_usb_words(&self) -> u64 {
         self.core.lock().lost_words
+    }
+
+    /// Returns the longest time from an edge of VSYNC to the handler that stamps it, ns.
+    pub fn latest_stamp_ns(&self) -> u64 {
+        self.latest_stamp_ns
     }
 
     /// Reads the pins and clocks again, and passes on the changes.
@@ -262,6 +273,10 @@ impl Chip {
 
     /// Handles an access by the core: a read or a write.
     pub fn accessed(&mut self, access: &Access, value: u64) {
+        if access.kind == AccessKind::Write && access.address == late_line::CLEAR {
+            let taken_ns = access.virtual_time.0 - self.vsync_at_ns;
+            self.latest_stamp_ns = self.latest_stamp_ns.max(taken_ns);
+        }
         self.late.accessed(access, value);
         self.late_flags.accessed(&mut self.part, access, value);
         self.late_enable.accessed(&mut self.part, access, value);
@@ -270,7 +285,7 @@ impl Chip {
     /// Sets the pin of VSYNC to the line's level.
     fn drive_vsync(&mut self, at: VirtualNanos) {
         if self.dcmi.vsync() != self.vsync {
-            self.vsync = self.dcmi.vsync();
+            (self.vsync, self.vsync_at_ns) = (self.dcmi.vsync(), at.0);
             let level = Some(self.vsync);
             self.part
                 .drive_port(at, board::VSYNC_PORT, |port, registers, context| {

@@ -6,6 +6,7 @@
 
 use rigless::device::RegisterFile;
 
+use crate::memory_types::MemoryTypes;
 use crate::rules::Rules;
 
 /// Memory out of the DMA controllers' reach: name, start, bytes.
@@ -19,6 +20,9 @@ const STREAM: u64 = 0x18;
 /// DMA_SxCR bits.
 const ENABLE: u64 = 1;
 const DOUBLE_BUFFER: u64 = 1 << 18;
+/// First bits of MSIZE, log2 of a word's bytes, and of DIR, 1 for memory to peripheral.
+const MEMORY_SIZE: u32 = 13;
+const DIRECTION: u32 = 6;
 
 /// The registers of one stream, in rows of the vendor's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,16 +46,17 @@ pub fn enabled_stream(address: u64, value: u64) -> Option<Stream> {
     })
 }
 
+/// Returns the value of a stream's register at an offset.
+fn value_at(stream: Stream, offset: u64, registers: &[(u64, u64)]) -> u64 {
+    let offset = FIRST_STREAM + stream.number * STREAM + offset;
+    let mut had = registers.iter().filter(|(had, _)| *had == offset);
+    had.next().map_or(0, |(_, value)| *value)
+}
+
 /// Notes a breach if a stream's memory addresses are out of reach. `registers` are those of its
 /// controller; `control` is the value written to its control register.
 pub fn check(stream: Stream, control: u64, registers: &[(u64, u64)], rules: &Rules) {
-    let at = |offset: u64| {
-        let offset = FIRST_STREAM + stream.number * STREAM + offset;
-        registers
-            .iter()
-            .find(|(had, _)| *had == offset)
-            .map_or(0, |(_, value)| *value)
-    };
+    let at = |offset: u64| value_at(stream, offset, registers);
     let second = (control & DOUBLE_BUFFER != 0).then(|| ("M1AR", at(0x10)));
     let addresses = [Some(("PAR", at(0x08))), Some(("M0AR", at(0x0C))), second];
     for (register, address) in addresses.into_iter().flatten() {
@@ -68,6 +73,29 @@ pub fn check(stream: Stream, control: u64, registers: &[(u64, u64)], rules: &Rul
                 )
             });
         }
+    }
+}
+
+/// Notes a breach if a stream's memory is cacheable.
+pub fn check_types(
+    stream: Stream,
+    control: u64,
+    registers: &[(u64, u64)],
+    types: &MemoryTypes,
+    rules: &Rules,
+) {
+    let Stream { controller, number } = stream;
+    let name = format!("{controller} stream {number}");
+    let bytes = value_at(stream, 0x04, registers) << (control >> MEMORY_SIZE & 3);
+    let is_to_memory = control >> DIRECTION & 3 != 1;
+    let second = (control & DOUBLE_BUFFER != 0).then_some(0x10);
+    for offset in [Some(0x0C), second].into_iter().flatten() {
+        let memory = Some((value_at(stream, offset, registers), bytes));
+        let (source, target) = match is_to_memory {
+            true => (None, memory),
+            false => (memory, None),
+        };
+        types.check_dma(&name, source, target, rules);
     }
 }
 

@@ -47,11 +47,15 @@ pub enum Kind {
     UsbStaleSuspend,
     /// The USB core sends no bulk or interrupt packet any more until it disconnects.
     UsbStuck,
+    /// Operations of the flash's second bank that begin while the fault is on end with an error. A
+    /// word that was to be programmed is unreadable; a sector that was to be erased looks blank and
+    /// is not.
+    FlashFails,
     /// The board's supply sags to 2.7 V, at which the microcontroller still runs.
     SupplyLow,
 }
 
-const NAMES: [(&str, Kind); 19] = [
+const NAMES: [(&str, Kind); 20] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),
@@ -70,6 +74,7 @@ const NAMES: [(&str, Kind); 19] = [
     ("cable-pulled", Kind::CablePulled),
     ("usb-stale-suspend", Kind::UsbStaleSuspend),
     ("usb-stuck", Kind::UsbStuck),
+    ("flash-fails", Kind::FlashFails),
     ("supply-low", Kind::SupplyLow),
 ];
 

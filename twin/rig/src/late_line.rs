@@ -15,7 +15,7 @@ use rigless::time::VirtualNanos;
 const EXTI: std::ops::Range<u64> = 0x5800_0000..0x5800_0400;
 /// EXTI_SWIER1, which raises a line as its edge does, and EXTI_CPUPR1, which clears it.
 const RAISE: u64 = 0x5800_0008;
-const CLEAR: u64 = 0x5800_0088;
+pub const CLEAR: u64 = 0x5800_0088;
 /// Delay of the line's fall after the write: more than a handler takes from the write to its end,
 /// less than a line of a frame.
 const LATE_NS: u64 = 10_000;

@@ -16,7 +16,7 @@
 //! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM and clock recovery |
 //! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`usb_host`], [`link`], [`script`] | the host; who uses its serial port |
-//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], `start_rules` | what goes wrong on request; what firmware must not do |
+//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules` | what goes wrong on request; what firmware must not do |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
 pub mod arrivals;
@@ -35,6 +35,7 @@ mod late_flags;
 mod late_line;
 pub mod link;
 pub mod machine;
+pub mod memory_types;
 pub mod mpu;
 pub mod peripherals;
 pub mod report;

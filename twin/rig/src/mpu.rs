@@ -1,9 +1,9 @@
 //! The memory protection unit (MPU), enforced or ignored.
 //!
 //! While the emulator's core enforces it, every access of the program is checked against its
-//! regions, which takes most of a run's time. If it is ignored, this module has its registers: they
-//! store the program's values, and no access is checked. A program that stays within its own
-//! regions behaves the same in both cases, bit for bit.
+//! regions, which takes most of a run's time. If it is ignored, this module has its registers: no
+//! access of the program is checked, but memory types are ([`MemoryTypes`]). A program that stays
+//! within its own regions behaves the same in both cases, bit for bit.
 
 use std::num::NonZeroU64;
 use std::sync::Arc;
@@ -13,12 +13,19 @@ use rigless::device::{DeviceContext, ErasedDevice, RegisterFile, RequestChange};
 use rigless::soc::{Bus, Error, RegisterSpec, Width, Window};
 use rigless::time::EventId;
 
+use crate::memory_types::MemoryTypes;
+use crate::rules::Rules;
+
 /// Base address of its registers (ARMv7-M, B3.5.4).
 const BASE: u64 = 0xE000_ED90;
 const BYTES: NonZeroU64 = NonZeroU64::new(0x2C).expect("some");
 /// MPU_TYPE, and its value with 16 regions.
 const TYPE: u64 = 0;
 const SIXTEEN_REGIONS: u64 = 16 << 8;
+/// MPU_RNR, MPU_RBAR and MPU_RASR; the aliases of the latter two are not simulated.
+const NUMBER: u64 = 8;
+const BASE_ADDRESS: u64 = 0xC;
+const ATTRIBUTES: u64 = 0x10;
 /// MPU_CTRL, which has the bit that switches the unit on.
 const CTRL: u64 = 4;
 /// MPU_CTRL's address, for code that checks the core's own register.
@@ -42,6 +49,8 @@ pub struct Mpu {
     slot: usize,
     layout: &'static [RegisterSpec],
     is_on: Arc<AtomicBool>,
+    types: MemoryTypes,
+    rules: Rules,
 }
 
 impl Mpu {
@@ -49,18 +58,25 @@ impl Mpu {
     ///
     /// # Errors
     /// If the addresses are already taken.
-    pub fn fit(bus: &mut Bus) -> Result<Self, Error> {
+    pub fn fit(bus: &mut Bus, rules: Rules) -> Result<Self, Error> {
         let slot = bus.add_window(Window::new("MPU", BASE, BYTES))?;
         Ok(Self {
             slot,
             layout: bus.slots()[slot].peripheral().registers,
             is_on: Arc::default(),
+            types: MemoryTypes::default(),
+            rules,
         })
     }
 
     /// Returns their slot on the bus.
     pub fn slot(&self) -> usize {
         self.slot
+    }
+
+    /// Returns the memory types that its regions set.
+    pub fn types(&self) -> &MemoryTypes {
+        &self.types
     }
 
     /// Returns a flag that is set once the program has switched the unit on.
@@ -89,13 +105,22 @@ impl ErasedDevice for Mpu {
         value: u64,
         _context: &mut DeviceContext<'_>,
     ) {
-        if offset == CTRL {
-            self.is_on.store(value & ENABLE != 0, Ordering::Relaxed);
+        match offset {
+            CTRL => {
+                let on = value & ENABLE != 0;
+                self.is_on.store(on, Ordering::Relaxed);
+                self.types.switch(on, &self.rules);
+            }
+            NUMBER => self.types.select(value),
+            BASE_ADDRESS => self.types.set_base(value),
+            ATTRIBUTES => self.types.set_attributes(value),
+            _ => {}
         }
     }
 
     fn reset(&mut self) {
         self.is_on.store(false, Ordering::Relaxed);
+        self.types.reset();
     }
 
     // It has a window, no register of the part's, and no events.

@@ -22,6 +22,8 @@ pub struct Report {
     pub wall: Duration,
     /// Times of the LED's switches, on and off in turn, ns.
     pub led_edges_ns: Vec<u64>,
+    /// The longest time from an edge of VSYNC to its handler, ns.
+    pub latest_stamp_ns: u64,
     /// Resets of the microcontroller.
     pub resets: usize,
     /// VSYNC pulses of the sensor.
@@ -83,6 +85,7 @@ impl Report {
             wall,
             resets: session.resets().len(),
             led_edges_ns: chip.led_edges_ns().to_vec(),
+            latest_stamp_ns: chip.latest_stamp_ns(),
             exposures: camera.exposures(),
             sccb_writes: camera.sccb_writes(),
             camera_fault: camera.faulty_output().map(str::to_owned),

@@ -339,6 +339,9 @@ impl Conductor {
             let registers = session.board().chip.bus().registers(stream.controller);
             let registers = registers.map(dma_reach::values).unwrap_or_default();
             dma_reach::check(stream, value, &registers, &self.rules);
+            if let Some(mpu) = &session.board().chip.mpu {
+                dma_reach::check_types(stream, value, &registers, mpu.types(), &self.rules);
+            }
             if let Some(multiplexer) = session.board().chip.bus().registers("DMAMUX1") {
                 dma_requests::check(stream, multiplexer, &self.rules);
             }

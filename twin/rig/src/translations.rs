@@ -30,7 +30,7 @@ const CODE: [Range<u64>; 3] = [
 ];
 /// The largest number of kept cores: several programs, on as many threads as a computer for tests
 /// has.
-const MOST_KEPT: usize = 6;
+const MOST_KEPT: usize = 16;
 
 /// Makes the cores of a board keep their translations. `is_on` shows whether a program has switched
 /// the MPU on; it is needed if the core itself has no MPU to check.

@@ -1,9 +1,16 @@
 //! Tests with firmware that has a seeded bug. Each bug must fail in its own way, which shows that
 //! the rig detects it.
 
-use crate::common::{Bug, Run, Setup, other};
+use crate::common::{Bug, Run, Setup, command, hello, other};
+use hivtac_rig::peripherals::flash::{Contents, SECTOR_BYTES};
+use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
 use hivtac_terms::status::Status;
+use hivtac_wire::message::{Outcome, Request};
+use hivtac_wire::settings::Selection;
+
+/// Number of the command to keep settings.
+const KEEP: u16 = 40;
 
 fn run_with(bug: Bug) -> Run {
     Setup::new(other("seeded-bugs"), 280).run_with(bug)
@@ -84,6 +91,93 @@ fn with_an_untrimmed_oscillator_usb_never_enumerates() {
     let run = run_with(Bug::UsbClock);
     assert_eq!(run.report.port, Port::Enumerating);
     assert_eq!((run.report.usb.enumerations, run.bytes.len()), (0, 0));
+}
+
+/// Returns the message with which a run ends that breaks a rule.
+fn broken_rule(setup: Setup, bug: Bug) -> String {
+    let directory = tempfile::tempdir().unwrap();
+    let outcome = setup
+        .choosing(bug, directory.path())
+        .try_run(&directory.path().join("truth"));
+    outcome.map(drop).unwrap_err().to_string()
+}
+
+/// Without their region, DMA buffers are cacheable as all SRAM is: the core would see old pixels.
+#[test]
+fn cacheable_dma_buffers_end_the_run() {
+    let setup = Setup::new(other("seeded-bugs"), 200);
+    let message = broken_rule(setup, Bug::CacheableBuffers);
+    let expected = "DMA1 stream 0 moves bytes at 0x24";
+    assert!(message.contains(expected), "{message}");
+}
+
+/// The core may read memory that no board has ahead of the program, and then waits for ever.
+#[test]
+fn normal_memory_where_no_board_has_any_ends_the_run() {
+    let setup = Setup::new(other("seeded-bugs"), 200);
+    let message = broken_rule(setup, Bug::ExternalMemory);
+    let expected = "0x60000000 is normal memory";
+    assert!(message.contains(expected), "{message}");
+}
+
+/// Both sectors for settings have old data, and the first erase fails. A program that ignores this
+/// programs words that are not blank, which spoils them.
+#[test]
+fn an_erase_that_fails_is_noticed() {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("old");
+    let mut old = Contents::default();
+    old.array[..2 * SECTOR_BYTES as usize].fill(0x55);
+    old.save(&flash).unwrap();
+    let keeping = || {
+        let keep = command(KEEP, Request::Keep(Selection::ALL));
+        Setup {
+            flash: Some(flash.clone()),
+            ..Setup::new(other("seeded-bugs"), 2_600)
+                .fault("camera-absent")
+                .fault("flash-fails@0-1000")
+                .at(190, Action::Send(keep))
+        }
+    };
+    let run = keeping().run_with(None);
+    assert_eq!(run.outcome(KEEP), Outcome::Done, "it tries again");
+    let message = broken_rule(keeping(), Bug::FlashErrors);
+    assert!(message.contains("is programmed twice"), "{message}");
+}
+
+/// USB's handler and the stamp of a frame have one priority: some stamps are late.
+#[test]
+fn a_stamp_that_usb_delays_is_late() {
+    let latest_ns = |bug: Option<Bug>| {
+        let mut setup = Setup::new(other("seeded-bugs"), 500);
+        for nth in 0..150 {
+            let get_status = Action::Request([0x80, 0, 0, 0, 0, 0, 2, 0]);
+            setup = setup.at_us(200_000 + 1_900 * nth, get_status);
+        }
+        setup.run_with(bug).report.latest_stamp_ns
+    };
+    let (right, wrong) = (latest_ns(None), latest_ns(Some(Bug::VsyncPriority)));
+    assert!(right < 1_000 && wrong > 2 * right, "{right}, {wrong}");
+}
+
+/// The host begins with DATA0 after each SET_CONFIGURATION, and takes a packet with another toggle
+/// for one that it has.
+#[test]
+fn a_toggle_that_outlives_a_configuration_loses_packets() {
+    let repeated = |bug: Option<Bug>| {
+        let mut setup = Setup::new(other("seeded-bugs"), 420);
+        for nth in 0..4 {
+            let configure = Action::Request([0, 9, 1, 0, 0, 0, 0, 0]);
+            let start = Action::Send(command(7, Request::Start));
+            setup = setup
+                .at(200 + 50 * nth, configure)
+                .at(205 + 50 * nth, Action::Send(hello()))
+                .at(206 + 50 * nth, start);
+        }
+        setup.run_with(bug).report.usb.repeated_packets
+    };
+    assert_eq!(repeated(None), 0);
+    assert!(repeated(Some(Bug::KeptToggles)) > 0);
 }
 
 /// A bug is what the tests above notice, not the way in which it is chosen.

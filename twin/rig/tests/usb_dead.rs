@@ -160,6 +160,10 @@ fn a_packet_that_waits_does_not_block_what_follows() {
     let came = arrivals(&run, from_s, f64::INFINITY);
     assert!(came >= 4, "reset: {came} {log:#?}");
     assert_eq!((run.report.resets, run.report.usb.failed_transfers), (0, 0));
+    assert_eq!(
+        run.report.usb.repeated_packets, 0,
+        "both sides begin with DATA0"
+    );
     all_new(&run);
 }
 

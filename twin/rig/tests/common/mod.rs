@@ -47,6 +47,11 @@ pub enum Bug {
     CameraRegister = 3,
     HalfBands = 4,
     UsbClock = 5,
+    CacheableBuffers = 6,
+    ExternalMemory = 7,
+    FlashErrors = 8,
+    VsyncPriority = 9,
+    KeptToggles = 10,
 }
 
 /// Time at which the host says hello, ms: the port exists from about 140 ms on.
@@ -181,16 +186,27 @@ impl Setup {
         self
     }
 
-    /// Chooses a bug of firmware with seeded bugs, by the last word of flash.
-    pub fn run_with(mut self, bug: Bug) -> Run {
-        let mut contents = Contents::default();
-        let last = contents.array.len() - 4;
-        contents.array[last..].copy_from_slice(&(bug as u32).to_le_bytes());
+    /// Runs firmware with seeded bugs with a bug, or with none.
+    pub fn run_with(self, bug: impl Into<Option<Bug>>) -> Run {
         let directory = tempfile::tempdir().unwrap();
-        let file = directory.path().join("flash");
+        self.choosing(bug, directory.path()).run()
+    }
+
+    /// Chooses a bug of firmware with seeded bugs, by the last word of flash. The flash's file is in
+    /// this folder.
+    pub fn choosing(mut self, bug: impl Into<Option<Bug>>, directory: &Path) -> Self {
+        let flash = self
+            .flash
+            .as_deref()
+            .map(|file| Contents::load(file).unwrap());
+        let mut contents = flash.unwrap_or_default();
+        let last = contents.array.len() - 4;
+        let number = bug.into().map_or(u32::MAX, |bug| bug as u32);
+        contents.array[last..].copy_from_slice(&number.to_le_bytes());
+        let file = directory.join("flash");
         contents.save(&file).unwrap();
         self.flash = Some(file);
-        self.run()
+        self
     }
 
     /// Enforces the firmware's own regions of memory. Elsewhere they are not enforced, which is
@@ -496,8 +512,7 @@ impl Run {
     /// Asserts that every sample names an exposure, and that the device's clock and the true one
     /// have a constant difference: the start of the device's clock.
     pub fn assert_times(&self) {
-        let ahead = |sample: &&Sample| sample.time_us as i64 - self.true_time_us(sample.frame);
-        let ahead: Vec<i64> = self.samples().iter().map(ahead).collect();
+        let ahead = self.clock_ahead_us();
         let first = *ahead.first().expect("samples");
         // HAL and emulator disagree about a compare flag at the timer's start: half a turn of 16
         // bits, 65.5 ms.
@@ -506,6 +521,12 @@ impl Run {
             ahead.iter().all(|other| other.abs_diff(first) <= 10),
             "{ahead:?}"
         );
+    }
+
+    /// Returns by how much the device's clock is ahead of the true one in each sample, µs.
+    pub fn clock_ahead_us(&self) -> Vec<i64> {
+        let ahead = |sample: &&Sample| sample.time_us as i64 - self.true_time_us(sample.frame);
+        self.samples().iter().map(ahead).collect()
     }
 
     /// Returns the time from the middle of a frame's exposure until its sample's last byte had

@@ -22,11 +22,14 @@ use rigless::soc::stm32h743::generated::flash::Register;
 use rigless::soc::stm32h743::peripherals::flash;
 use rigless::time::EventId;
 
+use crate::faults::{Faults, Kind};
 use crate::rules::Rules;
 pub use contents::{BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES};
 
 /// SR bits: an operation runs, or waits.
 const BUSY: u64 = 1 << 0 | 1 << 2;
+/// SR bit: the operation failed.
+const OPERATION_ERROR: u64 = 1 << 22;
 /// CR2: the sector's number, three bits from here.
 const SECTOR_BIT: u32 = 8;
 
@@ -58,6 +61,8 @@ struct State {
     /// Words that were read or programmed, by their addresses.
     touched: BTreeSet<u32>,
     under_way: bool,
+    /// The operation under way ends with an error.
+    fails: bool,
     /// The operation at whose end the power is cut.
     cut_at_its_end: Option<Operation>,
     /// The operation in which the power was cut, and its result.
@@ -73,6 +78,7 @@ impl Bank {
             operations: Vec::new(),
             touched: BTreeSet::new(),
             under_way: false,
+            fails: false,
             cut_at_its_end: None,
             was_cut: None,
         })))
@@ -138,15 +144,15 @@ fn words(range: &Range<u64>) -> impl Iterator<Item = u32> + use<> {
 }
 
 impl State {
-    /// Begins an operation.
-    fn begin(&mut self, operation: Operation, rules: &Rules) {
+    /// Begins an operation, which may fail.
+    fn begin(&mut self, operation: Operation, fails: bool, rules: &Rules) {
         let number = self.operations.len() as u64;
         let leaves = self.cut.filter(|cut| cut.operation == number);
         self.operations.push(operation);
         if let Operation::Program { word, .. } = operation {
             self.touched.insert(word);
         }
-        self.under_way = true;
+        (self.under_way, self.fails) = (true, fails);
         match leaves.map(|cut| cut.leaves) {
             None => {}
             Some(Leaves::After) => self.cut_at_its_end = Some(operation),
@@ -165,16 +171,22 @@ impl State {
                         )
                     });
                 }
+                if fails {
+                    self.contents.operate(&operation, Leaves::Torn);
+                }
             }
+            Operation::Erase { .. } if fails => {}
             Operation::Erase { sector } => self.contents.erased(sector),
         }
     }
 
-    fn end(&mut self) {
+    /// Ends an operation; returns whether it failed.
+    fn end(&mut self) -> bool {
         self.under_way = false;
         if let Some(operation) = self.cut_at_its_end.take() {
             self.was_cut = Some((operation, Leaves::After));
         }
+        std::mem::take(&mut self.fails)
     }
 }
 
@@ -184,6 +196,7 @@ pub struct Flash {
     interface: flash::Flash,
     bank: Bank,
     rules: Rules,
+    faults: Faults,
     /// The word with the latest store, and the stored bytes.
     word: u32,
     bytes: [u8; WORD_BYTES as usize],
@@ -191,18 +204,19 @@ pub struct Flash {
 
 impl Flash {
     /// Returns the interface out of reset.
-    pub fn new(bank: Bank, rules: Rules) -> Self {
+    pub fn new(bank: Bank, rules: Rules, faults: Faults) -> Self {
         Self {
             interface: flash::Flash::new(),
             bank,
             rules,
+            faults,
             word: 0,
             bytes: [0xFF; WORD_BYTES as usize],
         }
     }
 
     /// Checks whether an operation began or ended.
-    fn look(&mut self, registers: &RegisterFile, operation: Option<Operation>) {
+    fn look(&mut self, registers: &mut RegisterFile, now_ns: u64, operation: Option<Operation>) {
         if registers.get(Register::Sr1) & BUSY != 0 {
             self.rules.broken(|| {
                 "flash: the bank that the program runs from is programmed or erased, for which \
@@ -213,8 +227,16 @@ impl Flash {
         let busy = registers.get(Register::Sr2) & BUSY != 0;
         let mut state = self.bank.lock();
         match (operation, busy, state.under_way) {
-            (Some(operation), true, false) => state.begin(operation, &self.rules),
-            (_, false, true) => state.end(),
+            (Some(operation), true, false) => {
+                let fails = self.faults.on(Kind::FlashFails, now_ns);
+                state.begin(operation, fails, &self.rules);
+            }
+            (_, false, true) => {
+                if state.end() {
+                    let status = registers.get(Register::Sr2);
+                    registers.set(Register::Sr2, status | OPERATION_ERROR);
+                }
+            }
             _ => {}
         }
     }
@@ -233,7 +255,11 @@ impl Device for Flash {
         self.interface.write(register, value, registers, context);
         let number = (registers.get(Register::Cr2) >> SECTOR_BIT) as u32 & 7;
         let sector = BANK.start + number * SECTOR_BYTES;
-        self.look(registers, Some(Operation::Erase { sector }));
+        self.look(
+            registers,
+            context.now().0,
+            Some(Operation::Erase { sector }),
+        );
     }
 
     fn write_region(
@@ -254,7 +280,11 @@ impl Device for Flash {
             .for_each(|(byte, value)| *byte = value);
         let taken = (self.interface).write_region(address, width, value, registers, context);
         let (word, bytes) = (self.word, self.bytes);
-        self.look(registers, Some(Operation::Program { word, bytes }));
+        self.look(
+            registers,
+            context.now().0,
+            Some(Operation::Program { word, bytes }),
+        );
         taken
     }
 
@@ -265,7 +295,7 @@ impl Device for Flash {
         context: &mut DeviceContext<'_>,
     ) {
         self.interface.on_event(event, registers, context);
-        self.look(registers, None);
+        self.look(registers, context.now().0, None);
     }
 
     fn on_access(
@@ -276,7 +306,7 @@ impl Device for Flash {
         context: &mut DeviceContext<'_>,
     ) {
         self.interface.on_access(token, value, registers, context);
-        self.look(registers, None);
+        self.look(registers, context.now().0, None);
     }
 
     fn on_refused(
@@ -286,7 +316,7 @@ impl Device for Flash {
         context: &mut DeviceContext<'_>,
     ) {
         self.interface.on_refused(token, registers, context);
-        self.look(registers, None);
+        self.look(registers, context.now().0, None);
     }
 
     fn reset(&mut self) {

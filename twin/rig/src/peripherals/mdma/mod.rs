@@ -17,6 +17,7 @@ use rigless::time::{EventId, VirtualNanos};
 
 use crate::busy_bus::{Chance, InterruptLine};
 use crate::faults::{Faults, Kind};
+use crate::memory_types::MemoryTypes;
 use crate::peripherals::flash::{BANK, Bank};
 use crate::rules::Rules;
 use block::{Block, asked_for};
@@ -72,6 +73,8 @@ pub struct Mdma {
     rules: Rules,
     faults: Faults,
     bank: Bank,
+    /// Memory types, unless the emulator's core has them.
+    types: Option<MemoryTypes>,
     /// Decides the next block's wait.
     chance: Chance,
     channels: [Channel; CHANNELS],
@@ -84,12 +87,19 @@ pub struct Mdma {
 impl Mdma {
     /// Returns a controller at rest. `seed` decides the time for which others hold the bus under
     /// [`Kind::BusBusy`].
-    pub fn new(rules: Rules, faults: Faults, bank: Bank, seed: u64) -> Self {
+    pub fn new(
+        rules: Rules,
+        faults: Faults,
+        bank: Bank,
+        types: Option<MemoryTypes>,
+        seed: u64,
+    ) -> Self {
         Self {
             rules,
             interrupt: InterruptLine::new(faults.clone(), seed),
             faults,
             bank,
+            types,
             chance: Chance::new(seed),
             channels: Default::default(),
             to_move: Vec::new(),
@@ -129,6 +139,18 @@ impl Mdma {
         }
         match asked_for(&|row| registers.get(register(nth, row)), value) {
             Ok(block) => {
+                if let Some(types) = &self.types {
+                    let (from, to) = (
+                        (block.source, block.bytes),
+                        (block.destination, block.bytes),
+                    );
+                    types.check_dma(
+                        &format!("MDMA channel {nth}"),
+                        Some(from),
+                        Some(to),
+                        &self.rules,
+                    );
+                }
                 let cycles = block.bytes.div_ceil(BUFFER_BYTES) * BUFFER_CYCLES;
                 let end = context.now().0 + patience * cycles * 1_000_000_000 / BUS_HZ;
                 channel.under_way = Some((block, context.schedule(VirtualNanos(end))));
