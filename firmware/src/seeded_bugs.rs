@@ -88,4 +88,3 @@ pub fn lowers_vsync() -> bool {
 pub fn keeps_toggles() -> bool {
     is_chosen(Bug::KeptToggles)
 }
-
