@@ -248,7 +248,11 @@ fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
 }
 
 fn rig_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
-    shared.run(shared.tests(artifacts::RIG_TESTS)?, tally)
+    let mut command = shared.tests(artifacts::RIG_TESTS)?;
+    if shared.all {
+        command.env("HIVTAC_ATTACKS", "3");
+    }
+    shared.run(command, tally)
 }
 
 /// The tests that depend on the core's speed, at half of the speed that the rig assumes, and on a

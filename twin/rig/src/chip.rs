@@ -25,6 +25,7 @@ use crate::mpu::{Mpu, Protection};
 use crate::peripherals::crc::Crc;
 use crate::peripherals::crs::Crs;
 use crate::peripherals::dcmi::Dcmi;
+use crate::peripherals::dma::{Dma, Feed};
 use crate::peripherals::flash::{Bank, Flash};
 use crate::peripherals::mdma::Mdma;
 use crate::peripherals::otg::{Blocks, SharedCore};
@@ -73,6 +74,8 @@ pub struct Chip {
     pub part: Stm32h743,
     /// The camera interface.
     pub dcmi: Dcmi,
+    /// The DMA controller that takes the camera interface's words.
+    dma: Dma,
     /// The DMA controller that reaches DTCM.
     pub mdma: Mdma,
     /// The registers of an MPU that is not enforced.
@@ -97,6 +100,7 @@ pub struct Chip {
     host: SharedHost,
     slots: board::Slots,
     dcmi_slot: usize,
+    dma_slot: usize,
     mdma_slot: usize,
     crc_slot: usize,
     crs_slot: usize,
@@ -147,13 +151,23 @@ impl Chip {
         otg.wake_host(part.bus_mut(), VirtualNanos(0));
         let slots = board::Slots::of(part.bus(), board)?;
         let dcmi_slot = part.bus().slot("DCMI")?;
+        let dma_slot = part.bus().slot("DMA1")?;
         let mdma_slot = part.bus().slot("MDMA")?;
         let crc_slot = part.bus().slot("CRC")?;
         let crs_slot = part.bus().slot("CRS")?;
         let flash_slot = part.bus().slot("Flash")?;
         let i2c_slot = part.bus().slot("I2C1")?;
+        let feed = Feed::default();
         let mut chip = Self {
-            dcmi: Dcmi::new(camera.clone(), faults.clone(), rules.clone(), seed),
+            dcmi: Dcmi::new(
+                camera.clone(),
+                faults.clone(),
+                rules.clone(),
+                feed.clone(),
+                seed,
+            ),
+            dma: Dma::new(feed, rules.clone()),
+            dma_slot,
             control_bus: ControlBus::new(faults.clone(), slots.vsync_port(), i2c_slot),
             held_bus: HeldBus,
             mdma: Mdma::new(rules.clone(), faults.clone(), bank.clone(), types, seed),
@@ -256,6 +270,7 @@ impl Chip {
     /// on blocks of the MDMA that ended.
     pub fn settle(&mut self, at: VirtualNanos, memory: &mut dyn Memory) {
         self.sag(at);
+        self.dma.settle(memory);
         self.mdma.settle(memory);
         self.control_bus.settle(&mut self.part, at);
         self.late.settle(&mut self.part, at);
@@ -318,6 +333,7 @@ impl Mcu for Chip {
         if let Some(mpu) = &mut self.mpu {
             mpu.reset();
         }
+        Device::reset(&mut self.dma);
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crc);
         Device::reset(&mut self.crs);
@@ -341,6 +357,9 @@ impl Mcu for Chip {
         }
         if slot == self.dcmi_slot {
             return (self.part.bus_mut(), Some(&mut self.dcmi));
+        }
+        if slot == self.dma_slot {
+            return (self.part.bus_mut(), Some(&mut self.dma));
         }
         if slot == self.mdma_slot {
             return (self.part.bus_mut(), Some(&mut self.mdma));

@@ -1,4 +1,5 @@
-//! Connects DMA1 and DMA2 to DMAMUX1's channels by plain wires, without acknowledgements.
+//! Connects the emulator's DMA controllers to DMAMUX1's channels by plain wires, without
+//! acknowledgements. (DMA1's slot has a model of its own, `peripherals::dma`, which needs none.)
 //!
 //! The emulator's controllers acknowledge each word that they move, and each acknowledgement goes
 //! to about forty peripherals. With them, a frame takes a third longer. Only functions that an

@@ -17,7 +17,7 @@ use hivtac_wire::settings::Selection;
 use serde_json::Value;
 
 /// Default number of runs.
-const RUNS: u64 = 3;
+const RUNS: u64 = 1;
 /// Time of the attack, ms. It ends with a cable that is put back.
 const ATTACK_MS: std::ops::Range<u64> = 165..440;
 const PLUGGED_MS: u64 = 470;

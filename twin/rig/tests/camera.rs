@@ -166,6 +166,7 @@ fn an_exposure_that_is_found_in_small_steps_is_waited_for() {
 
 /// An eighth of the light that the film needs is more than the gain makes up for.
 #[test]
+#[ignore = "15 s"]
 fn a_search_that_finds_no_good_exposure_says_so() {
     let dark = CameraSettings {
         exposure: Some(Microseconds(500)),
@@ -202,6 +203,7 @@ fn the_longest_exposure_is_taken() {
 /// White light differs from unit to unit and from lamp to lamp. With the gains at the start markers
 /// are found in all of them; a unit's own make white white.
 #[test]
+#[ignore = "20 s: two runs of a second"]
 fn gains_of_a_units_own_make_its_white_white() {
     let [start, own] = [None, Some(White { red: 77, blue: 130 })].map(|white| {
         let settings = CameraSettings {

@@ -111,6 +111,7 @@ fn a_camera_with_another_version_is_refused() {
 }
 
 #[test]
+#[ignore = "as on the other board"]
 fn an_absent_camera_is_reported_and_found_later() {
     let run = openmv(1_340).fault("camera-absent@0-700").run();
     assert!(run.log().contains("no MT9V034"), "{}", run.log());
@@ -119,11 +120,13 @@ fn an_absent_camera_is_reported_and_found_later() {
 
 /// Its reset line and its register reset undo the settings of another program.
 #[test]
+#[ignore = "as on the other board"]
 fn what_another_program_left_in_the_camera_is_reset() {
     assert_good(&openmv(420).fault("camera-used").run());
 }
 
 #[test]
+#[ignore = "as on the other board"]
 fn a_silent_camera_is_restarted() {
     let run = openmv(840).fault("camera-silent@330-400").run();
     let stats = run.stats();
@@ -141,6 +144,7 @@ fn a_silent_camera_is_restarted() {
 
 /// A frame of the wrong size costs itself and no other.
 #[test]
+#[ignore = "as on the other board"]
 fn a_short_frame_is_dropped() {
     let run = openmv(420).fault("frame-short@340").run();
     assert!(run.stats().dropped_size >= 1, "{:?}", run.stats());
@@ -169,12 +173,14 @@ fn only_thresholds_of_its_luma_are_taken() {
 
 /// Its automatic control may move in small steps, too.
 #[test]
+#[ignore = "as on the other board"]
 fn an_exposure_that_is_found_in_small_steps_is_waited_for() {
     let run = openmv(700).fault("camera-hesitant").run();
     assert_good(&run);
 }
 
 #[test]
+#[ignore = "as on the other board"]
 fn exposure_is_found_anew_on_command() {
     let run = openmv(560)
         .at(340, Action::Send(command(50, Request::Expose)))

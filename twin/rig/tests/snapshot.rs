@@ -207,6 +207,7 @@ fn a_new_conversation_ends_it_and_can_have_its_own() {
 
 /// The cable is pulled between the parts and put back: nothing of the snapshot remains.
 #[test]
+#[ignore = "10 s: as a host that does not read"]
 fn a_pulled_cable_ends_it() {
     let again = HELLO_MS + 400;
     let run = setup(770)

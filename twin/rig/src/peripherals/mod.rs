@@ -5,6 +5,7 @@
 pub mod crc;
 pub mod crs;
 pub mod dcmi;
+pub mod dma;
 pub mod flash;
 pub mod mdma;
 pub mod otg;

@@ -16,7 +16,7 @@
 //! A fault that disturbs the camera or the DMA within a line keeps that line in groups. A busy bus
 //! does the same to all lines of a run in which it is ever busy.
 
-use rigless::device::DeviceContext;
+use rigless::device::{DeviceContext, Level};
 
 use super::receiver::Overrun;
 use super::signals::{Run, sampled_while_changing};
@@ -30,8 +30,13 @@ impl Dcmi {
         let flows = bytes.from == GROUP
             && self.receiver.waiting() == 0
             && !self.is_disturbed(&bytes.run, context.now().0);
+        let is_rest = bytes.to - bytes.from > GROUP;
         self.receive_group(bytes);
-        self.receive_due();
+        if is_rest && self.feed.lock().is_ready {
+            self.hand_over(context);
+        } else {
+            self.receive_due();
+        }
         self.wait_for_the_bus(context);
         self.drive(context);
         let Bytes { run, to, .. } = bytes;
@@ -42,6 +47,23 @@ impl Dcmi {
         } else {
             self.plan_group(run, to, context);
         }
+    }
+
+    /// Receives all due bytes and hands their words to the DMA, which takes them with one request.
+    fn hand_over(&mut self, context: &mut DeviceContext<'_>) {
+        let mut words = Vec::new();
+        loop {
+            while self.receiver.waiting() > 0 {
+                words.push(self.receiver.take());
+            }
+            if self.due.is_none() {
+                break;
+            }
+            self.receive_due();
+        }
+        self.feed.lock().words.extend(words);
+        context.request(0, Level::High);
+        context.request(0, Level::Low);
     }
 
     /// Returns whether a fault may delay words of a run or end it early.
@@ -148,6 +170,7 @@ mod tests {
     use crate::faults::Faults;
     use crate::frame_source::TestPicture;
     use crate::peripherals::dcmi::Pins;
+    use crate::peripherals::dma::Feed;
     use crate::rules::Rules;
     use crate::truth::TruthLog;
     use rigless::device::Device;
@@ -161,6 +184,7 @@ mod tests {
         part: Stm32h743,
         slot: usize,
         dcmi: Dcmi,
+        feed: Feed,
         words: Vec<u32>,
     }
 
@@ -183,7 +207,8 @@ mod tests {
             });
             let part = Stm32h743::new().unwrap();
             let slot = part.bus().slot("DCMI").unwrap();
-            let mut dcmi = Dcmi::new(camera, faults, rules, 1);
+            let feed = Feed::default();
+            let mut dcmi = Dcmi::new(camera, faults, rules, feed.clone(), 1);
             let pins = Pins {
                 data: 0xFF,
                 clock: true,
@@ -195,6 +220,7 @@ mod tests {
                 part,
                 slot,
                 dcmi,
+                feed,
                 words: Vec::new(),
             };
             let polarities = control::RISING | control::VSYNC_BLANKS_HIGH;
@@ -270,6 +296,21 @@ mod tests {
         bench.step();
         assert_eq!(bench.words.len() as u32 * 4, rest.run.bytes);
         assert_eq!(bench.dcmi.counters.overruns, 0);
+    }
+
+    /// A DMA that runs gets the same words at once.
+    #[test]
+    fn the_rest_of_a_line_is_handed_over() {
+        let [mut bench, mut word_by_word] = [Bench::new(), Bench::new()];
+        bench.until_the_rest_of_a_line();
+        bench.feed.lock().is_ready = true;
+        bench.step();
+        bench.words.extend(bench.feed.lock().words.drain(..));
+        word_by_word.until_the_rest_of_a_line();
+        word_by_word.step();
+        assert_eq!(bench.words, word_by_word.words);
+        assert_eq!(bench.dcmi.counters, word_by_word.dcmi.counters);
+        assert_eq!(bench.dcmi.receiver.waiting(), 0);
     }
 
     /// The bytes on the lines by then are received, the rest comes in groups, and the total is the

@@ -19,6 +19,7 @@ use rigless::time::{EventId, VirtualNanos};
 use crate::busy_bus::{Chance, InterruptLine};
 use crate::camera::SharedCamera;
 use crate::faults::{Faults, Kind};
+use crate::peripherals::dma::Feed;
 use crate::rules::Rules;
 use receiver::{Receiver, Settings, control};
 use signals::Frame;
@@ -90,6 +91,8 @@ pub struct Dcmi {
     /// The event until which the DMA waits for the bus.
     bus: Option<EventId>,
     requested: bool,
+    /// The DMA's way to take words at once.
+    feed: Feed,
     vsync: Level,
     vsync_at: VirtualNanos,
     last_byte: u8,
@@ -100,7 +103,7 @@ impl Dcmi {
     /// Returns an interface wired to a sensor.
     ///
     /// `seed` decides the waits of a busy bus ([`Kind::BusBusy`]).
-    pub fn new(camera: SharedCamera, faults: Faults, rules: Rules, seed: u64) -> Self {
+    pub fn new(camera: SharedCamera, faults: Faults, rules: Rules, feed: Feed, seed: u64) -> Self {
         Self {
             camera,
             interrupt: InterruptLine::new(faults.clone(), seed),
@@ -119,6 +122,7 @@ impl Dcmi {
             raised: 0,
             enabled: 0,
             requested: false,
+            feed,
             vsync: Level::Low,
             vsync_at: VirtualNanos(0),
             last_byte: 0,

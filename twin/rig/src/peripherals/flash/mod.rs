@@ -231,11 +231,10 @@ impl Flash {
                 let fails = self.faults.on(Kind::FlashFails, now_ns);
                 state.begin(operation, fails, &self.rules);
             }
-            (_, false, true) => {
-                if state.end() {
-                    let status = registers.get(Register::Sr2);
-                    registers.set(Register::Sr2, status | OPERATION_ERROR);
-                }
+            // An operation that ended, and failed.
+            (_, false, true) if state.end() => {
+                let status = registers.get(Register::Sr2);
+                registers.set(Register::Sr2, status | OPERATION_ERROR);
             }
             _ => {}
         }
