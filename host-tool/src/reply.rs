@@ -14,13 +14,16 @@ pub const KEEP_PATIENCE: Duration = Duration::from_secs(20);
 /// rate after a quarter of a second.
 pub const CAMERA_PATIENCE: Duration = Duration::from_secs(4);
 
+/// The name of the command that a camera may be unable to carry out.
+const SET_THRESHOLD: &str = "set threshold";
+
 /// A command's name.
 pub fn name_of(request: &Request) -> &'static str {
     match request {
         Request::GetInfo => "get info",
         Request::Start => "start",
         Request::Stop => "stop",
-        Request::SetThreshold(_) => "set threshold",
+        Request::SetThreshold(_) => SET_THRESHOLD,
         Request::Tare { .. } => "tare",
         Request::StartWithMarkers => "start with markers",
         Request::Expose => "expose",
@@ -94,7 +97,13 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
     let why = match outcome {
         Outcome::Done => return Ok(()),
         Outcome::InvalidArgument => "an argument is outside its range",
-        Outcome::Unsupported => "its camera does not send that pixel format; choose another",
+        Outcome::Unsupported if what == SET_THRESHOLD => {
+            "it cannot do that: its camera does not send that pixel format; choose another"
+        }
+        Outcome::Unsupported => {
+            "it cannot do that: a recording only plays, and a simulated sensor has neither \
+             registers nor a loader"
+        }
         Outcome::Busy => {
             "it is still busy with an earlier command, perhaps one that was not answered or of \
              another program: wait 10 s and try again"

@@ -343,7 +343,8 @@ fn a_format_that_the_camera_does_not_send_is_refused() {
     assert_eq!(refused.code, Some(6));
     assert_eq!(
         refused.stderr,
-        "hivtac: the device refused \"set threshold\": its camera does not send that pixel format; \
+        "hivtac: the device refused \"set threshold\": it cannot do that: its camera does not send \
+         that pixel format; \
          choose another\n"
     );
 }

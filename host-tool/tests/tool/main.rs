@@ -8,6 +8,7 @@ mod endings;
 mod fake;
 mod firmware;
 mod health;
+mod messages;
 mod monitor;
 mod reader;
 mod recordings;
