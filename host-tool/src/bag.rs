@@ -2,8 +2,12 @@
 //! read. It also holds every message of the device as received, for `hivtac replay`.
 
 use crate::clock::Clock;
+use crate::grip::Reading;
+use crate::grip::pair::Pair;
 use crate::recording::{HELLO, WIRE, to_hex};
-use crate::ros::channel::{Channel, Frames, messages, topic_of};
+use crate::ros::channel::{
+    Channel, Frames, GRIP_TOPIC, GripChannel, grip_messages, messages, topic_of,
+};
 use crate::ros::{self, Definition};
 use crate::shown::unit_number;
 use crate::tally::Tally;
@@ -27,6 +31,15 @@ pub struct Bag<W: Write + Seek> {
     writer: Writer<W>,
     frames: Frames,
     sensors: Vec<Topics>,
+    grip: Option<GripTopics>,
+}
+
+/// The topics of a grip of the first two sensors.
+struct GripTopics {
+    pair: Pair,
+    names: [String; 2],
+    numbers: Vec<u16>,
+    count: u32,
 }
 
 /// The topics of a sensor.
@@ -93,12 +106,56 @@ impl<W: Write + Seek> Bag<W> {
         let mut bag = Bag {
             sensors: sensors.collect::<McapResult<_>>()?,
             frames: Frames::of("hivtac"),
+            grip: None,
             writer,
         };
         for (sensor, hello) in hellos.iter().enumerate() {
             bag.message(sensor, &DeviceMessage::Hello(hello.clone()), now_ns)?;
         }
         Ok(bag)
+    }
+
+    /// Also writes what the first two sensors feel together, from now on.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn add_grip(&mut self, pair: Pair, names: [String; 2]) -> McapResult<()> {
+        let channels = GripChannel::ALL.iter().map(|channel| {
+            let definition = channel.definition();
+            let text = definition.text.as_bytes();
+            let schema = self.writer.add_schema(definition.name, "ros2msg", text)?;
+            let topic = format!("{GRIP_TOPIC}/{}", channel.name());
+            self.writer
+                .add_channel(schema, &topic, "cdr", &BTreeMap::new())
+        });
+        self.grip = Some(GripTopics {
+            numbers: channels.collect::<McapResult<_>>()?,
+            pair,
+            names,
+            count: 0,
+        });
+        Ok(())
+    }
+
+    /// Writes the grips that are known by a sensor's reading.
+    fn write_grips(&mut self, sensor: usize, reading: Reading, now_ns: u64) -> McapResult<()> {
+        let Some(grip_topics) = self.grip.as_mut().filter(|_| sensor < 2) else {
+            return Ok(());
+        };
+        for grip in grip_topics.pair.push(sensor, reading) {
+            let messages = grip_messages(&grip, "hivtac_grip", &grip_topics.names);
+            for (channel, data) in messages {
+                let header = MessageHeader {
+                    channel_id: grip_topics.numbers[channel as usize],
+                    sequence: grip_topics.count,
+                    log_time: now_ns,
+                    publish_time: grip.stamp_ns,
+                };
+                self.writer.write_to_known_channel(&header, &data)?;
+            }
+            grip_topics.count = grip_topics.count.wrapping_add(1);
+        }
+        Ok(())
     }
 
     /// Writes a sensor's message that was received at `now_ns`, ns since 1970.
@@ -132,6 +189,7 @@ impl<W: Write + Seek> Bag<W> {
             for (channel, data) in messages(sample, stamp_ns, &self.frames) {
                 self.write(channel as usize, &data, when)?;
             }
+            self.write_grips(sensor, Reading::of(sample, stamp_ns, now_ns), now_ns)?;
         }
         Ok(())
     }

@@ -9,6 +9,7 @@ mod finding;
 mod firmware;
 mod focus_command;
 mod follow;
+mod grip_command;
 mod health;
 mod help;
 mod hsv;
@@ -78,6 +79,7 @@ enum Command {
     #[cfg(feature = "twin")]
     Twin(twin::TwinArguments),
     Serve(serve::ServeArguments),
+    Grip(grip_command::GripCommand),
     Template(template::TemplateArguments),
     Sense(sense::SenseArguments),
     Completion(help::CompletionArguments),
@@ -107,6 +109,7 @@ impl Command {
             #[cfg(feature = "twin")]
             Command::Twin(arguments) => twin::run(&arguments),
             Command::Serve(arguments) => serve::run(&arguments),
+            Command::Grip(arguments) => grip_command::run(&arguments),
             Command::Template(arguments) => template::run(&arguments),
             Command::Sense(arguments) => sense::run(&arguments),
             Command::Completion(arguments) => help::completion(&arguments, command()),

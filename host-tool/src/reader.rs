@@ -4,6 +4,7 @@
 //! The samples wait in a queue of [`ROOM`]. When it is full, the oldest is passed over. A program
 //! that is slower than the sensor takes [`Reader::newest`], or sees [`Reader::missed`] grow.
 
+use crate::clock::{Arrival, LiveClock};
 use crate::failure::{Failure, Kind};
 use crate::link::Link;
 use crate::stop;
@@ -13,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Duration, Instant};
 
 /// Samples that wait for the program: 6.5 s at 156 a second.
 pub const ROOM: usize = 1024;
@@ -26,13 +27,16 @@ const ASK_EVERY: Duration = Duration::from_millis(50);
 /// Silence after which a streaming device counts as gone.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// A sample, and when it arrived.
+/// A sample, when it arrived, and when its frame was exposed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrived {
     /// The sample.
     pub sample: Sample,
     /// Time of its arrival at this computer, ns since 1970.
     pub came_ns: u64,
+    /// Time of its exposure by this computer's clock, ns since 1970: comparable with those of other
+    /// devices (see [`LiveClock`]).
+    pub exposed_ns: u64,
 }
 
 /// Takes messages that come while something else is waited for.
@@ -65,6 +69,7 @@ struct Inbox {
     lines: VecDeque<LogLine>,
     missed: u64,
     failure: Option<(Kind, String)>,
+    clock: LiveClock,
 }
 
 impl Reader {
@@ -86,9 +91,10 @@ impl Reader {
     /// # Errors
     /// Those of [`Link::request`].
     pub fn stream(&self, patience: Duration) -> Result<(), Failure> {
-        let start = Request::StartWithMarkers;
         self.order(Some(true), move |link, others| {
-            link.request(start, patience, others)
+            // Its latency, for the first samples.
+            link.request(Request::GetInfo, patience, &mut *others)?;
+            link.request(Request::StartWithMarkers, patience, others)
         })
     }
 
@@ -237,14 +243,20 @@ impl Inbox {
         newest
     }
 
-    fn take(&mut self, message: DeviceMessage, came_ns: u64) {
+    fn take(&mut self, message: DeviceMessage, came: Arrival) {
         match message {
+            DeviceMessage::Stats(stats) => self.clock.latency(stats.latency_us),
             DeviceMessage::Sample(sample) => {
                 if self.samples.len() == ROOM {
                     self.samples.pop_front();
                     self.missed += 1;
                 }
-                self.samples.push_back(Arrived { sample, came_ns });
+                let exposed_ns = self.clock.stamp_ns(sample.time_us, came);
+                self.samples.push_back(Arrived {
+                    sample,
+                    came_ns: came.ns,
+                    exposed_ns,
+                });
             }
             DeviceMessage::Log(line) => {
                 if self.lines.len() == LINES {
@@ -270,9 +282,8 @@ impl Shared {
     }
 
     fn take(&self, message: DeviceMessage) {
-        let came = SystemTime::now().duration_since(UNIX_EPOCH);
-        let came_ns = came.unwrap_or_default().as_nanos() as u64;
-        self.inbox().take(message, came_ns);
+        let came = Arrival::now();
+        self.inbox().take(message, came);
         self.news.notify_all();
     }
 

@@ -46,6 +46,11 @@ class Bool(IdlStruct, typename="std_msgs.msg.dds_.Bool_"):
 
 
 @dataclass
+class Float64(IdlStruct, typename="std_msgs.msg.dds_.Float64_"):
+    data: float64
+
+
+@dataclass
 class KeyValue(IdlStruct, typename="diagnostic_msgs.msg.dds_.KeyValue_"):
     key: str
     value: str

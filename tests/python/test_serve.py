@@ -46,6 +46,7 @@ from ros2_types import (
     CycloneReply,
     CycloneRequest,
     DiagnosticArray,
+    Float64,
     Reply,
     Request,
     WrenchStamped,
@@ -324,6 +325,30 @@ class OfARecording(unittest.TestCase):
                         wrench.header.frame_id, f"hivtac_unit_{unit}_film"
                     )
 
+    def test_nobody_there_is_told(self):
+        alone = ["--ros2", "--domain", "231"]
+        with Replay(self.file) as replay, Serve(*alone, *replay.port) as serve:
+            time.sleep(12)
+            self.assertIn("nothing else of ROS 2 is in domain 231", serve.said())
+
+    def test_a_grip_of_two_sensors_has_topics_of_its_own(self):
+        other_file = self.file.with_name("second.mcap")
+        other_file.write_bytes(of_another(self.file.read_bytes(), b"hivtac-rig-2"))
+        node = Node()
+        forces = node.reader("rt/hivtac/grip/force", Float64)
+        wrenches = node.reader("rt/hivtac/grip/wrench", WrenchStamped)
+        with Replay(self.file) as one, Replay(other_file) as other:
+            fingers = ["--grip", f"{one.port[1]},{other.port[1]}"]
+            with Serve(*ROS2, *FOXGLOVE, *fingers) as serve:
+                with connect(serve.told["foxglove"], subprotocols=["foxglove.sdk.v1"]) as it:
+                    channels = advertised(it, 19)
+                    data = messages(it, channels["/hivtac/grip/force"])
+                    known = next(it.data for it in data if not math.isnan(it.data))
+                self.assertLess(abs(known), 0.3)
+                self.assertFalse(all(math.isnan(it.data) for it in until(lambda: forces.take(99))))
+                wrench = next(taken(wrenches))
+                self.assertEqual(wrench.header.frame_id, "hivtac_grip")
+
     def test_one_sensor_is_not_served_twice(self):
         with Replay(self.file) as one, Replay(self.file) as other:
             refused = self.refused("--foxglove", *one.port, *other.port[:2])
@@ -442,10 +467,10 @@ def wrenches_of(serve):
         yield from messages(socket, channels[f"/hivtac/unit_{unit}/wrench"])
 
 
-def advertised(socket):
-    """The channels that a server of Foxglove's protocol tells of, by their topics."""
+def advertised(socket, count=7):
+    """As many channels that a server of Foxglove's protocol tells of, by their topics."""
     channels = {}
-    while len(channels) < 7:
+    while len(channels) < count:
         told = json.loads(socket.recv(timeout=PATIENCE))
         for channel in told.get("channels", []):
             channels[channel["topic"]] = channel

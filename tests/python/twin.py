@@ -25,7 +25,7 @@ hold_s = 600.0
 class Twin:
     """A twin (`HIVTAC_TOOL`) at a TCP port of its own, with a scene by its name or its text."""
 
-    def __init__(self, scene="rest"):
+    def __init__(self, scene="rest", camera="ov7725"):
         self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)
         self._truth_file = folder / "truth"
@@ -39,6 +39,8 @@ class Twin:
                 "--json",
                 "--scene",
                 scene,
+                "--camera",
+                camera,
                 "--truth",
                 self._truth_file,
             ],

@@ -1,6 +1,7 @@
 //! A sample as C reads it.
 
 use hivtac_host::force_fields::{FORCE, PLACE};
+use hivtac_host::grip::matrix::covariance;
 use hivtac_host::reader::Arrived;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
@@ -79,7 +80,8 @@ impl CSample {
         self.magnitude_n = size;
         self.magnitude_sigma_n = size_sigma;
         self.direction_sigma_rad = angle_sigma;
-        self.force_covariance = covariance([x, y, z], size_sigma, angle_sigma);
+        let covariance = covariance([x, y, z], size_sigma, angle_sigma);
+        self.force_covariance = std::array::from_fn(|index| covariance[index / 3][index % 3]);
         if let Some(place) = &force.place {
             let [right, down, sigma] = PLACE.map(|it| it.si(place));
             self.has_place = 1;
@@ -87,50 +89,5 @@ impl CSample {
             self.place_sigma_m = sigma;
             self.torque_nm = [down * z, -right * z, right * y - down * x];
         }
-    }
-}
-
-/// The covariance of a force, N², row by row. Along the force it is that of its size. Across it,
-/// the direction's uncertainty has two equal parts, one for each way.
-fn covariance(force: [f64; 3], size_sigma: f64, angle_sigma: f64) -> [f64; 9] {
-    let square: f64 = force.iter().map(|part| part * part).sum();
-    let across = square * angle_sigma.powi(2) / 2.0;
-    std::array::from_fn(|index| {
-        let (row, column) = (index / 3, index % 3);
-        let same = if row == column { 1.0 } else { 0.0 };
-        let along = match square > 0.0 {
-            true => force[row] * force[column] / square,
-            // Without a direction the size is uncertain every way.
-            false => same,
-        };
-        along * size_sigma.powi(2) + (same - along) * across
-    })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_covariance_is_that_of_size_along_and_direction_across() {
-        let near = |found: [f64; 9], wanted: [f64; 9]| {
-            let pairs = found.into_iter().zip(wanted);
-            for (found, wanted) in pairs {
-                assert!((found - wanted).abs() < 1e-15, "{found} {wanted}");
-            }
-        };
-        let (size, angle) = (1e-3, 0.02);
-        let across = (0.1 * angle) * (0.1 * angle) / 2.0;
-        let wanted = [across, 0.0, 0.0, 0.0, across, 0.0, 0.0, 0.0, 1e-6];
-        near(covariance([0.0, 0.0, -0.1], size, angle), wanted);
-        // Turned into x and z by 45°.
-        let part = 0.1 / f64::sqrt(2.0);
-        let turned = covariance([part, 0.0, -part], size, angle);
-        let (sum, less) = ((across + 1e-6) / 2.0, (across - 1e-6) / 2.0);
-        near(turned, [sum, 0.0, less, 0.0, across, 0.0, less, 0.0, sum]);
-        near(
-            covariance([0.0; 3], size, angle),
-            [1e-6, 0.0, 0.0, 0.0, 1e-6, 0.0, 0.0, 0.0, 1e-6],
-        );
     }
 }

@@ -32,6 +32,7 @@ import numpy.typing as npt
 from hivtac._hivtac import (
     Connection,
     Error,
+    Grips as _Grips,
     LostError,
     NoDeviceError,
     Reader,
@@ -42,6 +43,8 @@ from hivtac._hivtac import (
 __all__ = [
     "Device",
     "Error",
+    "Grip",
+    "Grips",
     "LostError",
     "Moved",
     "NoDeviceError",
@@ -53,6 +56,7 @@ __all__ = [
     "Sensor",
     "Tare",
     "VersionError",
+    "grip",
     "open",
     "recording",
 ]
@@ -94,6 +98,9 @@ class Sample:
     """Device time of the middle of the frame's exposure, s since its start."""
     host_time: float
     """Time of its arrival at the computer, s since 1970, however late it is taken."""
+    exposed: float
+    """Time of the middle of the exposure by the computer's clock, s since 1970. Several sensors are
+    on one clock: theirs agree to 0.2 ms."""
     status: tuple[str, ...]
     """Why the force is missing, or how reliable it is: names of `docs/wire.md`."""
     status_bits: int
@@ -128,6 +135,37 @@ class Sample:
     def slip(self) -> bool:
         """Whether what touches the film slips."""
         return "slip" in self.status
+
+
+@dataclass(frozen=True, eq=False)
+class Grip:
+    """What two sensors feel together when a frame of the first was exposed; `docs/robots.md` has
+    the equations. What is not known is `None`. σ is a standard uncertainty."""
+
+    time: float
+    """Time of the exposure, s since 1970."""
+    cause: str | None
+    """Why the grip is not known: the sensor, and names of its status; `None` if it is known."""
+    contact: bool | None
+    """Whether something touches both sensors."""
+    status: tuple[tuple[str, ...], tuple[str, ...]]
+    """Names of the status of the first and the second sensor."""
+    force: float | None
+    """Grip force: the part of both forces that squeezes, N."""
+    force_sigma: float | None
+    """Its σ, N."""
+    margin: float | None
+    """How much more pull there may be before the object slips, N; negative beyond."""
+    margin_sigma: float | None
+    """Its σ, N."""
+    common: Floats | None
+    """(3,): force of the object on both sensors, in the grip's frame, N."""
+    common_sigma: Floats | None
+    """(3,): σ of each component, N."""
+    torque: Floats | None
+    """(3,): torque of the object on both, about the origin of the grip's frame, N·m."""
+    torque_sigma: Floats | None
+    """(3,): σ of each component, N·m."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,6 +249,18 @@ def recording(path: str | os.PathLike[str], *, device: str | None = None) -> Rec
     Raises `Error` when the file is not a recording, or does not have the sensor.
     """
     return Recording(Reader(os.fspath(path), device))
+
+
+def grip(
+    first: Sensor, second: Sensor, *, poses: str | os.PathLike[str] | None = None
+) -> Grips:
+    """What two connected sensors feel together, as long as they are open. `poses`: a JSON file that
+    says where they are in the grip (`docs/robots.md`); opposing fingers, 30 mm apart, if not given.
+
+    Raises `Error` when the file cannot be used.
+    """
+    path = None if poses is None else os.fspath(poses)
+    return Grips(_Grips(first._connection, second._connection, path))
 
 
 class Sensor:
@@ -362,6 +412,43 @@ class Sensor:
             _log.log(level, "%s", line)
 
 
+class Grips:
+    """What two sensors feel together: iterates without an end, once for each frame of the first. It
+    takes the samples of both; a program that also iterates over a sensor takes some away."""
+
+    def __init__(self, grips: _Grips) -> None:
+        self._grips = grips
+
+    def __iter__(self) -> Iterator[Grip]:
+        return self
+
+    def __next__(self) -> Grip:
+        """Waits for the next one; it comes with the second sensor's next sample.
+
+        Raises `LostError` when a connection is lost.
+        """
+        time, names, contact, held, cause = self._grips.next()
+        force, margin, common, torque = held or ((None,) * 2, (None,) * 2, None, None)
+        arrays = [
+            (None, None) if it is None else (np.array(it[0]), np.array(it[1]))
+            for it in (common, torque)
+        ]
+        return Grip(
+            time=time,
+            cause=cause,
+            contact=contact,
+            status=(tuple(names[0]), tuple(names[1])),
+            force=force[0],
+            force_sigma=force[1],
+            margin=margin[0],
+            margin_sigma=margin[1],
+            common=arrays[0][0],
+            common_sigma=arrays[0][1],
+            torque=arrays[1][0],
+            torque_sigma=arrays[1][1],
+        )
+
+
 class Recording:
     """The recording of a sensor: iterates once over its samples."""
 
@@ -400,6 +487,7 @@ def _sample(
     frame: int,
     time: float,
     host_time: float,
+    exposed: float,
     bits: int,
     names: list[str],
     force: Any,
@@ -418,6 +506,7 @@ def _sample(
         frame=frame,
         time=time,
         host_time=host_time,
+        exposed=exposed,
         status=tuple(names),
         status_bits=bits,
         force=None if vector is None else np.array(vector),

@@ -15,10 +15,20 @@ _Sample = tuple[
     int,
     float,
     float,
+    float,
     int,
     list[str],
     Optional[_Force],
     Optional[list[tuple[float, float, int]]],
+]
+
+_Vectors = tuple[list[float], list[float]]
+_Grip = tuple[
+    float,
+    list[list[str]],
+    Optional[bool],
+    Optional[tuple[list[float], list[float], _Vectors, Optional[_Vectors]]],
+    Optional[str],
 ]
 
 class Error(Exception): ...
@@ -53,6 +63,12 @@ class Connection:
     ]: ...
     def take_lines(self) -> list[tuple[int, str]]: ...
     def close(self) -> None: ...
+
+class Grips:
+    def __init__(
+        self, first: Connection, second: Connection, poses: Optional[str]
+    ) -> None: ...
+    def next(self) -> _Grip: ...
 
 class Reader:
     def __init__(self, path: str, device: Optional[str]) -> None: ...

@@ -36,7 +36,7 @@ pub struct Connection {
 }
 
 /// An open connection.
-struct Talk {
+pub struct Talk {
     reader: Reader,
     is_streaming: AtomicBool,
 }
@@ -66,18 +66,17 @@ fn level(level: LogLevel) -> u8 {
 
 impl Talk {
     /// Waits for a sample with this function, for as long as the device sends messages.
-    fn sample(
+    pub fn arrived(
         &self,
         patience: Duration,
         wait: impl FnOnce(&Reader) -> Result<Option<Arrived>, Failure>,
-    ) -> Result<Option<SampleNumbers>, Failure> {
+    ) -> Result<Option<Arrived>, Failure> {
         // Two threads at once may both ask for the stream, which does no harm.
         if !self.is_streaming.load(Ordering::Relaxed) {
             self.reader.stream(patience)?;
             self.is_streaming.store(true, Ordering::Relaxed);
         }
-        let arrived = wait(&self.reader)?;
-        Ok(arrived.map(|arrived| told::sample(&arrived.sample, arrived.came_ns)))
+        wait(&self.reader)
     }
 }
 
@@ -296,6 +295,21 @@ impl Connection {
         self.talk.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
+    /// The open conversation; an error if it was closed.
+    pub fn talk(&self) -> PyResult<Arc<Talk>> {
+        self.open_talk().ok_or_else(|| raised(closed()))
+    }
+
+    /// The device's identity.
+    pub fn device(&self) -> &DeviceHello {
+        &self.hello
+    }
+
+    /// Longest wait for its answers.
+    pub fn patience(&self) -> Duration {
+        self.patience
+    }
+
     fn open_talk(&self) -> Option<Arc<Talk>> {
         self.lock().clone()
     }
@@ -307,8 +321,9 @@ impl Connection {
         wait: impl FnOnce(&Reader) -> Result<Option<Arrived>, Failure> + Send,
     ) -> PyResult<Option<SampleNumbers>> {
         // The last call under way closes the connection, which may wait, too.
-        let sample = py.detach(move || talk.sample(self.patience, wait));
-        sample.map_err(raised)
+        let arrived = py.detach(move || talk.arrived(self.patience, wait));
+        let arrived = arrived.map_err(raised)?;
+        Ok(arrived.map(|it| told::sample(&it.sample, it.came_ns, it.exposed_ns)))
     }
 
     /// Works with an open connection, without the interpreter's lock.

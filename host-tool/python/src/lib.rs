@@ -3,6 +3,7 @@
 
 mod connection;
 mod error;
+mod grip;
 mod interrupt;
 mod reader;
 mod told;
@@ -16,6 +17,8 @@ mod _hivtac {
     use crate::connection::Connection;
     #[pymodule_export]
     use crate::error::{Error, LostError, NoDeviceError, RefusedError, VersionError};
+    #[pymodule_export]
+    use crate::grip::Grips;
     #[pymodule_export]
     use crate::reader::Reader;
     #[pymodule_export]

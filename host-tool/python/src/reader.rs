@@ -2,6 +2,7 @@
 
 use crate::error::raised;
 use crate::told::{self, SampleNumbers};
+use hivtac_host::clock::Clock;
 use hivtac_host::recording::Recording;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use pyo3::prelude::*;
@@ -12,7 +13,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// A recording of one device.
 #[pyclass(frozen)]
 pub struct Reader {
-    recording: Mutex<Recording>,
+    recording: Mutex<(Recording, Clock)>,
     hello: DeviceHello,
 }
 
@@ -22,7 +23,7 @@ impl Reader {
     fn open(py: Python<'_>, path: PathBuf, device: Option<String>) -> PyResult<Reader> {
         let opened = py.detach(|| Recording::open(&path, device.as_deref()));
         let (recording, hello) = opened.map_err(raised)?;
-        let recording = Mutex::new(recording);
+        let recording = Mutex::new((recording, Clock::default()));
         Ok(Reader { recording, hello })
     }
 
@@ -34,10 +35,15 @@ impl Reader {
     /// The next sample; `None` at the end.
     fn next(&self, py: Python<'_>) -> PyResult<Option<SampleNumbers>> {
         let next = py.detach(|| {
-            let mut recording = self.lock();
+            let (recording, clock) = &mut *self.lock();
             while let Some((came_ns, message)) = recording.next_message()? {
-                if let DeviceMessage::Sample(sample) = message {
-                    return Ok(Some(told::sample(&sample, came_ns)));
+                match message {
+                    DeviceMessage::Stats(stats) => clock.latency(stats.latency_us),
+                    DeviceMessage::Sample(sample) => {
+                        let exposed_ns = clock.stamp_ns(sample.time_us, came_ns);
+                        return Ok(Some(told::sample(&sample, came_ns, exposed_ns)));
+                    }
+                    _ => (),
                 }
             }
             Ok(None)
@@ -47,13 +53,14 @@ impl Reader {
 
     /// True after the end of a recording that was cut.
     fn is_cut(&self, py: Python<'_>) -> bool {
-        py.detach(|| self.lock().is_cut())
+        py.detach(|| self.lock().0.is_cut())
     }
 
     /// The damaged parts that were skipped until now.
     fn damage(&self, py: Python<'_>) -> Vec<String> {
         py.detach(|| {
             self.lock()
+                .0
                 .damage()
                 .iter()
                 .map(ToString::to_string)
@@ -63,7 +70,7 @@ impl Reader {
 }
 
 impl Reader {
-    fn lock(&self) -> MutexGuard<'_, Recording> {
+    fn lock(&self) -> MutexGuard<'_, (Recording, Clock)> {
         self.recording
             .lock()
             .unwrap_or_else(PoisonError::into_inner)

@@ -14,11 +14,12 @@ use pyo3::types::PyDict;
 /// m, and its standard uncertainty, m.
 type ForceNumbers = ([f64; 3], [f64; 2], f64, f64, f64, Option<([f64; 2], f64)>);
 
-/// Sequence, frame, device time, s, host time, s, status bits, names of these, force, and column,
-/// row and area of each marker, px.
+/// Sequence, frame, device time, s, host times of arrival and exposure, s, status bits, names of
+/// these, force, and column, row and area of each marker, px.
 pub type SampleNumbers = (
     u32,
     u32,
+    f64,
     f64,
     f64,
     u32,
@@ -30,13 +31,14 @@ pub type SampleNumbers = (
 /// Column, row and area, px.
 pub type MarkerNumbers = (f64, f64, u32);
 
-/// A sample that was received at `came_ns`, ns since 1970.
-pub fn sample(sample: &Sample, came_ns: u64) -> SampleNumbers {
+/// A sample that was received at `came_ns` and exposed at `exposed_ns`, ns since 1970.
+pub fn sample(sample: &Sample, came_ns: u64, exposed_ns: u64) -> SampleNumbers {
     (
         sample.sequence,
         sample.frame,
         sample.time_us as f64 / 1e6,
         came_ns as f64 / 1e9,
+        exposed_ns as f64 / 1e9,
         sample.status.0,
         sample.status.names().collect(),
         sample.force.as_ref().map(force),

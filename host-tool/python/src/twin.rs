@@ -159,7 +159,8 @@ impl Simulated {
             if let DeviceMessage::Sample(mut sample) = message {
                 sample.time_us = sample.time_us.saturating_sub(self.begun_us);
                 let whole_us = now_us - self.begun_us.min(now_us);
-                samples.push(told::sample(&sample, 1000 * whole_us));
+                let exposed_ns = 1000 * sample.time_us;
+                samples.push(told::sample(&sample, 1000 * whole_us, exposed_ns));
             }
         }
     }

@@ -23,6 +23,40 @@ import hivtac
 
 sys.path.append(str(Path(__file__).parents[3] / "tests/python"))
 from rig import PATIENCE, Rig, true_force  # noqa: E402
+from twin import PRESSED, Twin  # noqa: E402
+
+
+class OnTwoTwins(unittest.TestCase):
+    def test_a_grip_is_that_of_both_presses(self):
+        other_scene = '[camera]\npreset = "mt9v034"\n' + PRESSED
+        with Twin(PRESSED) as one, Twin(other_scene, camera="mt9v034") as other:
+            with (
+                hivtac.open(one.port, timeout=PATIENCE) as thumb,
+                hivtac.open(other.port, timeout=PATIENCE) as index,
+            ):
+                grips = hivtac.grip(thumb, index)
+                known = [grip for grip, _ in zip(grips, range(60)) if grip.cause is None]
+        self.assertGreater(len(known), 20)
+        self.assertTrue(all(a.time < b.time for a, b in zip(known, known[1:])))
+        last = known[-1]
+        self.assertLess(abs(last.time - time.time()), 60)
+        self.assertTrue(last.contact)
+        alpha, beta = np.radians([5.0, -4.0])
+        x, z = 0.12 * np.sin(alpha) * np.cos(beta), -0.12 * np.cos(alpha) * np.cos(beta)
+        self.assertLess(abs(last.force + z), 4 * last.force_sigma)
+        off = np.abs(last.common - [2 * x, 0, 0])
+        self.assertTrue((off < 4 * last.common_sigma).all(), (last.common, last.common_sigma))
+        pull = np.hypot(x, 0.12 * np.sin(beta))
+        self.assertLess(abs(last.margin + 0.5 * z + pull), 4 * last.margin_sigma)
+        self.assertEqual((last.torque.shape, last.torque_sigma.shape), ((3,), (3,)))
+
+    def test_a_file_that_is_no_geometry_is_refused(self):
+        with Twin() as one, Twin(camera="mt9v034") as other, tempfile.TemporaryDirectory() as it:
+            poses = Path(it) / "poses.json"
+            poses.write_text("{}")
+            with hivtac.open(one.port) as thumb, hivtac.open(other.port) as index:
+                with self.assertRaisesRegex(hivtac.Error, "missing field `fingers`"):
+                    hivtac.grip(thumb, index, poses=poses)
 
 
 class OnTheRig(unittest.TestCase):
@@ -63,6 +97,7 @@ class OnTheRig(unittest.TestCase):
         self.assertEqual((last.place.shape, last.markers.shape), ((2,), (4, 2)))
         self.assertLess(np.abs(last.place).max(), 5e-3)
         self.assertLess(abs(last.host_time - time.time()), 60)
+        self.assertTrue(0 < last.host_time - last.exposed < 10)
 
     def test_a_slow_program_gets_arrival_times_and_the_newest_sample(self):
         with Rig() as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:

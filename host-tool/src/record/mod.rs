@@ -3,9 +3,10 @@
 mod listen;
 mod table;
 
-pub use listen::Heard;
+pub use listen::{Heard, Until, listen};
 
 use crate::device::{Devices, seconds};
+use crate::grip_command::{GripArguments, Paired};
 use crate::output::{note, print};
 use clap::Args;
 use hivtac_host::bag::{Bag, summary_of};
@@ -17,7 +18,6 @@ use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::tally::Tally;
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
-use listen::{Until, listen};
 use mcap::McapError;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,6 +45,8 @@ const FLUSH_EVERY: Duration = Duration::from_secs(1);
 pub struct RecordArguments {
     #[command(flatten)]
     devices: Devices,
+    #[command(flatten)]
+    grip: GripArguments,
     /// The file to make, ….mcap or ….csv
     file: PathBuf,
     /// End after this number of seconds
@@ -57,10 +59,13 @@ pub struct RecordArguments {
 
 /// Records until the time is over, Ctrl-C, or the loss of a device.
 pub fn run(arguments: &RecordArguments) -> Result<(), Failure> {
-    let addresses = arguments.devices.addresses()?;
+    let (devices, grip) = (&arguments.devices, &arguments.grip);
+    let addresses = grip.before(devices.timeout, || devices.addresses())?;
     check(&arguments.file, addresses.len())?;
     let (mut links, hellos) = arguments.devices.connect(&addresses)?;
+    let paired = grip.pair(&hellos)?;
     let mut recording = Recording::create(&arguments.file, &hellos)?;
+    recording.add_grip(paired)?;
     let result = recording.follow(&mut links, arguments);
     for (link, sensor) in links.iter().zip(&mut recording.sensors) {
         sensor.tally.rejected(link.rejected());
@@ -226,6 +231,15 @@ impl Recording {
             begun_ns,
             sensors,
         })
+    }
+
+    /// Also keeps what the first two devices feel together.
+    fn add_grip(&mut self, paired: Option<Paired>) -> Result<(), Failure> {
+        let (Sink::Bag(bag), Some(Paired { pair, names })) = (&mut self.sink, paired) else {
+            return Ok(());
+        };
+        bag.add_grip(pair, names)
+            .map_err(|error| unwritten(&self.partial, error))
     }
 
     /// Keeps all messages until the end; a failure of one device ends the recording.

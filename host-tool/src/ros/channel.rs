@@ -1,6 +1,7 @@
 //! Converts a sample to messages of ROS 2: the channels of a sensor, and the message of each.
 
-use super::{Definition, bool, point, polygon, string, wrench};
+use super::{Definition, bool, number, point, polygon, string, wrench, wrench_of};
+use crate::grip::{Grip, lines};
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
 
@@ -55,6 +56,82 @@ impl Channel {
         }
     }
 }
+
+/// A channel of a grip.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GripChannel {
+    /// Common force and torque.
+    Wrench,
+    /// The force that squeezes, N.
+    Force,
+    /// Its standard uncertainty, N.
+    ForceSigma,
+    /// How much more pull there may be, N.
+    Margin,
+    /// Its standard uncertainty, N.
+    MarginSigma,
+    /// Why there is no grip, else the status of both fingers.
+    Status,
+}
+
+impl GripChannel {
+    /// All channels, in the order of their numbers.
+    pub const ALL: [GripChannel; 6] = [
+        GripChannel::Wrench,
+        GripChannel::Force,
+        GripChannel::ForceSigma,
+        GripChannel::Margin,
+        GripChannel::MarginSigma,
+        GripChannel::Status,
+    ];
+
+    /// Its name below the grip's.
+    pub fn name(self) -> &'static str {
+        match self {
+            GripChannel::Wrench => "wrench",
+            GripChannel::Force => "force",
+            GripChannel::ForceSigma => "force_sigma",
+            GripChannel::Margin => "margin",
+            GripChannel::MarginSigma => "margin_sigma",
+            GripChannel::Status => "status",
+        }
+    }
+
+    /// The definition of its messages.
+    pub fn definition(self) -> &'static Definition {
+        match self {
+            GripChannel::Wrench => &super::WRENCH,
+            GripChannel::Status => &super::STRING,
+            _ => &super::FLOAT64,
+        }
+    }
+}
+
+/// The messages of a grip, each as CDR: one for each channel, in their order. What is not known is
+/// NaN. `frame` is the grip's.
+pub fn grip_messages(grip: &Grip, frame: &str, names: &[String; 2]) -> Vec<(GripChannel, Vec<u8>)> {
+    let held = grip.held.as_ref().ok();
+    let vectors = [
+        held.map(|held| held.common),
+        held.and_then(|held| held.torque.map(|(torque, _)| torque)),
+    ];
+    let [force, torque] = vectors.map(|vector| vector.unwrap_or([f64::NAN; 3]));
+    let numbers = held.map(|it| [it.force, it.force_sigma, it.margin, it.margin_sigma]);
+    let [size, size_sigma, margin, margin_sigma] = numbers.unwrap_or([f64::NAN; 4]).map(number);
+    let status = lines::cause(grip, names).unwrap_or_else(|| lines::status(grip, names));
+    let bodies = [
+        wrench_of(grip.stamp_ns, frame, force, torque),
+        size,
+        size_sigma,
+        margin,
+        margin_sigma,
+        string(&status),
+    ];
+    GripChannel::ALL.into_iter().zip(bodies).collect()
+}
+
+/// The beginning of the topics of a grip, in recordings and for Foxglove.
+pub const GRIP_TOPIC: &str = "/hivtac/grip";
 
 /// The beginning of the topics of a sensor with this serial number, in recordings and for Foxglove.
 pub fn topic_of(unit: &str) -> String {

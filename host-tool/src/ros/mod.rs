@@ -99,6 +99,12 @@ pub const BOOL: Definition = Definition {
     text: "bool data\n",
 };
 
+/// A number.
+pub const FLOAT64: Definition = Definition {
+    name: "std_msgs/msg/Float64",
+    text: "float64 data\n",
+};
+
 /// Names of status bits.
 pub const STRING: Definition = Definition {
     name: "std_msgs/msg/String",
@@ -221,10 +227,16 @@ impl Cdr {
 pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
     let [fx, fy, fz] = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let [x, y] = force.place.map_or([0.0; 2], place_m);
+    let torque = [y * fz, -x * fz, x * fy - y * fx];
+    wrench_of(stamp_ns, frame, [fx, fy, fz], torque)
+}
+
+/// A [`WRENCH`] of a force, N, and a torque, N·m.
+pub fn wrench_of(stamp_ns: u64, frame: &str, force: [f64; 3], torque: [f64; 3]) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.header(stamp_ns, frame);
-    cdr.vector([fx, fy, fz]);
-    cdr.vector([y * fz, -x * fz, x * fy - y * fx]);
+    cdr.vector(force);
+    cdr.vector(torque);
     cdr.0
 }
 
@@ -306,6 +318,13 @@ pub fn diagnostics(stamp_ns: u64, diagnosis: &Diagnosis) -> Vec<u8> {
 pub fn bool(value: bool) -> Vec<u8> {
     let mut cdr = Cdr::new();
     cdr.0.push(u8::from(value));
+    cdr.0
+}
+
+/// A [`FLOAT64`].
+pub fn number(value: f64) -> Vec<u8> {
+    let mut cdr = Cdr::new();
+    cdr.number(value.to_le_bytes());
     cdr.0
 }
 

@@ -4,7 +4,7 @@
 use super::outlet::{Outlet, Served};
 use foxglove::{ChannelBuilder, Context, FoxgloveError, PartialMetadata, RawChannel, Schema};
 use hivtac_host::failure::Failure;
-use hivtac_host::ros::channel::{Channel, topic_of};
+use hivtac_host::ros::channel::{Channel, GRIP_TOPIC, GripChannel, topic_of};
 use hivtac_host::ros::{DIAGNOSTICS, Definition};
 use hivtac_host::shown::unit_number;
 use std::net::SocketAddr;
@@ -17,15 +17,18 @@ pub struct Server {
     address: SocketAddr,
     /// The channels of each sensor, in the order of [`Channel::ALL`].
     sensors: Vec<Vec<Arc<RawChannel>>>,
+    /// Those of the grip, in the order of [`GripChannel::ALL`]; none without a grip.
+    grip: Vec<Arc<RawChannel>>,
     diagnostics: Arc<RawChannel>,
 }
 
 impl Server {
-    /// Opens a port, 0 for any free one, with the devices' channels.
+    /// Opens a port, 0 for any free one, with the devices' channels, and those of a grip if there
+    /// is one.
     ///
     /// # Errors
     /// When the port is taken.
-    pub fn open(listen: SocketAddr, served: &[Served]) -> Result<Server, Failure> {
+    pub fn open(listen: SocketAddr, served: &[Served], has_grip: bool) -> Result<Server, Failure> {
         let failed = |error: FoxgloveError| {
             Failure::input(format!(
                 "cannot listen at {listen}: {error}; choose another port with --listen"
@@ -41,6 +44,12 @@ impl Server {
             channels.collect()
         });
         let sensors = sensors.collect::<Result<_, _>>().map_err(failed)?;
+        let of_grip = GripChannel::ALL.iter().filter(|_| has_grip);
+        let grip = of_grip.map(|channel| {
+            let topic = format!("{GRIP_TOPIC}/{}", channel.name());
+            create(&context, topic, channel.definition())
+        });
+        let grip = grip.collect::<Result<_, _>>().map_err(failed)?;
         let diagnostics = create(&context, "/diagnostics".to_owned(), &DIAGNOSTICS);
         let diagnostics = diagnostics.map_err(failed)?;
         let server = context.websocket_server().name("hivtac");
@@ -54,6 +63,7 @@ impl Server {
             address: SocketAddr::new(listen.ip(), handle.port()),
             _context: context,
             sensors,
+            grip,
             diagnostics,
         })
     }
@@ -81,6 +91,14 @@ impl Outlet for Server {
     fn publish(&mut self, sensor: usize, channel: Channel, data: &[u8], came_ns: u64) -> bool {
         let when = PartialMetadata::with_log_time(came_ns);
         self.sensors[sensor][channel as usize].log_with_meta(data, when);
+        true
+    }
+
+    fn publish_grip(&mut self, channel: GripChannel, data: &[u8], came_ns: u64) -> bool {
+        let when = PartialMetadata::with_log_time(came_ns);
+        if let Some(topic) = self.grip.get(channel as usize) {
+            topic.log_with_meta(data, when);
+        }
         true
     }
 

@@ -11,11 +11,14 @@ mod sensor;
 
 use crate::device::Devices;
 use crate::follow::follow;
+use crate::grip_command::{GripArguments, Paired};
 use crate::output::{Reader, print};
 use clap::Args;
+use hivtac_host::clock::now_ns;
 use hivtac_host::failure::{Failure, Kind};
+use hivtac_host::grip::Reading;
 use hivtac_host::ros;
-use hivtac_host::ros::channel::{Frames, messages};
+use hivtac_host::ros::channel::{Frames, grip_messages, messages};
 use hivtac_host::shown::shown;
 use hivtac_host::stop;
 use hivtac_wire::message::DeviceHello;
@@ -46,13 +49,15 @@ const LAST_DOMAIN: u16 = 232;
 /// ros2,foxglove`. Prints `ready` and where; goes on after a lost connection, which diagnostics
 /// tell. Topics of the node, each below its name: `wrench`, `place`, `markers`, `contact`,
 /// `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are below
-/// /NODE/SENSOR.
+/// /NODE/SENSOR, those of a grip below /NODE/grip.
 ///
 /// Example: hivtac serve --ros2 --foxglove
 #[derive(Args)]
 pub struct ServeArguments {
     #[command(flatten)]
     devices: Devices,
+    #[command(flatten)]
+    grip: GripArguments,
     #[command(flatten)]
     outlets: Outlets,
     /// The node's name in ROS 2
@@ -98,7 +103,8 @@ struct Outlets {
 /// When this build lacks an outlet, a device is missing at the start, or an outlet cannot be
 /// opened. A device that is lost later is waited for.
 pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
-    let addresses = arguments.devices.addresses()?;
+    let (devices, grip) = (&arguments.devices, &arguments.grip);
+    let addresses = grip.before(devices.timeout, || devices.addresses())?;
     built_with(&arguments.outlets)?;
     names::check(&arguments.name)?;
     let domain = match (arguments.outlets.ros2, arguments.domain) {
@@ -110,9 +116,10 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
     if units.len() < hellos.len() {
         return Err(usage("the same sensor is named twice"));
     }
+    let paired = grip.pair(&hellos)?;
     let (served, orders): (Vec<Served>, Vec<_>) =
         served(&arguments.name, hellos).into_iter().unzip();
-    let mut outlets = outlets(arguments, domain, &served)?;
+    let mut outlets = outlets(arguments, domain, &served, paired.is_some())?;
     if tell(arguments.json, &outlets)? == Reader::Gone {
         return Ok(());
     }
@@ -134,7 +141,9 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
             scope.spawn(move || follow(address, arguments.devices.timeout, link, &mut sensor));
         }
         drop(events);
-        publish(&told, &served, &mut outlets);
+        let frame = format!("{}_grip", arguments.name);
+        let mut grips = paired.map(|paired| Grips { paired, frame });
+        publish(&told, &served, &mut grips, &mut outlets);
     });
     stop::check()
 }
@@ -215,15 +224,25 @@ fn outlets(
     arguments: &ServeArguments,
     domain: u16,
     served: &[Served],
+    has_grip: bool,
 ) -> Result<Vec<Box<dyn Outlet>>, Failure> {
     let mut outlets: Vec<Box<dyn Outlet>> = Vec::new();
     #[cfg(feature = "ros2")]
     if arguments.outlets.ros2 {
-        outlets.push(Box::new(node::Ros2::open(&arguments.name, domain, served)?));
+        outlets.push(Box::new(node::Ros2::open(
+            &arguments.name,
+            domain,
+            served,
+            has_grip,
+        )?));
     }
     #[cfg(feature = "foxglove")]
     if arguments.outlets.foxglove {
-        outlets.push(Box::new(foxglove::Server::open(arguments.listen, served)?));
+        outlets.push(Box::new(foxglove::Server::open(
+            arguments.listen,
+            served,
+            has_grip,
+        )?));
     }
     Ok(outlets)
 }
@@ -246,17 +265,57 @@ fn tell(json: bool, outlets: &[Box<dyn Outlet>]) -> Result<Reader, Failure> {
 }
 
 /// Publishes the devices' events until all their threads have ended.
-fn publish(told: &Receiver<Event>, served: &[Served], outlets: &mut [Box<dyn Outlet>]) {
+fn publish(
+    told: &Receiver<Event>,
+    served: &[Served],
+    grips: &mut Option<Grips>,
+    outlets: &mut [Box<dyn Outlet>],
+) {
     let mut turned = Instant::now();
     loop {
         match told.recv_timeout(TURN_EVERY) {
-            Ok(event) => publish_one(&event, &served[event.sensor], outlets),
+            Ok(event) => {
+                publish_one(&event, &served[event.sensor], outlets);
+                if let Some(grips) = grips {
+                    grips.publish(&event, served, outlets);
+                }
+            }
             Err(RecvTimeoutError::Timeout) => (),
             Err(RecvTimeoutError::Disconnected) => return,
         }
         if turned.elapsed() >= TURN_EVERY {
             turned = Instant::now();
             outlets.iter_mut().for_each(|outlet| outlet.turn());
+        }
+    }
+}
+
+/// The grip of the first two devices, and its coordinate frame.
+struct Grips {
+    paired: Paired,
+    frame: String,
+}
+
+impl Grips {
+    /// Publishes the grips that are known by an event. One that an outlet does not take counts as
+    /// a sample of the first finger.
+    fn publish(&mut self, event: &Event, served: &[Served], outlets: &mut [Box<dyn Outlet>]) {
+        let What::Sample(sample, stamp_ns) = &event.what else {
+            return;
+        };
+        if event.sensor > 1 {
+            return;
+        }
+        let reading = Reading::of(sample, *stamp_ns, event.came_ns);
+        let Paired { pair, names } = &mut self.paired;
+        for grip in pair.push(event.sensor, reading) {
+            let now_ns = now_ns();
+            for (channel, data) in grip_messages(&grip, &self.frame, names) {
+                let mut all = outlets.iter_mut();
+                if !all.all(|outlet| outlet.publish_grip(channel, &data, now_ns)) {
+                    served[0].not_published.fetch_add(1, Ordering::Relaxed);
+                }
+            }
         }
     }
 }

@@ -33,13 +33,16 @@ pub fn check(name: &str) -> Result<(), Failure> {
 }
 
 /// A device's own name as ROS 2 allows it, with underscores for other characters. `None` if there
-/// is no letter to begin with.
+/// is no letter to begin with, or if it is the grip's.
 fn of_device(name: &str) -> Option<String> {
     let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     let plain: String = name.chars().map(plain).collect();
     let parts: Vec<&str> = plain.split('_').filter(|part| !part.is_empty()).collect();
-    Some(parts.join("_")).filter(|name| is_legal(name))
+    Some(parts.join("_")).filter(|name| is_legal(name) && name != GRIP)
 }
+
+/// The name of the grip's topics, which no device has.
+const GRIP: &str = "grip";
 
 /// Names of the devices' topics, in the devices' order. `None` for a single device; otherwise each
 /// device's name. It is `unit_NUMBER` if ROS 2 does not allow the name or two devices share it.
@@ -71,6 +74,7 @@ mod tests {
             ("Daumen rechts äußen", Some("Daumen_rechts_u_en")),
             ("\u{1b}[31mred", None),
             ("3rd", None),
+            ("grip", None),
             ("±", None),
             ("", None),
         ] {

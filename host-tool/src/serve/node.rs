@@ -9,7 +9,7 @@ use super::sensor::{Answer, TareOrder, Told};
 use crate::output::note;
 use hivtac_host::down::direction;
 use hivtac_host::failure::Failure;
-use hivtac_host::ros::channel::Channel;
+use hivtac_host::ros::channel::{Channel, GripChannel};
 use hivtac_host::ros::{DIAGNOSTICS, Definition, trigger_reply, vector_stamped};
 use hivtac_host::shown::shown;
 use hivtac_terms::down::Down;
@@ -38,6 +38,8 @@ const CYCLONES_HEADER: usize = 16;
 const LONGEST_RECEIVED: usize = 512;
 /// Time between two checks for another node of this name.
 const LOOK_EVERY: Duration = Duration::from_secs(1);
+/// Time without any other program of the domain until that is reported.
+const ALONE: Duration = Duration::from_secs(10);
 
 /// A message as CDR, without its encoding; it is written and read unchanged.
 #[derive(Clone)]
@@ -113,8 +115,12 @@ struct Sensor {
 /// The node.
 pub struct Ros2 {
     sensors: Vec<Sensor>,
+    /// In the order of [`GripChannel::ALL`]; none without a grip.
+    grip: Vec<Publisher<Body>>,
     diagnostics: Publisher<Body>,
     looked: Instant,
+    /// Since when no other program was seen; `None` once one was, or that was reported.
+    alone: Option<Instant>,
     /// Whether another node of this name was reported.
     is_told: bool,
     node: Node,
@@ -125,12 +131,18 @@ pub struct Ros2 {
 }
 
 impl Ros2 {
-    /// Joins a domain as a node with this name, with the devices' topics and services below it.
+    /// Joins a domain as a node with this name, with the devices' topics and services below it, and
+    /// the topics of a grip if there is one.
     ///
     /// # Errors
     /// When there is no network to join, not even this computer's own.
-    pub fn open(name: &str, domain: u16, served: &[Served]) -> Result<Ros2, Failure> {
-        Ros2::try_to_open(name, domain, served).map_err(|error| {
+    pub fn open(
+        name: &str,
+        domain: u16,
+        served: &[Served],
+        has_grip: bool,
+    ) -> Result<Ros2, Failure> {
+        Ros2::try_to_open(name, domain, served, has_grip).map_err(|error| {
             Failure::input(format!(
                 "cannot take part in ROS 2's domain {domain}: {error}; is a network up, and is \
                  UDP allowed?"
@@ -142,6 +154,7 @@ impl Ros2 {
         name: &str,
         domain: u16,
         served: &[Served],
+        has_grip: bool,
     ) -> Result<Ros2, Box<dyn std::error::Error>> {
         let mut participant = DomainParticipantBuilder::new(domain);
         if stays_here() {
@@ -156,18 +169,51 @@ impl Ros2 {
         let sensors = served.iter().zip(&folders);
         let sensors = sensors.map(|(served, folder)| Sensor::open(&mut node, folder, served));
         let sensors = sensors.collect::<Result<_, _>>()?;
+        let of_grip = GripChannel::ALL.iter().filter(|_| has_grip);
+        let grip = of_grip.map(|channel| {
+            let name = Name::new(&format!("/{name}/grip"), channel.name())?;
+            Ok(publisher(&mut node, &name, channel.definition())?)
+        });
+        let grip = grip.collect::<Result<_, Box<dyn std::error::Error>>>()?;
         let diagnostics = Name::new("/", "diagnostics")?;
         let first = folders.first().map_or("", String::as_str);
         Ok(Ros2 {
             sensors,
+            grip,
             diagnostics: publisher(&mut node, &diagnostics, &DIAGNOSTICS)?,
             looked: Instant::now(),
+            alone: Some(Instant::now()),
             is_told: false,
             node,
             context,
             own_topic: format!("rt{first}/{}", Channel::Status.name()),
             domain,
         })
+    }
+
+    /// Reports once when no other program of the domain is seen.
+    fn look_for_company(&mut self) {
+        let Some(since) = self.alone else {
+            return;
+        };
+        let participant = self.context.domain_participant();
+        let own = participant.guid().prefix;
+        let writers = participant.discovered_writers().into_iter();
+        let readers = participant.discovered_readers().into_iter();
+        let mut others = writers
+            .map(|it| it.publication_topic_data.key.prefix)
+            .chain(readers.map(|it| it.reader_proxy.remote_reader_guid.prefix));
+        if others.any(|prefix| prefix != own) {
+            self.alone = None;
+        } else if since.elapsed() >= ALONE {
+            self.alone = None;
+            note(&format!(
+                "hivtac: nothing else of ROS 2 is in domain {} so far; is ROS_DOMAIN_ID the same \
+                 there, and do both reach one network? Nodes on Zenoh (rmw_zenoh_cpp) do not see \
+                 this one (docs/robots.md)",
+                self.domain
+            ));
+        }
     }
 
     /// Reports once when another node has this name, because their messages would mix.
@@ -344,6 +390,11 @@ impl Outlet for Ros2 {
         publisher.publish(Body::of(data)).is_ok()
     }
 
+    fn publish_grip(&mut self, channel: GripChannel, data: &[u8], _: u64) -> bool {
+        let publisher = self.grip.get(channel as usize);
+        publisher.is_none_or(|publisher| publisher.publish(Body::of(data)).is_ok())
+    }
+
     fn diagnostics(&mut self, data: &[u8], _: u64) {
         // An error is ignored: the next message comes in a second.
         let _ = self.diagnostics.publish(Body::of(data));
@@ -358,6 +409,7 @@ impl Outlet for Ros2 {
         if self.looked.elapsed() >= LOOK_EVERY {
             self.looked = Instant::now();
             self.look_for_another();
+            self.look_for_company();
         }
     }
 }

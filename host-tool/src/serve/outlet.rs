@@ -1,7 +1,7 @@
 //! The interface to a program's outlet, which ROS 2 and Foxglove share.
 
 use super::sensor::{TareOrder, Told};
-use hivtac_host::ros::channel::{Channel, Frames};
+use hivtac_host::ros::channel::{Channel, Frames, GripChannel};
 use hivtac_wire::message::DeviceHello;
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
@@ -15,6 +15,10 @@ pub trait Outlet {
     /// Publishes a device's message, as CDR, that was received at `came_ns`, ns since 1970. False
     /// if it could not be published.
     fn publish(&mut self, sensor: usize, channel: Channel, data: &[u8], came_ns: u64) -> bool;
+
+    /// Publishes a message of the grip, as CDR, that was known at `came_ns`, ns since 1970. False
+    /// if it could not be published.
+    fn publish_grip(&mut self, channel: GripChannel, data: &[u8], came_ns: u64) -> bool;
 
     /// Publishes the state of devices.
     fn diagnostics(&mut self, data: &[u8], came_ns: u64);

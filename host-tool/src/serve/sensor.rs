@@ -3,7 +3,7 @@
 use super::diagnosis::diagnose;
 use crate::follow::{Follower, note_connected_again};
 use crate::output::note;
-use hivtac_host::clock::{LiveClock, now_ns};
+use hivtac_host::clock::{Arrival, LiveClock, now_ns};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::page::State;
@@ -91,16 +91,16 @@ impl Sensor {
         }
     }
 
-    /// Handles a message that was received at `came_ns`, ns since 1970.
-    fn take(&mut self, message: DeviceMessage, came_ns: u64) {
+    /// Handles a message that has just arrived.
+    fn take(&mut self, message: DeviceMessage) {
+        let came = Arrival::now();
         self.state.take(&message);
         match message {
             DeviceMessage::Sample(sample) => {
-                let came = Instant::now();
-                let stamp_ns = self.clock.stamp_ns(sample.time_us, came, came_ns);
+                let stamp_ns = self.clock.stamp_ns(sample.time_us, came);
                 let since = self.since.unwrap_or_default();
                 self.since = Some(since | sample.status);
-                self.tell(came_ns, What::Sample(Box::new(sample), stamp_ns));
+                self.tell(came.ns, What::Sample(Box::new(sample), stamp_ns));
             }
             DeviceMessage::Stats(stats) => self.clock.latency(stats.latency_us),
             DeviceMessage::Log(line) => note(&log_text(&line)),
@@ -130,7 +130,7 @@ impl Sensor {
 
     fn tare(&mut self, link: &mut Link) -> Result<String, Failure> {
         let (request, patience, done) = usual_tare(self.patience);
-        link.request(request, patience, |message| self.take(message, now_ns()))?;
+        link.request(request, patience, |message| self.take(message))?;
         Ok(done)
     }
 
@@ -149,7 +149,7 @@ impl Sensor {
 
 impl Follower for Sensor {
     fn message(&mut self, message: DeviceMessage) {
-        self.take(message, now_ns());
+        self.take(message);
     }
 
     fn lost(&mut self, failure: Failure, rejected: Rejected) {

@@ -57,6 +57,10 @@ fn samples_have_the_time_of_their_arrival_however_late_they_are_taken() {
     assert!(all.iter().map(|arrived| arrived.sample.sequence).eq(0..40));
     let lasted_ns = all[39].came_ns - all[0].came_ns;
     assert!(lasted_ns >= 150_000_000, "{lasted_ns}");
+    assert!(
+        all.iter()
+            .all(|arrived| arrived.exposed_ns <= arrived.came_ns)
+    );
     assert_eq!(reader.missed(), 0);
 }
 
@@ -95,7 +99,7 @@ fn a_wait_has_an_end_and_takes_what_is_there() {
 #[test]
 fn a_lost_connection_is_told_after_the_last_sample() {
     let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| {
-        assert!(device.answer_one() && device.answer_one());
+        assert!((0..3).all(|_| device.answer_one()));
         device.send(sample(0, 0));
         device.end_after_what_was_sent();
     })]);

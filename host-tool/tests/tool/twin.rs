@@ -404,3 +404,85 @@ fn a_twin_has_no_loader() {
     );
     assert_eq!(twin.json(&["info"])["board"], "twin + ov7725");
 }
+
+/// Two fingers press an object from both sides as `PRESSED` says: what squeezes is the force
+/// straight in, and what pulls both is the part along x; the second finger's y is turned over.
+#[test]
+fn two_twins_are_a_grip() {
+    let (thumb, _) = Twin::pressed(&[]);
+    let folder = tempfile::tempdir().unwrap();
+    let scene = text(&folder, "press.toml");
+    let camera = "[camera]\npreset = \"mt9v034\"\n";
+    std::fs::write(&scene, [camera, PRESSED].concat()).unwrap();
+    let index = Twin::in_folder(folder, &["--scene", &scene, "--camera", "mt9v034"]);
+    thumb.done(&["settings", "set", "name", "thumb"]);
+    index.done(&["settings", "set", "name", "index"]);
+    let fingers = format!("{},{}", thumb.port, index.port);
+    let shown = run(&["grip", &fingers, "--json", "--seconds", "2"]);
+    assert_eq!(shown.code, Some(0), "{}", shown.stderr);
+    let grips: Vec<Value> = (shown.stdout.lines())
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert!(grips.len() > 20, "{}", grips.len());
+    let last = grips.last().unwrap();
+    assert_eq!(
+        (&last["cause"], &last["contact"]),
+        (&Value::Null, &true.into()),
+        "{last}"
+    );
+    assert!(last["status"]["thumb"].is_array() && last["status"]["index"].is_array());
+    let held = &last["grip"];
+    let number = |value: &Value| value.as_f64().unwrap_or_else(|| panic!("{last}"));
+    let [alpha, beta] = [5.0_f64, -4.0].map(f64::to_radians);
+    let [x, z] = [
+        0.12 * alpha.sin() * beta.cos(),
+        -0.12 * alpha.cos() * beta.cos(),
+    ];
+    let near = |found: f64, wanted: f64, sigma: f64| {
+        assert!(
+            (found - wanted).abs() < 4.0 * sigma,
+            "{found} for {wanted} ± {sigma}: {last}"
+        );
+    };
+    near(number(&held["force_n"]), -z, number(&held["force_sigma_n"]));
+    for (axis, wanted) in [2.0 * x, 0.0, 0.0].into_iter().enumerate() {
+        let [found, sigma] = ["common_n", "common_sigma_n"].map(|it| number(&held[it][axis]));
+        near(found, wanted, sigma);
+    }
+    let pull = x.hypot(0.12 * beta.sin());
+    near(
+        number(&held["margin_n"]),
+        -0.5 * z - pull,
+        number(&held["margin_sigma_n"]),
+    );
+    assert!(shown.stderr.contains("latency: p50"), "{}", shown.stderr);
+}
+
+#[test]
+fn a_grip_needs_two_fingers_and_its_file() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    let port = &twin.port;
+    let alone = run(&["grip", port]);
+    assert_eq!(alone.code, Some(2));
+    assert!(
+        alone.stderr.contains("two fingers are needed"),
+        "{}",
+        alone.stderr
+    );
+    let other = Twin::of(&["--scene", "rest", "--camera", "mt9v034"]);
+    let file = text(&twin.folder, "poses.json");
+    let fingers = format!("{port},{}", other.port);
+    let missing = run(&["grip", &fingers, "--poses", &file]);
+    assert_eq!(missing.code, Some(1));
+    assert!(missing.stderr.contains("cannot read"), "{}", missing.stderr);
+    std::fs::write(&file, "{}").unwrap();
+    let empty = run(&["grip", &fingers, "--poses", &file]);
+    let why = "poses.json: it is no geometry of a grip: missing field `fingers`";
+    assert!(empty.stderr.contains(why), "{}", empty.stderr);
+    let recorded = text(&twin.folder, "grip.mcap");
+    let run = run(&["record", &recorded, "--grip", &fingers, "--seconds", "1"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    let bytes = std::fs::read(recorded).unwrap();
+    let topic = b"/hivtac/grip/margin_sigma";
+    assert!(bytes.windows(topic.len()).any(|it| it == topic));
+}
