@@ -7,8 +7,8 @@
 //! Values: direction of gravity ([`down`]), shape of what presses ([`contact_shape`]), thresholds
 //! ([`threshold`]), forces ([`force_fields`], [`decimal`]), markers ([`marker_fields`]), texts
 //! ([`shown`]), the usual tare ([`usual_tare`]), counts ([`tally`]), true forces ([`truth`]), times
-//! ([`clock`]), what two fingers feel together ([`grip`]). Also the live page ([`page`]), and recordings: written ([`bag`], [`ros`]) and read
-//! ([`recording`]).
+//! ([`clock`]), what two fingers feel together ([`grip`]). Also the live page ([`page`]), and
+//! recordings: written ([`bag`], [`ros`]) and read ([`recording`]).
 //!
 //! In a browser (`web/`) there are neither ports nor files: what needs them is left out there.
 
