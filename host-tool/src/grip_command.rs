@@ -3,7 +3,7 @@
 
 use crate::device::seconds;
 use crate::output::{self, Reader, note, print};
-use crate::record::{Heard, Until, listen};
+use crate::record::{Heard, listen_to_all};
 use clap::Args;
 use hivtac_host::clock::{Clock, now_ns};
 use hivtac_host::failure::{Failure, Kind};
@@ -13,11 +13,11 @@ use hivtac_host::grip::{Grip, Reading, lines};
 use hivtac_host::link::Link;
 use hivtac_host::named;
 use hivtac_host::port::Address;
+use hivtac_host::shown::unit_number;
 use hivtac_host::stop;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver};
+use std::sync::mpsc::Receiver;
 use std::time::{Duration, Instant};
 
 /// The fingers of a grip: names or serial numbers of sensors, or ports.
@@ -94,8 +94,9 @@ impl GripArguments {
     /// # Errors
     /// When the file with the poses cannot be used.
     pub fn pair(&self, hellos: &[DeviceHello]) -> Result<Option<Paired>, Failure> {
-        let paired = |_: &Fingers| Paired::new(self.grip_poses.as_ref(), hellos);
-        self.grip.as_ref().map(paired).transpose()
+        let geometry = geometry(self.grip_poses.as_ref())?;
+        let paired = |_: &Fingers| Paired::new(geometry, hellos);
+        Ok(self.grip.as_ref().map(paired))
     }
 }
 
@@ -108,14 +109,27 @@ pub struct Paired {
 }
 
 impl Paired {
-    fn new(poses: Option<&PathBuf>, hellos: &[DeviceHello]) -> Result<Paired, Failure> {
-        let geometry = poses.map(|path| Geometry::read(path)).transpose()?;
-        let names = [0, 1].map(|finger| hellos.get(finger).map(lines::finger).unwrap_or_default());
-        Ok(Paired {
-            pair: Pair::new(geometry.unwrap_or_default()),
+    /// The first two of these devices; names that are the same give way to serial numbers.
+    fn new(geometry: Geometry, hellos: &[DeviceHello]) -> Paired {
+        let each = |name: fn(&DeviceHello) -> String| {
+            [0, 1].map(|finger| hellos.get(finger).map(name).unwrap_or_default())
+        };
+        let [first, second] = each(lines::finger);
+        let names = match first == second {
+            true => each(|hello| unit_number(&hello.device_id)),
+            false => [first, second],
+        };
+        Paired {
+            pair: Pair::new(geometry),
             names,
-        })
+        }
     }
+}
+
+/// The geometry of a file; the usual one without.
+fn geometry(poses: Option<&PathBuf>) -> Result<Geometry, Failure> {
+    let read = poses.map(|path| Geometry::read(path)).transpose()?;
+    Ok(read.unwrap_or_default())
 }
 
 /// Show what two fingers feel together: grip force, common wrench, friction margin
@@ -146,6 +160,7 @@ pub struct GripCommand {
 
 /// Shows grips until the time is over, the reader is gone, or a finger is lost.
 pub fn run(command: &GripCommand) -> Result<(), Failure> {
+    let geometry = geometry(command.poses.as_ref())?;
     let addresses = command.fingers.addresses(command.timeout)?;
     let connect = |address| Link::connect(address, command.timeout);
     let connected: Result<Vec<_>, _> = addresses.iter().map(connect).collect();
@@ -154,7 +169,7 @@ pub fn run(command: &GripCommand) -> Result<(), Failure> {
         return Err(Failure::new(Kind::Usage, "the same sensor is named twice"));
     }
     let mut shown = Shown {
-        paired: Paired::new(command.poses.as_ref(), &hellos)?,
+        paired: Paired::new(geometry, &hellos),
         clocks: [Clock::default(), Clock::default()],
         begun: Instant::now(),
         begun_ns: now_ns(),
@@ -164,32 +179,8 @@ pub fn run(command: &GripCommand) -> Result<(), Failure> {
     if !command.json {
         print(&lines::header())?;
     }
-    let is_over = AtomicBool::new(false);
-    let until = &Until {
-        duration: command.seconds,
-        is_over: &is_over,
-    };
-    let (said, heard) = mpsc::channel();
-    let result: Result<(), Failure> = std::thread::scope(|scope| {
-        let each = links.iter_mut().enumerate();
-        let threads: Vec<_> = each
-            .map(|(finger, link)| {
-                let said = said.clone();
-                scope.spawn(move || {
-                    let result = listen(link, finger, command.timeout, until, &said);
-                    until.is_over.store(true, Ordering::Relaxed);
-                    result
-                })
-            })
-            .collect();
-        drop(said);
-        let shown = shown.all(&heard);
-        is_over.store(true, Ordering::Relaxed);
-        let results = threads.into_iter().map(|thread| match thread.join() {
-            Ok(result) => result,
-            Err(panic) => std::panic::resume_unwind(panic),
-        });
-        std::iter::once(shown).chain(results).collect()
+    let result = listen_to_all(&mut links, command.timeout, command.seconds, |heard| {
+        shown.all(heard)
     });
     note(&shown.lateness.summary());
     result.and_then(|()| stop::check())

@@ -5,7 +5,7 @@ use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
 use hivtac_wire::message::{DeviceMessage, Request};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::Sender;
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::time::{Duration, Instant};
 
 /// Longest wait for a message between two checks whether the recording is over.
@@ -23,16 +23,58 @@ pub struct Heard {
     pub message: DeviceMessage,
 }
 
-/// The end of a recording.
-pub struct Until<'f> {
+/// When sensors stop streaming.
+struct Until<'f> {
     /// Time for which samples flow; `None` for no limit.
-    pub duration: Option<Duration>,
+    duration: Option<Duration>,
     /// True after a failure: no more messages are kept.
-    pub is_over: &'f AtomicBool,
+    is_over: &'f AtomicBool,
+}
+
+/// Has all sensors stream for some time (`None` for no limit), or until one fails or `keep`, which
+/// gets all their messages, returns.
+///
+/// # Errors
+/// That of `keep`, or the first of a sensor.
+pub fn listen_to_all(
+    links: &mut [Link],
+    patience: Duration,
+    duration: Option<Duration>,
+    keep: impl FnOnce(&Receiver<Heard>) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let is_over = AtomicBool::new(false);
+    let until = &Until {
+        duration,
+        is_over: &is_over,
+    };
+    let (said, heard) = mpsc::channel();
+    std::thread::scope(|scope| {
+        let each = links.iter_mut().enumerate();
+        let threads: Vec<_> = each
+            .map(|(sensor, link)| {
+                let said = said.clone();
+                scope.spawn(move || {
+                    let result = listen(link, sensor, patience, until, &said);
+                    if result.is_err() {
+                        until.is_over.store(true, Ordering::Relaxed);
+                    }
+                    result
+                })
+            })
+            .collect();
+        drop(said);
+        let kept = keep(&heard);
+        is_over.store(true, Ordering::Relaxed);
+        let results = threads.into_iter().map(|thread| match thread.join() {
+            Ok(result) => result,
+            Err(panic) => std::panic::resume_unwind(panic),
+        });
+        std::iter::once(kept).chain(results).collect()
+    })
 }
 
 /// Has a sensor stream until the end; passes on all its messages, including its last counters.
-pub fn listen(
+fn listen(
     link: &mut Link,
     sensor: usize,
     patience: Duration,

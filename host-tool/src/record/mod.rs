@@ -3,7 +3,7 @@
 mod listen;
 mod table;
 
-pub use listen::{Heard, Until, listen};
+pub use listen::{Heard, listen_to_all};
 
 use crate::device::{Devices, seconds};
 use crate::grip_command::{GripArguments, Paired};
@@ -25,8 +25,7 @@ use std::fmt::Display;
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, IsTerminal, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use table::Table;
 
@@ -244,34 +243,9 @@ impl Recording {
 
     /// Keeps all messages until the end; a failure of one device ends the recording.
     fn follow(&mut self, links: &mut [Link], arguments: &RecordArguments) -> Result<(), Failure> {
-        let is_over = AtomicBool::new(false);
-        let until = &Until {
-            duration: arguments.seconds,
-            is_over: &is_over,
-        };
-        let (said, heard) = mpsc::channel();
-        std::thread::scope(|scope| {
-            let each = links.iter_mut().enumerate();
-            let threads: Vec<_> = each
-                .map(|(sensor, link)| {
-                    let said = said.clone();
-                    scope.spawn(move || {
-                        let result = listen(link, sensor, arguments.devices.timeout, until, &said);
-                        if result.is_err() {
-                            until.is_over.store(true, Ordering::Relaxed);
-                        }
-                        result
-                    })
-                })
-                .collect();
-            drop(said);
-            let kept = self.keep_all(&heard);
-            is_over.store(true, Ordering::Relaxed);
-            let results = threads.into_iter().map(|thread| match thread.join() {
-                Ok(result) => result,
-                Err(panic) => std::panic::resume_unwind(panic),
-            });
-            std::iter::once(kept).chain(results).collect()
+        let patience = arguments.devices.timeout;
+        listen_to_all(links, patience, arguments.seconds, |heard| {
+            self.keep_all(heard)
         })
     }
 

@@ -216,6 +216,31 @@ fn every_exit_code_is_provoked() {
     }
 }
 
+/// Each pattern of the LED, and what the tests of the flashed program in the rig expect of it.
+const PATTERNS: [(&str, &str); 6] = [
+    ("breathes, 4 s", "Pattern::Breathes(4.0)"),
+    ("blinks once a second", "Pattern::Flashes(1, 1.0)"),
+    ("blinks five times a second", "Pattern::Flashes(1, 0.2)"),
+    (
+        "three flashes every two seconds",
+        "Pattern::Flashes(3, 2.0)",
+    ),
+    ("two flashes a second", "Pattern::Flashes(2, "),
+    // No program runs.
+    ("dark, or always lit", ""),
+];
+
+#[test]
+fn every_pattern_of_the_led_is_seen_in_the_rig() {
+    let page = page();
+    let told = first_cells(section(&page, "The LED"));
+    assert_eq!(told, PATTERNS.map(|(pattern, _)| pattern));
+    let tests = root_file("twin/rig/tests/led.rs");
+    for (pattern, expected) in PATTERNS {
+        assert!(tests.contains(expected), "no test expects {pattern}");
+    }
+}
+
 /// What the page quotes with the tool's name before it, and what provokes it.
 fn saying(quoted: &str) -> String {
     match quoted {
