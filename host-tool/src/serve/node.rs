@@ -142,6 +142,12 @@ impl Ros2 {
         served: &[Served],
         has_grip: bool,
     ) -> Result<Ros2, Failure> {
+        if std::env::var_os("RMW_IMPLEMENTATION").is_some_and(|it| it == "rmw_zenoh_cpp") {
+            note(
+                "hivtac: RMW_IMPLEMENTATION is rmw_zenoh_cpp, but this node speaks DDS, and nodes \
+                 on Zenoh do not see it (docs/robots.md)",
+            );
+        }
         Ros2::try_to_open(name, domain, served, has_grip).map_err(|error| {
             Failure::input(format!(
                 "cannot take part in ROS 2's domain {domain}: {error}; is a network up, and is \
