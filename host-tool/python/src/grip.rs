@@ -52,11 +52,7 @@ struct State {
 impl Grips {
     /// Of two connections; `poses` is a file (docs/robots.md).
     #[new]
-    fn new(
-        first: &Connection,
-        second: &Connection,
-        poses: Option<PathBuf>,
-    ) -> PyResult<Grips> {
+    fn new(first: &Connection, second: &Connection, poses: Option<PathBuf>) -> PyResult<Grips> {
         let geometry = poses.map(|path| Geometry::read(&path)).transpose();
         let geometry = geometry.map_err(raised)?.unwrap_or_default();
         Ok(Grips {
