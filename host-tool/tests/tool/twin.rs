@@ -1,9 +1,16 @@
 //! Tests `hivtac twin`: it answers every command as a device does, and its forces are true.
 
 use crate::run::*;
+use hivtac_host::clock::Clock;
+use hivtac_host::grip::Reading;
+use hivtac_host::grip::geometry::Geometry;
+use hivtac_host::grip::pair::Pair;
+use hivtac_host::recording::Recording;
+use hivtac_wire::message::DeviceMessage;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::Child;
 
 const MODEL: &str = concat!(
@@ -479,10 +486,65 @@ fn a_grip_needs_two_fingers_and_its_file() {
     let empty = run(&["grip", &fingers, "--poses", &file]);
     let why = "poses.json: it is no geometry of a grip: missing field `fingers`";
     assert!(empty.stderr.contains(why), "{}", empty.stderr);
+}
+
+/// Recorded grips are those that come of both sensors' recorded samples, on one clock.
+#[test]
+fn a_grip_is_recorded_beside_its_sensors() {
+    let twin = Twin::of(&["--scene", "rest"]);
+    let other = Twin::of(&["--scene", "rest", "--camera", "mt9v034"]);
+    let fingers = format!("{},{}", twin.port, other.port);
     let recorded = text(&twin.folder, "grip.mcap");
     let run = run(&["record", &recorded, "--grip", &fingers, "--seconds", "1"]);
     assert_eq!(run.code, Some(0), "{}", run.stderr);
-    let bytes = std::fs::read(recorded).unwrap();
-    let topic = b"/hivtac/grip/margin_sigma";
-    assert!(bytes.windows(topic.len()).any(|it| it == topic));
+    let recorded_forces = numbers_of(&recorded, "/hivtac/grip/force");
+    assert!(recorded_forces.len() > 20, "{}", recorded_forces.len());
+    let units = [&twin, &other].map(|it| it.json(&["info"])["device_id"].clone());
+    let forces = forces_of_both(&recorded, &units.map(|it| it.as_str().unwrap().to_owned()));
+    // By their bits: what is not known is NaN.
+    let bits = |forces: Vec<f64>| forces.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+    assert_eq!(bits(forces), bits(recorded_forces));
+}
+
+/// The numbers of a topic with numbers alone.
+fn numbers_of(file: &str, topic: &str) -> Vec<f64> {
+    let bytes = std::fs::read(file).unwrap();
+    let messages = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap);
+    let of_topic = messages.filter(|message| message.channel.topic == topic);
+    // Behind the encoding.
+    let number = |message: mcap::Message| message.data[4..].try_into().map(f64::from_le_bytes);
+    of_topic.map(|message| number(message).unwrap()).collect()
+}
+
+/// The grip forces that come of what a file has of two sensors.
+fn forces_of_both(file: &str, units: &[String; 2]) -> Vec<f64> {
+    let mut all = Vec::new();
+    for (finger, unit) in units.iter().enumerate() {
+        let (mut recording, _) = Recording::open(Path::new(file), Some(unit)).unwrap();
+        while let Some((came_ns, message)) = recording.next_message().unwrap() {
+            all.push((came_ns, finger, message));
+        }
+    }
+    all.sort_by_key(|(came_ns, ..)| *came_ns);
+    let mut clocks = [Clock::default(), Clock::default()];
+    let mut pair = Pair::new(Geometry::default());
+    let mut forces = Vec::new();
+    for (came_ns, finger, message) in all {
+        match message {
+            DeviceMessage::Stats(stats) => clocks[finger].latency(stats.latency_us),
+            DeviceMessage::Sample(sample) => {
+                let stamp_ns = clocks[finger].stamp_ns(sample.time_us, came_ns);
+                let grips = pair.push(finger, Reading::of(&sample, stamp_ns, came_ns));
+                forces.extend(
+                    grips
+                        .iter()
+                        .map(|it| it.held.map_or(f64::NAN, |it| it.force)),
+                );
+            }
+            _ => (),
+        }
+    }
+    forces
 }
