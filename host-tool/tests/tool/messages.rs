@@ -263,6 +263,13 @@ fn saying(quoted: &str) -> String {
         "no sensor found: no serial port has USB id 1209:0001" | "more than one sensor found" => {
             in_tests_of("host-tool/src/port.rs", quoted)
         }
+        #[cfg(not(feature = "ros2"))]
+        "this hivtac was built without ROS 2" => run(&["serve", "--ros2"]).stderr,
+        #[cfg(feature = "ros2")]
+        "this hivtac was built without ROS 2" => format!("hivtac: {quoted}"),
+        "nothing else of ROS 2 is in domain"
+        | "RMW_IMPLEMENTATION is rmw_zenoh_cpp"
+        | "another node in domain" => in_tests_of("tests/python/test_serve.py", quoted),
         quoted => panic!("nothing provokes {quoted:?}"),
     }
 }
@@ -279,10 +286,10 @@ fn taken() -> String {
     second.replace(&device.port, "/dev/ttyACM0")
 }
 
-/// The tool's message, as the tests beside the code expect it: ports cannot be plugged in here.
+/// The tool's message, as other tests expect it: here no port can be plugged in, nor is ROS 2 built.
 fn in_tests_of(file: &str, quoted: &str) -> String {
     let source = root_file(file);
-    let (_, tests) = source.split_once("#[cfg(test)]").unwrap();
+    let (_, tests) = source.split_once("#[cfg(test)]").unwrap_or(("", &source));
     let text: String = tests.split("\\\n").map(str::trim_start).collect();
     assert!(
         text.contains(quoted),
