@@ -305,7 +305,7 @@ mod tests {
         bench.until_the_rest_of_a_line();
         bench.feed.lock().is_ready = true;
         bench.step();
-        bench.words.extend(bench.feed.lock().words.drain(..));
+        bench.words.append(&mut bench.feed.lock().words);
         word_by_word.until_the_rest_of_a_line();
         word_by_word.step();
         assert_eq!(bench.words, word_by_word.words);
