@@ -2,7 +2,9 @@
 
 use crate::capture_task::{self, Action};
 use crate::orders::{Order, order};
-use crate::{info, loader, memory, model_upload, outbox, session, settings, snapshot, stats};
+use crate::{
+    info, loader, memory, model_upload, outbox, session, settings, snapshot, starts, stats,
+};
 use hivtac_wire::decoder::Received;
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Outcome, Reply, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -30,6 +32,7 @@ pub async fn handle(received: Received<HostMessage>) {
 }
 
 async fn greet(prefix: HelloPrefix) {
+    starts::good();
     session::begin(prefix.is_ours());
     outbox::clear();
     outbox::answer(DeviceMessage::Hello(info::hello())).await;

@@ -2,30 +2,31 @@
 //!
 //! | what | ends in |
 //! |---|---|
-//! | panic | a line on the debug probe, then a hard fault (`panic-probe`) |
-//! | hard fault: stack overflow, wild pointer, panic | reset at once, touching neither stack nor memory |
-//! | interrupt without a handler | reset |
-//! | thread mode stands still for 2 s, or the core is locked up | reset by the watchdog |
+//! | panic | a record (`failure`) and a line on the debug probe, then a reset |
+//! | hard fault: stack overflow, wild pointer | a record, then a reset |
+//! | interrupt without a handler | the same |
+//! | the start or thread mode stands still for 2 s, or the core is locked up | reset by the watchdog |
 
+use crate::{failure, seeded_bugs, starts};
 use core::sync::atomic::{AtomicU8, Ordering};
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
-use embassy_stm32::pac::{DBGMCU, RCC};
-use embassy_stm32::peripherals::IWDG1;
-use embassy_stm32::wdg::IndependentWatchdog;
+use embassy_stm32::pac::iwdg::vals::{Key, Pr};
+use embassy_stm32::pac::{DBGMCU, IWDG1};
 use embassy_time::{Duration, Timer};
 use hivtac_wire::health::ResetReason;
-use panic_probe as _;
 
 /// Why the microcontroller started, a `ResetReason`. Written at boot; read by the memory task.
 static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
 
 /// A quarter of the watchdog's time.
 const FEED_PERIOD: Duration = Duration::from_millis(500);
+/// Of the watchdog's 32 kHz, of which it counts 4,096: 2.05 s.
+const WATCHDOG_DIVIDER: Pr = Pr::DIVIDE_BY16;
 
-/// Logs why the microcontroller was reset, keeps that for the host, and clears the reasons.
+/// Logs why the microcontroller was reset, and keeps that for the host. Call first, and once.
 pub fn report_reset() {
-    let reasons = RCC.rsr().read();
+    let reasons = starts::reset_flags();
     // Each reset also pulls the reset line, and a power-on also sets the flags of other supply
     // resets.
     let reason = match () {
@@ -37,6 +38,8 @@ pub fn report_reset() {
         () => ResetReason::Other,
     };
     RESET_REASON.store(reason as u8, Ordering::Relaxed);
+    let was_unpowered = matches!(reason, ResetReason::PowerOn | ResetReason::BrownOut);
+    failure::started(was_unpowered, reason == ResetReason::Watchdog);
     defmt::info!(
         "reset: power {=bool}, pin {=bool}, software or fault {=bool}, watchdog {=bool}",
         reasons.porrstf(),
@@ -44,7 +47,6 @@ pub fn report_reset() {
         reasons.sftrstf(),
         reasons.iwdg1rstf()
     );
-    RCC.rsr().modify(|w| w.set_rmvf(true));
 }
 
 /// Why the microcontroller started.
@@ -61,27 +63,34 @@ pub fn reset_reason() -> ResetReason {
     reason.unwrap_or(ResetReason::Other)
 }
 
-/// Starts the watchdog and feeds it from thread mode. It resets the program if tasks of higher
+/// Starts the watchdog. It resets the program if the start takes longer, or tasks of higher
 /// priority never let thread mode run.
-#[embassy_executor::task]
-pub async fn feed_watchdog(mut watchdog: IndependentWatchdog<'static, IWDG1>) {
+pub fn start_watchdog() {
     // The watchdog stops while a debugger halts the core.
     DBGMCU.apb4fzr1().modify(|w| w.set_iwdg1(true));
-    watchdog.unleash();
+    IWDG1.kr().write(|w| w.set_key(Key::START));
+    IWDG1.kr().write(|w| w.set_key(Key::ENABLE));
+    IWDG1.pr().write(|w| w.set_pr(WATCHDOG_DIVIDER));
+}
+
+fn feed() {
+    IWDG1.kr().write(|w| w.set_key(Key::RESET));
+}
+
+/// Feeds the watchdog from thread mode.
+#[embassy_executor::task]
+pub async fn feed_watchdog() {
     loop {
-        watchdog.pet();
+        feed();
+        starts::look();
+        seeded_bugs::fail_late();
         Timer::after(FEED_PERIOD).await;
     }
 }
 
-#[exception(trampoline = false)]
-unsafe fn HardFault() -> ! {
-    // After a stack overflow no data may be pushed.
-    SCB::sys_reset()
-}
-
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
+    failure::record_interrupt(number);
     defmt::error!("interrupt {=i16} has no handler", number);
     SCB::sys_reset()
 }

@@ -11,7 +11,11 @@
     .equ    CRC_OF_PROGRAM, PROGRAM + 0x45C
     .equ    MOST,           0x000E0000      // the bank's other sectors
     .equ    UNSEALED,       0x756E7365
-    .equ    WANTED_AT,      0x2001FFF8      // the word that outlives a reset (memory.x)
+    .equ    STARTS_AT,      0x2001FFF0      // what outlives a reset (memory.x): failed starts,
+                                            // then why the microcontroller started
+    .equ    STARTS,         0x53540000      // "ST", and the number of them
+    .equ    MOST_FAILED,    4
+    .equ    WANTED_AT,      0x2001FFF8      // a request of the program
     .equ    WANTED,         0x21554644      // "DFU!"
 
     .section .first_stage.vectors, "a", %progbits
@@ -29,6 +33,7 @@
 first_stage:
     ldr     r0, =0x580244D0         // RCC_RSR
     ldr     r1, [r0]
+    mov     r10, r1
     tst     r1, #0x01000000         // SFTRSTF: after a reset by software memory holds what it held
     beq     1f
     ldr     r0, =WANTED_AT
@@ -71,7 +76,9 @@ first_stage:
     ldr     r2, =UNSEALED
     cmp     r8, r2
     bne     3f
-    cbz     r7, start_program
+    movs    r6, #0
+    cmp     r7, #0
+    beq     start_program
 3:  cmp     r7, #0x460              // with its header, and in whole flash words
     blo     start_loader
     cmp     r7, #MOST
@@ -114,7 +121,36 @@ first_stage:
     cmp     r3, r8
     bne     start_loader
 
+    // How many starts in a row have failed?
+    movs    r6, #0
+    tst     r10, #0x00A00000        // PORRSTF, BORRSTF: memory holds nothing
+    bne     start_program
+    tst     r10, #0x15000000        // WWDG1RSTF, IWDG1RSTF, SFTRSTF
+    beq     start_program
+    ldr     r5, =STARTS_AT
+    ldr     r6, [r5]
+    ldr     r2, =STARTS
+    subs    r6, r2
+    cmp     r6, #MOST_FAILED
+    it      hs                      // not a count
+    movhs   r6, #0
+    adds    r6, #1
+    cmp     r6, #MOST_FAILED
+    blo     start_program
+    str     r2, [r5]
+    b       start_loader
+
+    // r6: the number of failed starts before.
 start_program:
+    ldr     r0, =STARTS_AT
+    ldr     r2, =STARTS
+    adds    r2, r6
+    mov     r3, r10
+    strd    r2, r3, [r0]
+    ldr     r0, =0x580244D0         // RCC_RSR
+    ldr     r1, [r0]
+    orr     r1, #0x00010000         // RMVF: the next start has its own flags only
+    str     r1, [r0]
     ldr     r0, =PROGRAM
     ldr     r1, =0xE000ED08         // VTOR
     str     r0, [r1]

@@ -25,6 +25,7 @@ mod capture_task;
 mod commands;
 mod condition;
 mod dtcm_table;
+mod failure;
 mod faults;
 mod flash;
 mod info;
@@ -48,7 +49,9 @@ mod settings;
 mod snapshot;
 mod snapshot_copy;
 mod stack;
+mod starts;
 mod stats;
+mod supply;
 mod tare;
 mod thermometer;
 mod usb;
@@ -63,8 +66,7 @@ use cortex_m_rt::entry;
 use defmt_rtt as _;
 use dtcm_table::Sensor;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
-use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{interrupt, peripherals};
+use embassy_stm32::interrupt;
 use hivtac_image::header::{Header, Mark};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::kept::Record;
@@ -107,7 +109,7 @@ fn main() -> ! {
                 foreground.bands,
                 foreground.snapshots,
             )));
-            spawner.spawn(token(faults::feed_watchdog(foreground.watchdog)));
+            spawner.spawn(token(faults::feed_watchdog()));
         })
 }
 
@@ -117,7 +119,6 @@ struct Foreground {
     model: InUse,
     bands: BandCopy,
     snapshots: SnapshotCopy,
-    watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
 }
 
 /// Starts all tasks. Separate from `main`, which never releases its stack.
@@ -125,10 +126,11 @@ struct Foreground {
 fn start() -> Foreground {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
     caches::enable(&mut core);
+    faults::report_reset();
     bands::clear();
     priorities::set();
     let board = board::start();
-    faults::report_reset();
+    seeded_bugs::fail_at_start();
     vsync::start(camera::VSYNC_BLANKING_IS_HIGH);
     let sensor = SENSOR.take();
     let mut memory = Memory::open(board.flash, board.thermometer);
@@ -154,7 +156,6 @@ fn start() -> Foreground {
         model,
         bands: board.bands,
         snapshots: board.snapshots,
-        watchdog: board.watchdog,
     }
 }
 
@@ -164,7 +165,7 @@ fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
     let model = chosen.model();
     let settings = model::fitting().settings(model.as_ref(), kept.threshold);
     if sensor.configure(settings, model).is_err() {
-        defmt::panic!("the built-in settings are out of range");
+        panic!("the built-in settings are out of range");
     }
     sensor.set_motion(camera::MOTION);
     settings::set_down(kept.down);
@@ -197,7 +198,7 @@ fn set_camera(kept: CameraSettings) {
 fn token<S, E>(result: Result<SpawnToken<S>, E>) -> SpawnToken<S> {
     match result {
         Ok(token) => token,
-        Err(_) => defmt::panic!("a task was started twice"),
+        Err(_) => panic!("a task was started twice"),
     }
 }
 

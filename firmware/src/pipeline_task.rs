@@ -13,7 +13,7 @@ use crate::orders::{ORDERS, Order};
 use crate::session::Origin;
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
-use crate::{outbox, session, settings, stats, vsync};
+use crate::{outbox, seeded_bugs, session, settings, stats, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_capture::{Action, Band, Delivery, Ending, Event, Follower};
@@ -300,6 +300,7 @@ impl PipelineTask {
 
     /// Measures the frame whose rows were scanned.
     fn deliver(&mut self, delivery: &Delivery) {
+        seeded_bugs::fail_at(delivery.edge.number);
         let begun = Instant::now();
         let mut measurement = self.sensor.finish_frame();
         if self.taring.is_none() {

@@ -4,6 +4,8 @@
 //! all of them, and the last word of flash chooses one. Without the feature every function here
 //! returns its correct value as a constant, and the program is the same as without this file.
 
+use embassy_time::Instant;
+
 /// A bug, by the number in the last word of flash; any other number chooses none.
 #[derive(Clone, Copy)]
 enum Bug {
@@ -12,11 +14,18 @@ enum Bug {
     CameraRegister = 3,
     HalfBands = 4,
     UsbClock = 5,
-    CacheableBuffers = 6,
-    ExternalMemory = 7,
-    FlashErrors = 8,
-    VsyncPriority = 9,
-    KeptToggles = 10,
+    FaultAtStart = 6,
+    HangAtStart = 7,
+    BusFault = 8,
+    Panic = 9,
+    StackOverflow = 10,
+    Hang = 11,
+    FaultLate = 12,
+    CacheableBuffers = 13,
+    ExternalMemory = 14,
+    FlashErrors = 15,
+    VsyncPriority = 16,
+    KeptToggles = 17,
 }
 
 #[cfg(not(feature = "seeded-bugs"))]
@@ -87,4 +96,67 @@ pub fn lowers_vsync() -> bool {
 /// True if endpoints keep their data toggles when a host configures the device anew.
 pub fn keeps_toggles() -> bool {
     is_chosen(Bug::KeptToggles)
+}
+
+/// The number of the first frame that the program does not survive: about 0.26 s after the start.
+const FATAL_FRAME: u32 = 30;
+
+/// Fails before USB and the camera are set up. The watchdog runs.
+#[inline(always)]
+pub fn fail_at_start() {
+    if is_chosen(Bug::FaultAtStart) {
+        access_nothing();
+    }
+    if is_chosen(Bug::HangAtStart) {
+        hang();
+    }
+}
+
+/// Fails in thread mode at a frame, and at each later one.
+#[inline(always)]
+pub fn fail_at(frame: u32) {
+    if frame < FATAL_FRAME {
+        return;
+    }
+    if is_chosen(Bug::BusFault) {
+        access_nothing();
+    }
+    if is_chosen(Bug::Panic) {
+        panic!("seeded");
+    }
+    if is_chosen(Bug::StackOverflow) {
+        overflow(frame);
+    }
+    if is_chosen(Bug::Hang) {
+        hang();
+    }
+}
+
+/// Fails after 6 s.
+#[inline(always)]
+pub fn fail_late() {
+    if is_chosen(Bug::FaultLate) && Instant::now() > Instant::from_secs(6) {
+        access_nothing();
+    }
+}
+
+fn hang() {
+    loop {
+        core::hint::spin_loop();
+    }
+}
+
+/// Reads an address behind the SRAM, at which nothing answers.
+#[inline(never)]
+fn access_nothing() {
+    const NOTHING: *const u32 = 0x2600_0000 as *const u32;
+    // SAFETY: it is a bus error, as wanted.
+    unsafe { NOTHING.read_volatile() };
+}
+
+#[expect(unconditional_recursion, reason = "the stack ends it")]
+#[inline(never)]
+fn overflow(depth: u32) -> u32 {
+    let used = core::hint::black_box([depth; 256]);
+    overflow(depth + 1).wrapping_add(used.iter().sum::<u32>())
 }

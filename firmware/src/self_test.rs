@@ -15,7 +15,7 @@ use crate::condition::{self, Condition};
 use crate::dtcm_table::Sensor;
 use crate::model;
 use crate::settings;
-use crate::{camera, faults, stack};
+use crate::{camera, failure, faults, stack, supply};
 use core::sync::atomic::{AtomicU32, Ordering};
 use hivtac_wire::health::{Health, Problem, ResetReason};
 use hivtac_wire::message::ModelSource;
@@ -66,6 +66,8 @@ pub fn health(flash: &OfFlash, temperature_centidegrees: Option<i16>) -> Health 
             | CAMERA_PROBLEM.load(Ordering::Relaxed)
             | at_start & Problem::Arithmetic.bit(),
         at_start,
+        brown_out: supply::brown_out(),
+        failure: failure::last(),
     }
 }
 

@@ -1,13 +1,14 @@
 //! `hivtac self-test`: what the device finds when it tests itself and its camera, with codes.
 
 use crate::device::Device;
+use crate::ended::Ended;
 use crate::output;
 use crate::request::show_log;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::shown::unit_number;
-use hivtac_wire::health::{Health, Problem, ResetReason};
+use hivtac_wire::health::{BrownOut, Health, Problem, ResetReason};
 use hivtac_wire::message::{DeviceMessage, Request};
 use serde::Serialize;
 use std::time::Duration;
@@ -21,6 +22,10 @@ pub struct Told {
     stack_bytes: u32,
     problems: Vec<&'static str>,
     at_start: Vec<&'static str>,
+    /// The supply voltage that resets it, V; `None` if no level is chosen.
+    brown_out_v: Option<f64>,
+    /// What ended the program in an earlier run.
+    failure: Option<Ended>,
 }
 
 /// The result of a self-test.
@@ -48,6 +53,11 @@ impl Told {
             stack_bytes: health.stack_bytes,
             problems: problems(health.problems).map(Problem::name).collect(),
             at_start: problems(health.at_start).map(Problem::name).collect(),
+            brown_out_v: match health.brown_out {
+                BrownOut::Off => None,
+                level => Some(f64::from(level.millivolts()) / 1e3),
+            },
+            failure: health.failure.as_ref().map(Ended::of),
         }
     }
 
@@ -65,14 +75,22 @@ impl Told {
             [] => "no problem".to_owned(),
             names => names.join(", "),
         };
-        vec![
+        let supply = match self.brown_out_v {
+            Some(volts) => format!("a reset below {volts:.1} V"),
+            None => "no reset when it is low; docs/firmware.md, \"Supply\", says how to set one"
+                .to_owned(),
+        };
+        let mut lines = vec![
             format!(
                 "health     started by {}; {temperature}; {} of {} bytes of stack used",
                 self.reset, self.stack_used, self.stack_bytes
             ),
             format!("problems   {problems}"),
             format!("at start   {at_start}"),
-        ]
+            format!("supply     {supply}"),
+        ];
+        lines.extend(self.failure.iter().flat_map(Ended::lines));
+        lines
     }
 }
 
@@ -168,10 +186,12 @@ fn advice(problem: Problem) -> &'static str {
         Problem::FlashFails => "it wears out: what is kept stays, new things may not",
         Problem::StackLow => "report it, with what the device was doing",
         Problem::WatchdogReset => {
-            "the program stood still; report it, with what the device was doing"
+            "the program stood still; report it with `hivtac info --json` and what the device was \
+             doing"
         }
         Problem::SoftwareReset => {
-            "a fault, unless a debug probe was at work; report it, with what the device was doing"
+            "a fault, of which `hivtac info` names the place, or a debug probe; report it with \
+             `hivtac info --json` and what the device was doing"
         }
         Problem::Temperature => "above 105 °C, or the sensor for it does not tell; let it cool",
         Problem::AnotherCamera => {

@@ -4,6 +4,7 @@ mod auto_threshold;
 mod bring_up;
 mod check;
 mod device;
+mod ended;
 mod expose;
 mod finding;
 mod firmware;

@@ -17,8 +17,9 @@ use hivtac_terms::units::{
     SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
+use hivtac_wire::failure::{Failure, FailureKind};
 use hivtac_wire::frame::{DEVICE_FRAME_LIMIT, HOST_FRAME_LIMIT, MAX_SAMPLE_FRAME, Message, encode};
-use hivtac_wire::health::{Health, Problem, ResetReason};
+use hivtac_wire::health::{BrownOut, Health, Problem, ResetReason};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use hivtac_wire::version::{HelloPrefix, SCHEMA_HASH};
@@ -342,6 +343,52 @@ fn health() -> DeviceMessage {
         stack_bytes: 24_576,
         problems: Problem::ModelFallback.bit() | Problem::WatchdogReset.bit(),
         at_start: Problem::ModelFallback.bit() | Problem::Arithmetic.bit(),
+        brown_out: BrownOut::Off,
+        failure: None,
+    })
+}
+
+/// A bus error in an interrupt's handler, in the run before this one, and a panic before that.
+fn health_after_a_failure() -> DeviceMessage {
+    DeviceMessage::Health(Health {
+        reset: ResetReason::Software,
+        temperature_centidegrees: Some(4_150),
+        stack_used: 6_120,
+        stack_bytes: 24_576,
+        problems: Problem::SoftwareReset.bit(),
+        at_start: Problem::SoftwareReset.bit(),
+        brown_out: BrownOut::High,
+        failure: Some(Failure {
+            kind: FailureKind::BusFault,
+            starts_ago: 1,
+            count: 2,
+            program_counter: Some(0x0806_1234),
+            link_register: Some(0x0806_0ABD),
+            address: Some(0x2600_0000),
+            fault_status: 0x8200,
+            exception: 69,
+            place: "".try_into().unwrap(),
+        }),
+    })
+}
+
+fn health_after_a_panic() -> DeviceMessage {
+    let DeviceMessage::Health(health) = health_after_a_failure() else {
+        unreachable!("it is one");
+    };
+    DeviceMessage::Health(Health {
+        failure: Some(Failure {
+            kind: FailureKind::Panic,
+            starts_ago: 3,
+            count: 1,
+            program_counter: None,
+            link_register: None,
+            address: None,
+            fault_status: 0,
+            exception: 0,
+            place: "firmware/src/usb.rs:123".try_into().unwrap(),
+        }),
+        ..health
     })
 }
 
@@ -434,6 +481,8 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("settings", settings()),
         ("tared", tared()),
         ("health", health()),
+        ("health-after-a-failure", health_after_a_failure()),
+        ("health-after-a-panic", health_after_a_panic()),
         (
             "reply-touched",
             reply(

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x816491E573F1F27B
+SCHEMA = 0x23DB2D0167CB848B
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -136,6 +136,18 @@ REST = [
     *DOWN,
 ]
 
+
+AFTER_FAULT = [
+    raw("Health", [10]),
+    raw("reset: Software", [3]),
+    raw("temperature_centidegrees: Some", [1]),
+    signed("temperature_centidegrees", 4_150),
+    unsigned("stack_used", 6_120),
+    unsigned("stack_bytes", 24_576),
+    (varint(0x80), "problems 0x80: software_reset"),
+    (varint(0x80), "at_start 0x80: software_reset"),
+    raw("brown_out: High", [3]),
+]
 
 # Name, threshold, tare, temporal, camera, down, contact_shape.
 KEPT = [1, 0, 1, 1, 1, 0, 1]
@@ -360,6 +372,35 @@ DEVICE = {
         unsigned("stack_bytes", 24_576),
         (varint(0x44), "problems 0x44: model_fallback, watchdog_reset"),
         (varint(0x1004), "at_start 0x1004: model_fallback, arithmetic"),
+        raw("brown_out: Off", [0]),
+        raw("failure: None", [0]),
+    ],
+    "health-after-a-failure": AFTER_FAULT + [
+        raw("failure: Some", [1]),
+        raw("kind: BusFault", [3]),
+        unsigned("starts_ago", 1),
+        unsigned("count", 2),
+        raw("program_counter: Some", [1]),
+        (varint(0x08061234), "program_counter 0x08061234"),
+        raw("link_register: Some", [1]),
+        (varint(0x08060ABD), "link_register 0x08060abd"),
+        raw("address: Some", [1]),
+        (varint(0x26000000), "address 0x26000000"),
+        (varint(0x8200), "fault_status 0x8200: BFARVALID, PRECISERR"),
+        unsigned("exception", 69),
+        string("place", ""),
+    ],
+    "health-after-a-panic": AFTER_FAULT + [
+        raw("failure: Some", [1]),
+        raw("kind: Panic", [0]),
+        unsigned("starts_ago", 3),
+        unsigned("count", 1),
+        raw("program_counter: None", [0]),
+        raw("link_register: None", [0]),
+        raw("address: None", [0]),
+        unsigned("fault_status", 0),
+        unsigned("exception", 0),
+        string("place", "firmware/src/usb.rs:123"),
     ],
     "tared": [
         raw("Tared", [9]),

@@ -1,5 +1,6 @@
 //! Provides messages for tests: the longest of each kind, and arbitrary ones.
 
+use crate::failure::*;
 use crate::health::*;
 use crate::message::*;
 use crate::settings::*;
@@ -120,6 +121,18 @@ pub fn longest_device_messages() -> Vec<DeviceMessage> {
             stack_bytes: u32::MAX,
             problems: u32::MAX,
             at_start: u32::MAX,
+            brown_out: BrownOut::High,
+            failure: Some(Failure {
+                kind: FailureKind::Watchdog,
+                starts_ago: u32::MAX,
+                count: u32::MAX,
+                program_counter: Some(u32::MAX),
+                link_register: Some(u32::MAX),
+                address: Some(u32::MAX),
+                fault_status: u32::MAX,
+                exception: u16::MAX,
+                place: full(),
+            }),
         }),
         DeviceMessage::Tared(TareReport {
             rest: longest_rest(),
@@ -634,15 +647,43 @@ fn any_health() -> impl Strategy<Value = Health> {
         Just(ResetReason::Watchdog),
         Just(ResetReason::Other)
     ];
-    (reset, any::<(Option<i16>, u32, u32, [u32; 2])>()).prop_map(
-        |(reset, (temperature_centidegrees, stack_used, stack_bytes, [problems, at_start]))| {
+    let rest = any::<(Option<i16>, u32, u32, [u32; 2])>();
+    let brown_out = proptest::sample::select(&BrownOut::ALL[..]);
+    (reset, rest, brown_out, proptest::option::of(any_failure())).prop_map(
+        |(reset, (temperature_centidegrees, used, bytes, [problems, at_start]), level, failure)| {
             Health {
                 reset,
                 temperature_centidegrees,
-                stack_used,
-                stack_bytes,
+                stack_used: used,
+                stack_bytes: bytes,
                 problems,
                 at_start,
+                brown_out: level,
+                failure,
+            }
+        },
+    )
+}
+
+fn any_failure() -> impl Strategy<Value = Failure> {
+    let kind = proptest::sample::select(&FailureKind::ALL[..]);
+    let numbers = any::<([u32; 3], [Option<u32>; 3], u16)>();
+    (kind, numbers, "[ -~]{0,48}").prop_map(
+        |(
+            kind,
+            ([starts_ago, count, fault_status], [program_counter, link, address], exception),
+            place,
+        )| {
+            Failure {
+                kind,
+                starts_ago,
+                count,
+                program_counter,
+                link_register: link,
+                address,
+                fault_status,
+                exception,
+                place: String::try_from(place.as_str()).unwrap(),
             }
         },
     )

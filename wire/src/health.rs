@@ -1,10 +1,11 @@
 //! Defines a device's health, apart from its frames: the result of its self-test.
 
+use crate::failure::Failure;
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
 
 /// Answer to [`GetHealth`](crate::message::Request::GetHealth).
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Health {
     /// Why the microcontroller last started.
     pub reset: ResetReason,
@@ -19,6 +20,44 @@ pub struct Health {
     pub problems: u32,
     /// Problems at the start, before the first sample: bits of [`Problem`].
     pub at_start: u32,
+    /// The supply voltage under which the microcontroller resets itself.
+    pub brown_out: BrownOut,
+    /// What ended the program in an earlier run; `None` if nothing did since power-on.
+    pub failure: Option<Failure>,
+}
+
+/// The level of the brown-out reset, an option of the microcontroller (RM0433, BOR_LEV).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
+pub enum BrownOut {
+    /// No level is chosen: only the power-on reset is there.
+    Off,
+    /// Level 1.
+    Low,
+    /// Level 2.
+    Middle,
+    /// Level 3.
+    High,
+}
+
+impl BrownOut {
+    /// All levels, sorted by the value of BOR_LEV.
+    pub const ALL: [BrownOut; 4] = [
+        BrownOut::Off,
+        BrownOut::Low,
+        BrownOut::Middle,
+        BrownOut::High,
+    ];
+
+    /// The threshold, mV, as ST names it (its HAL, `OB_BOR_LEVEL0` to 3). A falling supply resets
+    /// about 0.1 V below.
+    pub const fn millivolts(self) -> u16 {
+        match self {
+            BrownOut::Off => 1_600,
+            BrownOut::Low => 2_100,
+            BrownOut::Middle => 2_400,
+            BrownOut::High => 2_700,
+        }
+    }
 }
 
 /// Why a microcontroller started.

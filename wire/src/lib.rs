@@ -9,6 +9,7 @@
 extern crate std;
 
 pub mod decoder;
+pub mod failure;
 pub mod frame;
 pub mod health;
 pub mod kept;

@@ -12,12 +12,13 @@
 //! | LED (green) | PC1, low = on |
 //! | crystal | 12 MHz |
 
-use super::parts::{self, Board, StatusLed, UsbPort, WATCHDOG};
+use super::parts::{self, Board, StatusLed, UsbPort};
 use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
 use crate::camera::{Bus, Camera, CameraLines, XCLK_HZ};
 use crate::capture::Capture;
+use crate::faults;
 use crate::flash::SecondBank;
 use crate::priorities;
 use crate::snapshot_copy::SnapshotCopy;
@@ -28,7 +29,6 @@ use embassy_stm32::rcc::*;
 use embassy_stm32::time::Hertz;
 use embassy_stm32::timer::low_level::CountingMode;
 use embassy_stm32::timer::simple_pwm::{PwmPin, SimplePwm};
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, pac, peripherals};
 
 /// Name in the device's hello.
@@ -48,6 +48,7 @@ pub fn start() -> Board {
         pin: 1,
         on: Level::Low,
     });
+    faults::start_watchdog();
     let p = embassy_stm32::init(parts::clocks(CRYSTAL_HZ, PllPreDiv::DIV3, PllMul::MUL240));
     start_camera_clock(p.TIM1, p.PA8);
     parts::connect_camera([
@@ -84,7 +85,6 @@ pub fn start() -> Board {
             pin: Output::new(p.PC1, Level::High, Speed::Low),
             on: Level::Low,
         },
-        watchdog: IndependentWatchdog::new(p.IWDG1, WATCHDOG.as_micros() as u32),
     }
 }
 

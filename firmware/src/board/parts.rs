@@ -12,12 +12,8 @@ use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull};
 use embassy_stm32::i2c;
 use embassy_stm32::rcc::*;
 use embassy_stm32::time::Hertz;
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::Duration;
-
-/// The watchdog resets the program if its thread mode is blocked for this time.
-pub const WATCHDOG: Duration = Duration::from_secs(2);
 
 /// DCMI's alternate function on each of its pins.
 const DCMI_FUNCTION: u8 = 13;
@@ -39,8 +35,6 @@ pub struct Board {
     pub usb: UsbPort,
     /// The status LED, off.
     pub led: StatusLed,
-    /// Not started yet.
-    pub watchdog: IndependentWatchdog<'static, peripherals::IWDG1>,
 }
 
 /// USB full speed on the OTG_FS core.

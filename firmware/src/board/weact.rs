@@ -11,12 +11,13 @@
 //! | LED | PE3, high = on |
 //! | crystal | 25 MHz |
 
-use super::parts::{self, Board, StatusLed, UsbPort, WATCHDOG};
+use super::parts::{self, Board, StatusLed, UsbPort};
 use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
 use crate::camera::{self, Bus, Camera, CameraLines};
 use crate::capture::Capture;
+use crate::faults;
 use crate::flash::SecondBank;
 use crate::priorities;
 use crate::snapshot_copy::SnapshotCopy;
@@ -24,7 +25,6 @@ use crate::thermometer::Thermometer;
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::i2c::I2c;
 use embassy_stm32::rcc::*;
-use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, pac, peripherals};
 
 /// Name in the device's hello.
@@ -40,6 +40,7 @@ pub fn start() -> Board {
         pin: 3,
         on: Level::High,
     });
+    faults::start_watchdog();
     let p = embassy_stm32::init(parts::clocks(CRYSTAL_HZ, PllPreDiv::DIV5, PllMul::MUL192));
     start_camera_clock(p.MCO1, p.PA8);
     parts::connect_camera([
@@ -76,7 +77,6 @@ pub fn start() -> Board {
             pin: Output::new(p.PE3, Level::Low, Speed::Low),
             on: Level::High,
         },
-        watchdog: IndependentWatchdog::new(p.IWDG1, WATCHDOG.as_micros() as u32),
     }
 }
 

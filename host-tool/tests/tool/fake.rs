@@ -16,7 +16,7 @@ use hivtac_terms::units::{
 };
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
-use hivtac_wire::health::{Health, ResetReason};
+use hivtac_wire::health::{BrownOut, Health, ResetReason};
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
 use hivtac_wire::version::SCHEMA_HASH;
@@ -167,7 +167,7 @@ impl Conversation {
                 let settings = self.settings.clone();
                 self.send(DeviceMessage::Settings(settings));
             }
-            Request::GetHealth => self.send(DeviceMessage::Health(self.health)),
+            Request::GetHealth => self.send(DeviceMessage::Health(self.health.clone())),
             Request::SetName(name) => self.settings.name = name.clone(),
             Request::SetCamera(settings) => {
                 let found = camera();
@@ -202,6 +202,8 @@ pub const HEALTHY: Health = Health {
     stack_bytes: 24_576,
     problems: 0,
     at_start: 0,
+    brown_out: BrownOut::High,
+    failure: None,
 };
 
 /// The threshold that its model was made for.

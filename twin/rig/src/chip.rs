@@ -1,15 +1,15 @@
 //! The microcontroller: the emulator's STM32H743 with the camera interface, the MDMA and the USB
 //! core that the emulator lacks.
 //!
-//! The emulator itself is not patched. [`Chip`] wraps the part and handles eight slots itself:
-//! DCMI, MDMA, CRC, CRS, the flash, and the three blocks of OTG2. All other accesses go to the
+//! The emulator itself is not patched. [`Chip`] wraps the part and handles nine slots itself: DCMI,
+//! MDMA, CRC, CRS, IWDG, the flash, and the three blocks of OTG2. All other accesses go to the
 //! part's own models.
 
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::{Access, AccessKind, Memory};
 use rigless::mcu::Mcu;
 use rigless::soc::stm32h743::Stm32h743;
-use rigless::soc::stm32h743::generated::dbgmcu;
+use rigless::soc::stm32h743::generated::{dbgmcu, rcc};
 use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 
@@ -27,6 +27,7 @@ use crate::peripherals::crs::Crs;
 use crate::peripherals::dcmi::Dcmi;
 use crate::peripherals::dma::{Dma, Feed};
 use crate::peripherals::flash::{Bank, Flash};
+use crate::peripherals::iwdg::Iwdg;
 use crate::peripherals::mdma::Mdma;
 use crate::peripherals::otg::{Blocks, SharedCore};
 use crate::rules::Rules;
@@ -84,6 +85,7 @@ pub struct Chip {
     is_supply_low: bool,
     crc: Crc,
     crs: Crs,
+    iwdg: Iwdg,
     flash: Flash,
     control_bus: ControlBus,
     held_bus: HeldBus,
@@ -104,6 +106,7 @@ pub struct Chip {
     mdma_slot: usize,
     crc_slot: usize,
     crs_slot: usize,
+    iwdg_slot: usize,
     flash_slot: usize,
     vsync: Level,
     /// Time of its last change, and the longest time from one to its handler, ns.
@@ -155,6 +158,7 @@ impl Chip {
         let mdma_slot = part.bus().slot("MDMA")?;
         let crc_slot = part.bus().slot("CRC")?;
         let crs_slot = part.bus().slot("CRS")?;
+        let iwdg_slot = part.bus().slot("IWDG")?;
         let flash_slot = part.bus().slot("Flash")?;
         let i2c_slot = part.bus().slot("I2C1")?;
         let feed = Feed::default();
@@ -184,6 +188,7 @@ impl Chip {
             is_supply_low: false,
             crc: Crc::default(),
             crs: Crs::default(),
+            iwdg: Iwdg::default(),
             mpu,
             part,
             camera,
@@ -195,6 +200,7 @@ impl Chip {
             mdma_slot,
             crc_slot,
             crs_slot,
+            iwdg_slot,
             vsync: Level::Low,
             vsync_at_ns: 0,
             latest_stamp_ns: 0,
@@ -209,6 +215,16 @@ impl Chip {
         let slot = self.slots.dbgmcu;
         let registers = self.part.bus_mut().slot_mut(slot).registers_mut();
         registers.set(dbgmcu::Register::Idc, self.revision.identity());
+    }
+
+    /// Makes the flags of the reset that has just happened those of a power-on (RM0433, table of
+    /// reset sources).
+    pub fn powered_on(&mut self) {
+        const POWER_ON: u64 = 0x00FE_0000;
+        let slot = self.part.bus().slot("RCC").expect("the part has it");
+        let registers = self.part.bus_mut().slot_mut(slot).registers_mut();
+        registers.set(rcc::Register::Rsr, POWER_ON);
+        registers.set(rcc::Register::C1Rsr, POWER_ON);
     }
 
     /// Returns the part's board.
@@ -337,6 +353,7 @@ impl Mcu for Chip {
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crc);
         Device::reset(&mut self.crs);
+        Device::reset(&mut self.iwdg);
         Device::reset(&mut self.flash);
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
@@ -379,6 +396,9 @@ impl Mcu for Chip {
         }
         if slot == self.crs_slot {
             return (self.part.bus_mut(), Some(&mut self.crs));
+        }
+        if slot == self.iwdg_slot {
+            return (self.part.bus_mut(), Some(&mut self.iwdg));
         }
         if slot == self.slots.vsync_port() {
             self.drive_vsync(self.dcmi.vsync_at());

@@ -13,10 +13,10 @@
 //! |---|---|
 //! | [`command`], [`run`], [`report`] | one run from arguments to outcome |
 //! | [`chip`], [`board`], [`machine`], `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
-//! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM and clock recovery |
+//! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM, watchdog and clock recovery |
 //! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`usb_host`], [`link`], [`script`] | the host; who uses its serial port |
-//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules` | what goes wrong on request; what firmware must not do |
+//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules`, `power` | what goes wrong on request; what firmware must not do; what a power-on leaves |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
 pub mod arrivals;
@@ -38,6 +38,7 @@ pub mod machine;
 pub mod memory_types;
 pub mod mpu;
 pub mod peripherals;
+mod power;
 pub mod report;
 pub mod rules;
 pub mod run;

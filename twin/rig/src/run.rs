@@ -26,9 +26,10 @@ use crate::link::Link;
 use crate::machine::{Entry, Sensor};
 use crate::mpu::Protection;
 use crate::peripherals::flash::{self, Bank, Contents, Cut};
+use crate::power;
 use crate::report::Report;
 use crate::rules::Rules;
-use crate::script::Script;
+use crate::script::{Restart, Script};
 use crate::start_rules::StartRules;
 use crate::truth::TruthLog;
 use crate::usb_host::{Host, SharedHost};
@@ -50,6 +51,10 @@ const SETTLING_NS: u64 = 10_000_000;
 /// Period of these checks, ns. The program may poll for a change without a pause, but the camera
 /// and the host do not need a finer period.
 const SETTLING_STEP_NS: u64 = 10_000;
+
+/// Addresses that are reserved, where the first access after each reset is a bus error: below DTCM,
+/// into which a stack runs that is used up, and behind AXI SRAM. The emulator answers others.
+const RESERVED: [(u64, u64); 2] = [(0x1FFE_0000, 0x2000_0000), (0x2500_0000, 0x3000_0000)];
 
 /// The user of the serial port.
 #[derive(Debug)]
@@ -180,6 +185,10 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         settling_until: 0,
         next_look: 0,
         settled_at_ns: 0,
+        restart: None,
+        seed: options.seed,
+        is_on: false,
+        armed: None,
     };
     let began = Instant::now();
     // The conductor ends the run at an interrupt: only it can read the flash then.
@@ -249,6 +258,13 @@ struct Conductor {
     /// Time of their next check, ns.
     next_look: u64,
     settled_at_ns: u64,
+    /// A restart from outside that is due.
+    restart: Option<Restart>,
+    seed: u64,
+    /// Whether the power was switched on.
+    is_on: bool,
+    /// Resets at the time when accesses to [`RESERVED`] were made to fail.
+    armed: Option<usize>,
 }
 
 /// Returns the time for which a write changes the board's wiring: `None` for not at all, 0 for now,
@@ -274,6 +290,9 @@ impl Driver<Sensor> for Conductor {
         host: &mut dyn emulator::Host,
         settled: Settled,
     ) {
+        if !std::mem::replace(&mut self.is_on, true) {
+            power::leave(host, self.seed);
+        }
         let now = match settled {
             Settled::Access { access, value } => {
                 if access.kind == AccessKind::Write {
@@ -307,11 +326,25 @@ impl Driver<Sensor> for Conductor {
         let now = stop.at.0;
         let frames = session.board().chip.dcmi.counters().frames;
         let full = self.limits.frames.is_some_and(|limit| frames >= limit);
+        if self.armed != Some(session.resets().len()) {
+            self.armed = Some(session.resets().len());
+            for (from, to) in RESERVED {
+                session.fail_next(from, to);
+            }
+        }
         let late = self.limits.virtual_ns.is_some_and(|limit| now >= limit);
         let over = full || late || self.rules.are_broken() || self.bank.was_cut();
         if over || !self.serve(now) {
             self.array = flash::read_array(host);
             return None;
+        }
+        if let Some(restart) = self.restart.take() {
+            session.reset_by_pin(stop.at, stop.instruction_count, host);
+            if restart == Restart::PowerCycle {
+                self.start = StartRules::default();
+                power::forget(host, self.seed);
+                session.board_mut().chip.powered_on();
+            }
         }
         let limit = self.limits.virtual_ns.unwrap_or(u64::MAX);
         let action = match &self.program {
@@ -356,7 +389,7 @@ impl Conductor {
         match &mut self.program {
             Program::Script(script) => {
                 let mut host = self.host.lock();
-                script.run(now, &mut host);
+                self.restart = script.run(now, &mut host);
                 self.bytes.extend(host.from_device.drain(..));
                 true
             }

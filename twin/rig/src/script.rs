@@ -15,6 +15,8 @@
 //! 960   cancel           the control transfer under way is given up, wherever it is
 //! 1000  reset            the host resets the bus and enumerates the device again
 //! 1200  close
+//! 1500  button           the board's reset button is pressed
+//! 1800  power-cycle      the power is cut for a moment
 //! ```
 
 use std::path::Path;
@@ -46,6 +48,17 @@ pub enum Action {
     Cancel,
     /// A control transfer, by its SETUP packet.
     Request([u8; 8]),
+    /// Do something to the board.
+    Restart(Restart),
+}
+
+/// What restarts the microcontroller from outside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Restart {
+    /// The reset line is pulled, by the board's button or its supply's supervisor.
+    Button,
+    /// The power is cut for a moment. Memory holds nothing afterwards.
+    PowerCycle,
 }
 
 /// Actions in the order of their times.
@@ -89,8 +102,10 @@ impl Script {
         self.0.first().map(|(at, _)| *at)
     }
 
-    /// Carries out the actions that are due.
-    pub fn run(&mut self, now_ns: u64, host: &mut Host) {
+    /// Carries out the actions that are due; returns the last restart among them, which is left to
+    /// the caller.
+    pub fn run(&mut self, now_ns: u64, host: &mut Host) -> Option<Restart> {
+        let mut wanted = None;
         let due = self.0.iter().take_while(|(at, _)| *at <= now_ns).count();
         for (_, action) in self.0.drain(..due) {
             match action {
@@ -104,8 +119,10 @@ impl Script {
                 Action::Reset => host.reset(),
                 Action::Cancel => host.cancel(),
                 Action::Request(setup) => host.request(setup),
+                Action::Restart(restart) => wanted = Some(restart),
             }
         }
+        wanted
     }
 }
 
@@ -136,9 +153,11 @@ fn action(line: &str) -> anyhow::Result<(u64, Action)> {
             let bytes = hexadecimal(argument)?;
             Action::Request(bytes.try_into().ok().context("a SETUP has eight bytes")?)
         }
+        "button" => Action::Restart(Restart::Button),
+        "power-cycle" => Action::Restart(Restart::PowerCycle),
         _ => bail!(
             "no action is called `{word}`: use open, close, send, read, stop-reading, plug, \
-             unplug, reset, cancel, request"
+             unplug, reset, cancel, request, button, power-cycle"
         ),
     };
     if !argument.is_empty() && word != "send" && word != "request" {

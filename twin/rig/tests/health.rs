@@ -26,7 +26,7 @@ fn health(setup: Setup) -> Health {
 
 fn told(run: &Run) -> Health {
     assert_eq!(run.outcome(ASKED), Outcome::Done);
-    *run.health()
+    run.health().clone()
 }
 
 #[test]

@@ -8,6 +8,7 @@ mod camera;
 mod camera_settings;
 mod command;
 mod cuts;
+mod failures;
 mod faults;
 mod firmware;
 mod format;

@@ -12,7 +12,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::temporal::TemporalSettings;
 use hivtac_terms::threshold::Threshold;
-use hivtac_wire::health::{Health, Problem, ResetReason};
+use hivtac_wire::health::{BrownOut, Health, Problem, ResetReason};
 use hivtac_wire::kept::{KeptModel, Record};
 use hivtac_wire::message::{
     Command, DeviceMessage, LogLevel, MODEL_BYTES, ModelPart, ModelSource, Outcome, Request,
@@ -239,7 +239,7 @@ impl Device {
     }
 
     /// The self-test: of a device's checks, those that a twin can fail. It has neither stack nor
-    /// temperature; the latter is told as 25 °C.
+    /// temperature nor supply; the latter two are told as 25 °C and watched.
     fn health(&mut self) -> Health {
         let answers_right = Model::parse(self.built_in).is_ok_and(|model| {
             let expected = known_answer::of(&model, &mut Network::new());
@@ -258,6 +258,8 @@ impl Device {
             stack_bytes: 0,
             problems,
             at_start: 0,
+            brown_out: BrownOut::High,
+            failure: None,
         }
     }
 }

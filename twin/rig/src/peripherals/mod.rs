@@ -7,6 +7,7 @@ pub mod crs;
 pub mod dcmi;
 pub mod dma;
 pub mod flash;
+pub mod iwdg;
 pub mod mdma;
 pub mod otg;
 pub(crate) mod rom;

@@ -22,7 +22,7 @@ use hivtac_rig::mpu::Protection;
 use hivtac_rig::peripherals::flash::{Contents, Cut};
 use hivtac_rig::report::Report;
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
-use hivtac_rig::script::{Action, Script};
+use hivtac_rig::script::{Action, Restart, Script};
 use hivtac_rig::truth::TruthLog;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
@@ -47,11 +47,18 @@ pub enum Bug {
     CameraRegister = 3,
     HalfBands = 4,
     UsbClock = 5,
-    CacheableBuffers = 6,
-    ExternalMemory = 7,
-    FlashErrors = 8,
-    VsyncPriority = 9,
-    KeptToggles = 10,
+    FaultAtStart = 6,
+    HangAtStart = 7,
+    BusFault = 8,
+    Panic = 9,
+    StackOverflow = 10,
+    Hang = 11,
+    FaultLate = 12,
+    CacheableBuffers = 13,
+    ExternalMemory = 14,
+    FlashErrors = 15,
+    VsyncPriority = 16,
+    KeptToggles = 17,
 }
 
 /// Time at which the host says hello, ms: the port exists from about 140 ms on.
@@ -181,6 +188,17 @@ impl Setup {
         self.at_us(ms * 1000, action)
     }
 
+    /// Presses the reset button, or cuts the power for a moment.
+    pub fn restart_at(self, ms: u64, restart: Restart) -> Self {
+        self.at(ms, Action::Restart(restart))
+    }
+
+    /// Says hello at a later time, and asks for the device's health 10 ms after it.
+    pub fn ask_health_at(self, ms: u64, asked: u16) -> Self {
+        let ask = Action::Send(command(asked, Request::GetHealth));
+        self.at(ms, Action::Send(hello())).at(ms + 10, ask)
+    }
+
     pub fn at_us(mut self, us: u64, action: Action) -> Self {
         self.actions.push((us * 1000, action));
         self
@@ -188,12 +206,17 @@ impl Setup {
 
     /// Runs firmware with seeded bugs with a bug, or with none.
     pub fn run_with(self, bug: impl Into<Option<Bug>>) -> Run {
-        let directory = tempfile::tempdir().unwrap();
-        self.choosing(bug, directory.path()).run()
+        self.with(bug, Self::run)
     }
 
-    /// Chooses a bug of firmware with seeded bugs, by the last word of flash. The flash's file is in
-    /// this folder.
+    /// Chooses a bug, or none, and passes the set-up on.
+    pub fn with<R>(self, bug: impl Into<Option<Bug>>, run: impl FnOnce(Self) -> R) -> R {
+        let directory = tempfile::tempdir().unwrap();
+        run(self.choosing(bug, directory.path()))
+    }
+
+    /// Chooses a bug of firmware with seeded bugs, by the last word of flash, whose file is in this
+    /// folder.
     pub fn choosing(mut self, bug: impl Into<Option<Bug>>, directory: &Path) -> Self {
         let flash = self
             .flash
