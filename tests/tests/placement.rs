@@ -167,6 +167,23 @@ fn a_place_for_a_model_lies_in_each_of_two_cached_memories() {
     }
 }
 
+/// The first stage, which an update does not write, has the addresses of the last two.
+#[test]
+fn what_outlives_a_reset_lies_where_nothing_initializes_it() {
+    let symbols = symbols();
+    for (words, address) in [
+        (["7failure", "FAILURE"], 0x2001_FF80),
+        (["6starts", "STARTS"], 0x2001_FFF0),
+        (["LOADER", "WANTED"], 0x2001_FFF8),
+    ] {
+        let found: Vec<u64> = variables(&symbols, &words)
+            .iter()
+            .map(|symbol| symbol.address)
+            .collect();
+        assert_eq!(found, [address], "{words:?}");
+    }
+}
+
 #[test]
 fn nothing_lies_below_the_stack_and_every_variable_in_a_memory() {
     let symbols = symbols();

@@ -89,7 +89,7 @@ const REASONS: [(&str, usize, &str); 19] = [
     ),
     (
         "hivtac_firmware",
-        11,
+        12,
         "at the start only: tasks are spawned once, and the settings are constants that the \
          model's proof fits; what serves USB, which is not polled after its end; queues' cells, in \
          a critical section and so never borrowed twice",

@@ -3,8 +3,9 @@
 use rigless::emulator::Memory;
 use rigless::soc::Width;
 
-/// The end of DTCM, which programs use to keep something through a reset. It has other contents at
-/// each power-on, by seed. The rest is zero, by which `start_rules` sees what was written too early.
+/// The end of DTCM, which programs use to keep something through a reset. By seed it has other
+/// contents at each power-on. The rest is zero, by which `start_rules` sees what was written too
+/// early.
 const KEPT: std::ops::Range<u32> = 0x2001_FF80..0x2002_0000;
 /// Memories, with their sizes in bytes.
 const MEMORIES: [(u64, u64); 4] = [

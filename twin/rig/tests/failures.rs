@@ -106,8 +106,8 @@ fn a_program_that_stands_still_is_told() {
 #[test]
 fn a_failure_is_told_until_the_power_is_cut() {
     let run = |restart: Restart| {
-        let setup = Setup::new(other("seeded-bugs"), 740).restart_at(400, restart);
-        setup.ask_health_at(700, ASKED).run_with(Bug::BusFault)
+        let setup = Setup::new(other("seeded-bugs"), 620).restart_at(400, restart);
+        setup.ask_health_at(580, ASKED).run_with(Bug::BusFault)
     };
     let run_on = run(Restart::Button);
     let told = health(&run_on);
