@@ -24,8 +24,9 @@ const FEED_PERIOD: Duration = Duration::from_millis(500);
 /// Of the watchdog's 32 kHz, of which it counts 4,096: 2.05 s.
 const WATCHDOG_DIVIDER: Pr = Pr::DIVIDE_BY16;
 
-/// Logs why the microcontroller was reset, and keeps that for the host. Call first, and once.
-pub fn report_reset() {
+/// Keeps why the microcontroller was reset. Call first, and once. It does not log: the clock of the
+/// log's times does not run yet.
+pub fn note_reset() {
     let reasons = starts::reset_flags();
     // Each reset also pulls the reset line, and a power-on also sets the flags of other supply
     // resets.
@@ -40,13 +41,11 @@ pub fn report_reset() {
     RESET_REASON.store(reason as u8, Ordering::Relaxed);
     let was_unpowered = matches!(reason, ResetReason::PowerOn | ResetReason::BrownOut);
     failure::started(was_unpowered, reason == ResetReason::Watchdog);
-    defmt::info!(
-        "reset: power {=bool}, pin {=bool}, software or fault {=bool}, watchdog {=bool}",
-        reasons.porrstf(),
-        reasons.pinrstf(),
-        reasons.sftrstf(),
-        reasons.iwdg1rstf()
-    );
+}
+
+/// Logs why the microcontroller was reset.
+pub fn log_reset() {
+    defmt::info!("started by {}", defmt::Debug2Format(&reset_reason()));
 }
 
 /// Why the microcontroller started.

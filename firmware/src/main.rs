@@ -126,10 +126,11 @@ struct Foreground {
 fn start() -> Foreground {
     let mut core = cortex_m::Peripherals::take().expect("first and only use");
     caches::enable(&mut core);
-    faults::report_reset();
+    faults::note_reset();
     bands::clear();
     priorities::set();
     let board = board::start();
+    faults::log_reset();
     seeded_bugs::fail_at_start();
     vsync::start(camera::VSYNC_BLANKING_IS_HIGH);
     let sensor = SENSOR.take();
