@@ -10,11 +10,10 @@ use hivtac_sensor::force::features::FEATURES;
 use hivtac_sensor::force::model::{self, InputScaling, OutputKind, UncertaintyKnot};
 use hivtac_sensor::force::model::{encode::LayerSpec, encode::ModelSpec};
 use hivtac_sensor::force::packing::{MAX_ACTIVATION8, WeightWidth};
-use hivtac_sensor::force::rest;
 use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees};
 
 use crate::data::range::Range;
-use crate::data::rest::{Rest, features_from_q16, q16};
+use crate::data::rest::{FeatureList, features_from_q16, q16};
 use crate::forward::FilmModel;
 use crate::network::{Layer, Meaning, Network, Standardization};
 use crate::weights::{Uncertainty, Weights};
@@ -53,27 +52,26 @@ pub fn spec(weights: &Weights) -> Result<ModelSpec> {
     weights.check()?;
     Ok(ModelSpec {
         conditions: weights.conditions.to_model()?,
-        rest: rest(&weights.rest)?,
-        input: input_scaling(&weights.network.input)?,
-        layers: layers(&weights.network)?
-            .into_iter()
-            .map(|layer| layer.spec)
-            .collect(),
+        rest: weights.rest.to_sensor()?,
+        input: match &weights.network {
+            Some(network) => input_scaling(&network.input)?,
+            None => InputScaling::default(),
+        },
+        layers: match &weights.network {
+            Some(network) => layers(network)?
+                .into_iter()
+                .map(|layer| layer.spec)
+                .collect(),
+            None => Vec::new(),
+        },
         forward: weights.film.as_ref().map(FilmModel::spec).transpose()?,
-        output: match weights.network.meaning {
-            Meaning::ForceVector => OutputKind::ForceVector,
-            Meaning::AnglesMagnitude => OutputKind::AnglesMagnitude,
-            Meaning::ForceAndPlace => OutputKind::ForceAndPlace,
+        output: match weights.network.as_ref().map(|network| network.meaning) {
+            Some(Meaning::ForceVector) => OutputKind::ForceVector,
+            Some(Meaning::AnglesMagnitude) => OutputKind::AnglesMagnitude,
+            Some(Meaning::ForceAndPlace) | None => OutputKind::ForceAndPlace,
         },
         range: range(&weights.range),
         uncertainty: uncertainty(&weights.uncertainty),
-    })
-}
-
-fn rest(rest: &Rest) -> Result<rest::Rest> {
-    Ok(rest::Rest {
-        features: features_from_q16(&rest.features_q16)?,
-        areas: rest.areas_px.into(),
     })
 }
 
@@ -111,7 +109,7 @@ pub(crate) fn input_scaling(input: &Standardization) -> Result<InputScaling> {
             .with_context(|| format!("scaling of feature {i}"))?;
     }
     Ok(InputScaling {
-        mean: features_from_q16(&std::array::from_fn(|i| q16(input.mean[i])))?,
+        mean: features_from_q16(&FeatureList::from_fn(FEATURES, |i| q16(input.mean[i])))?,
         multipliers,
         shifts,
     })

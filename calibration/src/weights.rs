@@ -4,13 +4,14 @@
 use std::{fs, path::Path};
 
 use anyhow::{Context, Result, ensure};
+use hivtac_terms::marker::LEAST_MARKERS;
 use serde::{Deserialize, Serialize};
 
 use crate::data::conditions::Conditions;
 use crate::data::range::Range;
-use crate::data::rest::{Rest, features_from_q16};
+use crate::data::rest::Rest;
 use crate::forward::FilmModel;
-use crate::network::{INPUTS, Network};
+use crate::network::Network;
 pub use crate::uncertainty::Uncertainty;
 
 /// The file's name of its format.
@@ -35,8 +36,9 @@ pub struct Weights {
     /// The film run forwards, which improves the network's answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmModel>,
-    /// The network.
-    pub network: Network,
+    /// The network; none for other layouts than the square of four dots.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub network: Option<Network>,
 }
 
 /// How a network was trained.
@@ -97,21 +99,43 @@ impl Weights {
     /// # Errors
     /// Names the part that is wrong.
     pub fn check(&self) -> Result<()> {
-        self.network.validate()?;
+        let markers = self.conditions.markers;
+        self.conditions.layout()?;
+        if let Some(network) = &self.network {
+            network.validate()?;
+            ensure!(
+                markers == LEAST_MARKERS,
+                "network: only one of four markers can be, and there are {markers}"
+            );
+        }
         if let Some(film) = &self.film {
             film.check()?;
             ensure!(
-                self.network.meaning.tells_place(),
+                self.network
+                    .as_ref()
+                    .is_none_or(|it| it.meaning.tells_place()),
                 "film: only a network that tells places can have one"
             );
+            ensure!(
+                film.rest_px.len() == markers,
+                "film.rest_px is of {} markers, and there are {markers}",
+                film.rest_px.len()
+            );
         }
+        ensure!(
+            self.network.is_some() || self.film.is_some(),
+            "there is neither a network nor a film"
+        );
         self.check_numbers()
     }
 
-    /// The force (N) for features (px) relative to the same rest position, without the chip's
-    /// rounding.
-    pub fn force_n(&self, features: &[f64; INPUTS]) -> [f64; 3] {
-        self.network.force_n(features)
+    /// The network.
+    ///
+    /// # Errors
+    /// When there is none, as for other layouts than the square of four dots.
+    pub fn network(&self) -> Result<&Network> {
+        let network = self.network.as_ref();
+        network.context("these weights have no network, as their film has other dots than four")
     }
 
     fn check_numbers(&self) -> Result<()> {
@@ -153,7 +177,13 @@ impl Weights {
                 wrong.unwrap_or(&0.0)
             );
         }
-        features_from_q16(&self.rest.features_q16).context("rest.features_q16")?;
+        let rest = self.rest.to_sensor().context("rest")?;
+        ensure!(
+            rest.areas.len() == self.conditions.markers,
+            "rest is of {} markers, and there are {}",
+            rest.areas.len(),
+            self.conditions.markers
+        );
         Ok(())
     }
 

@@ -107,7 +107,10 @@ fn from_data_to_a_checked_model() {
         here,
         &[&again[..], &none, &["--out", "b.weights"]].concat(),
     ));
-    let network = |name: &str| Weights::load(&here.join(name)).unwrap().network;
+    let network = |name: &str| {
+        let weights = Weights::load(&here.join(name)).unwrap();
+        weights.network().unwrap().clone()
+    };
     assert_eq!(network("a.weights").layers, network("b.weights").layers);
 }
 

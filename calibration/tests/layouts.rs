@@ -4,7 +4,9 @@
 use std::sync::LazyLock;
 
 use hivtac_calibration::evaluation::errors::angle_deg;
-use hivtac_calibration::forward::{self, layout_model, layout_scene};
+use hivtac_calibration::forward::{self, layout_model, layout_scene, layout_weights};
+use hivtac_calibration::quantize::export;
+use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{AlignedFile, Model};
@@ -209,15 +211,16 @@ fn a_tare_is_refused_while_a_dot_is_missing_or_something_presses() {
     assert!(matches!(refused, Err(Refusal::Touched(_))), "{refused:?}");
 }
 
-/// The file beside the built-in model, which demo and twin use, is what `hivtac-calibrate layout
-/// 8v` makes.
+/// The files that demo, twin and calibration use are what `hivtac-calibrate layout 8v` makes.
 #[test]
-fn the_models_file_is_as_it_is_made() {
+fn the_models_files_are_as_they_are_made() {
+    const ANEW: &str = "make it anew: hivtac-calibrate layout";
     let file = include_bytes!("../models/8v/default.hvtm");
-    assert!(
-        FILE[..] == file[..],
-        "make it anew: hivtac-calibrate layout"
-    );
+    assert!(FILE[..] == file[..], "{ANEW}");
+    let weights = Weights::parse(include_str!("../models/8v/default.weights")).unwrap();
+    let spec = layout_model(layout(), 2).unwrap();
+    assert!(layout_weights(&spec).unwrap() == weights, "{ANEW}");
+    assert!(export(&weights).unwrap() == file[..], "{ANEW}");
 }
 
 /// A sensor with the model of the four dots, without a tare.

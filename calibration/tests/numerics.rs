@@ -29,14 +29,14 @@ fn weights(network: Network) -> Weights {
         format: Weights::format(),
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
-            features_q16: REST.map(q16),
-            areas_px: [190; 4],
+            features_q16: REST.map(q16).into(),
+            areas_px: [190; 4].into(),
         },
         range: Range::default(),
         uncertainty: Uncertainty::default(),
         training: Training::default(),
         film: None,
-        network,
+        network: Some(network),
     }
 }
 
@@ -44,7 +44,7 @@ fn weights(network: Network) -> Weights {
 fn on_the_chip(network: &Network, features: &[f64; INPUTS]) -> ([f64; 3], Output) {
     let bytes = export(&weights(network.clone())).unwrap();
     let model = Model::parse(&bytes).unwrap();
-    let features = features_from_q16(&features.map(q16)).unwrap();
+    let features = features_from_q16(&features.map(q16).into()).unwrap();
     let rest = model.rest.features;
     let output = ChipNetwork::new().run(&model, &features, &rest);
     (output.values.map(|micro| f64::from(micro) / 1e6), output)

@@ -67,7 +67,7 @@ fn it_goes_on_to_the_chip() {
         ..Options::default()
     };
     let fitted = fit(&data, &options, |_| ()).unwrap();
-    let found = &fitted.weights.network;
+    let found = fitted.weights.network().unwrap();
     assert_eq!(found.layers, network.layers);
     assert_ne!(found.activation_max, network.activation_max);
     assert!(export(&fitted.weights).is_ok());

@@ -56,14 +56,14 @@ fn weights(network: Network) -> Weights {
         format: Weights::format(),
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
-            features_q16: [q16(16.0); INPUTS],
-            areas_px: [200; 4],
+            features_q16: [q16(16.0); INPUTS].into(),
+            areas_px: [200; 4].into(),
         },
         range: Range::default(),
         uncertainty: Uncertainty::default(),
         training: Training::default(),
         film: None,
-        network,
+        network: Some(network),
     }
 }
 
@@ -142,12 +142,12 @@ proptest! {
             .collect();
         network.activation_max = network.activation_maxima(&px);
         let weights = weights(network);
-        let network = &weights.network;
+        let network = weights.network().unwrap();
         let bytes = export(&weights).unwrap();
         let model = Model::parse(&bytes).unwrap();
         let mut chip = ChipNetwork::new();
         for (row, px) in rows.iter().zip(&px) {
-            let output = chip.run(&model, &features_from_q16(row).unwrap(), &model.rest.features);
+            let output = chip.run(&model, &features_from_q16(&(*row).into()).unwrap(), &model.rest.features);
             let (float, bound) = (network.predict(px), bound(network, px));
             for i in 0..OUTPUTS {
                 let error = (f64::from(output.values[i]) / 1e6 - float[i]).abs();

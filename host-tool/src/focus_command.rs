@@ -5,7 +5,7 @@ use crate::output::{self, Reader};
 use crate::snapshot::snapshot;
 use clap::Args;
 use hivtac_host::failure::Failure;
-use hivtac_host::focus::{Focus, four_dots};
+use hivtac_host::focus::Focus;
 
 /// Show how sharp, bright and well placed the markers are, until all is right
 ///
@@ -26,10 +26,9 @@ pub struct FocusArguments {
 /// Shows the checks of each picture, until all are right or the program is interrupted.
 pub fn run(arguments: &FocusArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
-    four_dots(&hello)?;
     loop {
         let taken = snapshot(&mut link, arguments.device.timeout)?;
-        let focus = Focus::of(&taken.frame, &hello);
+        let focus = Focus::of(&taken.frame, &hello)?;
         let reader = output::report(arguments.json, &focus, || focus.text())?;
         if reader == Reader::Gone || focus.right {
             return Ok(());

@@ -3,8 +3,8 @@
 use crate::output::tell;
 use clap::{Args, ValueEnum};
 use hivtac_host::failure::Failure;
+use hivtac_host::focus::dots;
 use hivtac_terms::geometry::{Geometry, Preset};
-use hivtac_terms::layout::EIGHT_V;
 use serde_json::json;
 
 /// Distance of each post from the film's middle, along x and y, mm, as on the simulated sensor.
@@ -54,17 +54,11 @@ enum Dots {
 impl Dots {
     /// Their centres from the film's middle, mm.
     fn centres_mm(self, geometry: &Geometry) -> Vec<[f64; 2]> {
-        match self {
-            Dots::Four => {
-                let rest_mm = f64::from(geometry.marker_radius.0) / 1e3 / std::f64::consts::SQRT_2;
-                CORNERS
-                    .map(|corner| corner.map(|part| part * rest_mm))
-                    .into()
-            }
-            Dots::EightV => EIGHT_V
-                .map(|dot| dot.map(|part| f64::from(part.0) / 1e3))
-                .into(),
-        }
+        let dots = match self {
+            Dots::Four => dots::Dots::Four,
+            Dots::EightV => dots::Dots::EightV,
+        };
+        dots.centres_mm(geometry)
     }
 }
 

@@ -123,8 +123,8 @@ impl Paper {
         let test = dataset(CentroidEstimator::BinaryMask, self.judged, TEST_SEED)?;
         Ok(judged(&test, |row| {
             let features = row.features_px();
-            let place_mm = weights.network.place_mm(&features)?;
-            Some((weights.network.force_n(&features), place_mm))
+            let network = weights.network.as_ref()?;
+            Some((network.force_n(&features), network.place_mm(&features)?))
         }))
     }
 

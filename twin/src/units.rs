@@ -1,6 +1,7 @@
 //! How exactly units are built: standard deviations of their numbers, and units drawn by them.
 
 use crate::film::reduced::Unit;
+use crate::film::{Dots, Layout};
 use crate::{Camera, Lens, Mechanics, Mounting, Options, PresetCamera, noise};
 
 /// ln of the film's Young's modulus.
@@ -25,9 +26,14 @@ const MARKER_AT_MOST_MM: f64 = 0.3;
 /// Largest deviation of a drawn number, in standard deviations.
 const AT_MOST: f64 = 2.5;
 
-/// Draws a unit: its scene's options, with a camera of a focal length in µm, and in px for the
-/// nominal unit. `normal` gives random numbers of the standard normal distribution.
-pub fn random_unit(mut normal: impl FnMut() -> f64, focal_um: f64, focal_px: f64) -> Options {
+/// Draws a unit with these dots: its scene's options, with a camera of a focal length in µm, and in
+/// px for the nominal unit. `normal` gives random numbers of the standard normal distribution.
+pub fn random_unit(
+    mut normal: impl FnMut() -> f64,
+    layout: Layout,
+    focal_um: f64,
+    focal_px: f64,
+) -> Options {
     let mut within = |sigma: f64, at_most: f64| {
         let mut all = std::iter::repeat_with(|| sigma * normal());
         all.find(|value| value.abs() <= at_most).unwrap_or(0.0)
@@ -40,8 +46,9 @@ pub fn random_unit(mut normal: impl FnMut() -> f64, focal_um: f64, focal_px: f64
     let longer = 1.0 + usual(FOCAL);
     let (stiffness, thickness) = (1.0 + usual(STIFFNESS), 1.0 + usual(THICKNESS));
     let posts_mm = std::array::from_fn(|_| [usual(POST_MM), usual(POST_MM)]);
-    let glued_mm: [[f64; 2]; 4] =
-        std::array::from_fn(|_| [0, 1].map(|_| within(MARKER_MM, MARKER_AT_MOST_MM)));
+    let glued_mm = Dots::from_fn(layout.count(), |_| {
+        [0, 1].map(|_| within(MARKER_MM, MARKER_AT_MOST_MM))
+    });
     Options {
         film: Mechanics {
             unit: Unit {
@@ -52,7 +59,8 @@ pub fn random_unit(mut normal: impl FnMut() -> f64, focal_um: f64, focal_px: f64
             },
             ..Mechanics::default()
         },
-        glued_mm: glued_mm.into(),
+        layout,
+        glued_mm,
         lens: Lens {
             pitch_um: Some(focal_um / (focal_px * longer)),
             ..Lens::default()
@@ -69,7 +77,7 @@ pub fn with_unit(number: u64, camera: &Camera, options: Options) -> Options {
     // The sum of twelve uniform numbers: nearly normal, with variance 1.
     let normal = || random.by_ref().take(12).map(|part| part - 0.5).sum();
     let focal_um = 1000.0 * camera.preset().focal_length_mm();
-    let unit = random_unit(normal, focal_um, camera.focal_px());
+    let unit = random_unit(normal, options.layout, focal_um, camera.focal_px());
     Options {
         film: Mechanics {
             unit: unit.film.unit,
@@ -108,5 +116,25 @@ mod tests {
                 nominal.clone().with_options(unit).unwrap();
             }
         }
+    }
+
+    /// Every dot of a layout is glued somewhat off its place; camera and film are those of the same
+    /// unit with four dots.
+    #[test]
+    fn a_unit_with_more_dots_has_all_of_them_glued_off() {
+        let nominal = Scene::preset("demo", Preset::Ov7725, 320, 240, 1).unwrap();
+        let of = |layout: Layout| {
+            let options = Options {
+                layout,
+                ..nominal.options().clone()
+            };
+            with_unit(7, nominal.camera(), options)
+        };
+        let (four, eight) = (of(Layout::default()), of("8v".parse().unwrap()));
+        assert_eq!(eight.glued_mm.len(), 8);
+        assert!(eight.glued_mm.iter().flatten().all(|mm| *mm != 0.0));
+        assert_eq!(eight.glued_mm[..4], four.glued_mm[..]);
+        assert_eq!((eight.mounting, eight.film), (four.mounting, four.film));
+        nominal.with_options(eight).unwrap();
     }
 }

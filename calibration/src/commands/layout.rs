@@ -2,9 +2,11 @@
 
 use std::path::PathBuf;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::Result;
 use clap::Args;
-use hivtac_calibration::forward::layout_model;
+use hivtac_calibration::forward::{layout_model, layout_weights};
+
+use super::model::exported;
 use hivtac_twin::film::Layout;
 
 /// Number of Gauss–Newton steps.
@@ -16,19 +18,17 @@ pub struct LayoutArgs {
     /// The layout: 8v has dots at (±7, ±4.5), (±2.5, 0) and (0, ±2.4) mm.
     #[arg(default_value = "8v")]
     layout: Layout,
-    /// The model file.
+    /// The weights file, with which a unit's calibration begins. The model file is beside it: the
+    /// same name with `hvtm`.
     #[arg(long)]
     out: PathBuf,
 }
 
 impl LayoutArgs {
-    /// Makes the model and writes its file.
+    /// Makes the model, and writes its weights file and its model file.
     pub fn run(&self) -> Result<()> {
-        let spec = layout_model(self.layout, STEPS)?;
-        let bytes = spec.encode().map_err(|error| anyhow!("{error}"))?;
-        std::fs::write(&self.out, &bytes)
-            .with_context(|| format!("cannot write {}", self.out.display()))?;
-        println!("{}: {} bytes", self.out.display(), bytes.len());
-        Ok(())
+        let weights = layout_weights(&layout_model(self.layout, STEPS)?)?;
+        weights.save(&self.out)?;
+        exported(&weights, &self.out.with_extension("hvtm"))
     }
 }

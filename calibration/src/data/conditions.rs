@@ -5,7 +5,9 @@ use hivtac_host::shown::unit_number;
 use hivtac_sensor::force::model::{self, Origin};
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::geometry::{Geometry, Preset};
+use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_terms::threshold::{PixelFormat, Threshold};
+use hivtac_twin::film::Layout;
 use hivtac_twin::{Camera, Contact};
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +36,18 @@ pub struct Conditions {
     pub contact: Contact,
     /// Origin of the data.
     pub origin: OriginName,
+    /// Number of markers.
+    #[serde(default = "four", skip_serializing_if = "is_four")]
+    pub markers: usize,
+}
+
+/// The number of markers where a file names none.
+fn four() -> usize {
+    LEAST_MARKERS
+}
+
+fn is_four(markers: &usize) -> bool {
+    *markers == LEAST_MARKERS
 }
 
 /// Where data comes from, by name.
@@ -101,7 +115,16 @@ impl Conditions {
             centroid: CentroidEstimator::BinaryMask,
             contact: Contact::default(),
             origin: OriginName::Simulated,
+            markers: LEAST_MARKERS,
         }
+    }
+
+    /// The layout of these markers.
+    ///
+    /// # Errors
+    /// When no layout has as many.
+    pub fn layout(&self) -> Result<Layout> {
+        layout(self.markers)
     }
 
     /// The simulated camera of these conditions.
@@ -133,6 +156,21 @@ impl Conditions {
             origin: self.origin.to_model()?,
         })
     }
+}
+
+/// The layout with this many markers.
+///
+/// # Errors
+/// When no layout has as many.
+pub fn layout(markers: usize) -> Result<Layout> {
+    let all = Layout::NAMES.iter().filter_map(|name| name.parse().ok());
+    let found = { all }.find(|layout: &Layout| layout.count() == markers);
+    found.with_context(|| {
+        format!(
+            "{markers} markers: where they are is known of the layouts {} alone",
+            Layout::NAMES.join(", ")
+        )
+    })
 }
 
 /// The geometry preset with this name.

@@ -10,10 +10,10 @@ use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::conditions::ContactReading;
 use hivtac_terms::threshold::ByteOrder;
-use hivtac_twin::Contact;
+use hivtac_twin::{Contact, Options};
 use rayon::prelude::*;
 
-use crate::data::conditions::meaning;
+use crate::data::conditions::{layout, meaning};
 use crate::data::dataset::{Loads, Recipe, measure, reasons};
 use crate::data::range::Range;
 use crate::evaluation::errors::{Errors, WEAK_N};
@@ -50,6 +50,11 @@ pub fn check(
     );
     let recipe = recipe(&model, samples, seed)?;
     let scene = recipe.scene(0)?;
+    let options = Options {
+        layout: layout(model.rest.areas.len())?,
+        ..scene.options().clone()
+    };
+    let scene = scene.with_options(options)?;
     let eyes = || sensor(&model);
     let measured = (0..samples).into_par_iter().map_init(eyes, |sensor, row| {
         let sensor = sensor.as_mut().map_err(|error| anyhow!("{error}"))?;

@@ -5,6 +5,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network as ChipNetwork;
+use hivtac_terms::marker::LEAST_MARKERS;
 
 use crate::data::dataset::{About, Dataset, Observation, Sample};
 use crate::data::loads::norm;
@@ -43,6 +44,11 @@ type Rows<'a> = Vec<Sample<'a>>;
 /// # Errors
 /// When the data set has too few accepted rows or none at rest, or training fails.
 pub fn fit(dataset: &Dataset, options: &Options, report: impl FnMut(Progress)) -> Result<Fit> {
+    ensure!(
+        dataset.about.conditions.markers == LEAST_MARKERS,
+        "networks are of four dots, and the data set is of {}",
+        dataset.about.conditions.markers
+    );
     let dataset = dataset.clone().tared()?;
     let (training, held_out) = parts(&dataset, options.seed)?;
     ensure!(
@@ -119,7 +125,7 @@ fn finished(
         uncertainty: Uncertainty::default(),
         training,
         film: None,
-        network,
+        network: Some(network),
     };
     let tare = features_from_q16(&weights.rest.features_q16)?;
     measured(weights, &tare, rows)
@@ -140,14 +146,14 @@ fn measured(mut weights: Weights, tare: &Features, rows: &Rows<'_>) -> Result<Fi
     let judged = rows.iter().zip(answers);
     // If the model gives no place, the range of places does not matter.
     let range = Range {
-        place_mm: match weights.network.meaning.tells_place() {
+        place_mm: match weights.network()?.meaning.tells_place() {
             true => weights.range.place_mm,
             false => f64::INFINITY,
         },
         ..weights.range
     };
     for (row, found) in judged.filter(|(row, _)| is_inside(row, &range)) {
-        Answer::in_floats(&weights, row.seen).add_to(&mut float, row);
+        Answer::in_floats(weights.network()?, row.seen).add_to(&mut float, row);
         found.add_to(&mut quantized, row);
     }
     Ok(Fit {
@@ -164,11 +170,11 @@ struct Answer {
 }
 
 impl Answer {
-    fn in_floats(weights: &Weights, seen: &Observation) -> Self {
+    fn in_floats(network: &Network, seen: &Observation) -> Self {
         let features = seen.features_px();
         Self {
-            force_n: weights.force_n(&features),
-            place_mm: weights.network.place_mm(&features),
+            force_n: network.force_n(&features),
+            place_mm: network.place_mm(&features),
         }
     }
 
@@ -229,7 +235,7 @@ fn quantized_answers(weights: &Weights, tare: &Features, rows: &Rows<'_>) -> Res
         .map_err(|error| anyhow!("{error}"))
         .context("the exported model")?;
     let mut chip = ChipNetwork::new();
-    let meaning = weights.network.meaning;
+    let meaning = weights.network()?.meaning;
     let units = meaning.chip_units();
     let mut answer = |row: &Sample<'_>| {
         let output = chip.run(&model, &features_from_q16(&row.seen.features_q16)?, tare);

@@ -12,7 +12,7 @@ use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::{Camera, Preset};
 use rayon::prelude::*;
 
-use super::covariances::{END_MM, EQUATIONS, Moved, covariances, knots, sum_of_squares};
+use super::covariances::{Covariance, END_MM, Moved, OF_FOUR, covariances, knots, sum_of_squares};
 use super::{LeastSquares, UnitSetup, in_focal_lengths};
 
 /// Knots along the size, along y and along x.
@@ -86,12 +86,13 @@ pub fn contact_shapes() -> Result<ShapesSpec> {
             .collect();
         let (mean, covariance) = mean_and_covariance(&members, &own);
         let wider = wider(pose.place_mm).powi(2);
-        factors.push(covariance.map(|row| row.map(|part| wider * part)));
+        let row = |row: &Moved| row.map(|part| wider * part);
+        factors.push(covariance.iter().map(row).collect());
         let radial = |is_kind: fn(ContactShape) -> bool| by_radius(&members, &own, is_kind);
         let [round, round_square] = radial(|shape| matches!(shape, ContactShape::Round(_)))?;
         let [flat, flat_square] = radial(|shape| matches!(shape, ContactShape::Flat(_)))?;
         let all: [Moved; SHIFTS] = [mean, round, round_square, flat, flat_square];
-        shifts.push(all);
+        shifts.push(all.map(|motion| motion.array()));
     }
     Ok(ShapesSpec {
         covariance: covariances(KNOTS, &factors),
@@ -107,16 +108,16 @@ fn wider([x, y]: [f64; 2]) -> f64 {
     WIDER + WIDER_AT_DOTS * near.clamp(0.0, 1.0)
 }
 
-fn mean_and_covariance(members: &[Member], shifts: &[Moved]) -> (Moved, [Moved; EQUATIONS]) {
-    let mut mean = Moved::default();
+fn mean_and_covariance(members: &[Member], shifts: &[Moved]) -> (Moved, Covariance) {
+    let mut mean = Moved::defaults(OF_FOUR);
     for (member, shift) in members.iter().zip(shifts) {
-        for (mean, part) in mean.iter_mut().zip(shift) {
+        for (mean, part) in mean.iter_mut().zip(shift.iter()) {
             *mean += member.weight * part;
         }
     }
     let around = members.iter().zip(shifts).map(|(member, shift)| {
         let part = member.weight.sqrt();
-        std::array::from_fn(|k| part * (shift[k] - mean[k]))
+        Moved::from_fn(OF_FOUR, |k| part * (shift[k] - mean[k]))
     });
     let covariance = sum_of_squares(&around.collect::<Vec<Moved>>());
     (mean, covariance)
@@ -135,8 +136,8 @@ fn by_radius(
         vec![part, part * part]
     });
     let through = LeastSquares::new(&rows.collect::<Vec<_>>())?;
-    let mut motions = [Moved::default(); 2];
-    for k in 0..EQUATIONS {
+    let mut motions = [Moved::defaults(OF_FOUR); 2];
+    for k in 0..OF_FOUR {
         let samples: Vec<f64> = own().map(|(_, shift)| shift[k]).collect();
         let found = through.coefficients(&samples);
         (motions[0][k], motions[1][k]) = (found[0], found[1]);
@@ -171,7 +172,7 @@ impl NominalFilm {
     /// Images of the dots, focal lengths from the axis.
     fn seen(&self, state: &Equilibrium) -> Moved {
         let images = markers(&self.film, state, &self.camera);
-        let mut seen = Moved::default();
+        let mut seen = Moved::defaults(OF_FOUR);
         for (place, marker) in seen.as_chunks_mut::<2>().0.iter_mut().zip(images) {
             *place = in_focal_lengths(marker.seen_px, &self.camera);
         }
@@ -196,7 +197,7 @@ impl NominalFilm {
                 -pose.size * (linear_n + cubic_n * pose.size.powi(2)),
             ];
             if pose.size == 0.0 {
-                all.push(vec![Moved::default(); members.len()]);
+                all.push(vec![Moved::defaults(OF_FOUR); members.len()]);
                 continue;
             }
             let radius_mm = self.film.design().tip_radius_mm;
@@ -210,7 +211,7 @@ impl NominalFilm {
                 let patch = member.at(pose.place_mm)?;
                 *state = self.film.press_patch(&patch, force_n, state)?;
                 let seen = self.seen(state);
-                shifts.push(std::array::from_fn(|k| seen[k] - by_needle[k]));
+                shifts.push(Moved::from_fn(OF_FOUR, |k| seen[k] - by_needle[k]));
             }
             all.push(shifts);
         }
@@ -283,6 +284,6 @@ fn tilted(radius_mm: f64, turn: f64) -> Result<Patch> {
 /// The mirror image of a motion of all images in the diagonal x = y. Markers 0 and 2 lie on it, 1
 /// and 3 change places.
 fn exchanged(moved: &Moved) -> Moved {
-    let [ax, ay, bx, by, cx, cy, dx, dy] = *moved;
-    [ay, ax, dy, dx, cy, cx, by, bx]
+    let [ax, ay, bx, by, cx, cy, dx, dy] = moved.array();
+    [ay, ax, dy, dx, cy, cx, by, bx].into()
 }

@@ -1,6 +1,8 @@
 //! Covariances of the images' motion around a film's tables, at even places and sizes.
 
+use hivtac_sensor::force::forward::MOST_EQUATIONS;
 use hivtac_sensor::force::model::CovarianceSpec;
+use hivtac_terms::list::List;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 
 use super::matrix::cholesky;
@@ -12,21 +14,26 @@ pub const KNOTS: [u8; 3] = [5, 5, 5];
 /// The same where covariances do not depend on the place.
 const ANYWHERE: [u8; 3] = [5, 2, 2];
 
-/// Number of coordinates: x and y of four markers.
-pub const EQUATIONS: usize = 8;
+/// Number of coordinates of four markers: x and y of each.
+pub const OF_FOUR: usize = 8;
 
 /// Motion of all images, x and y of each marker, focal lengths along the film's axes.
-pub type Moved = [f64; EQUATIONS];
+pub type Moved = List<f64, MOST_EQUATIONS>;
 
-/// The covariance of images' motion.
-pub type Covariance = [[f64; EQUATIONS]; EQUATIONS];
+/// The covariance of images' motion, row by row.
+pub type Covariance = Vec<Moved>;
+
+/// No covariance of this many coordinates.
+fn zeros(coordinates: usize) -> Covariance {
+    vec![Moved::defaults(coordinates); coordinates]
+}
 
 /// The sum over motions of each times its transpose.
 pub fn sum_of_squares(differences: &[Moved]) -> Covariance {
-    let mut sum = Covariance::default();
+    let mut sum = zeros(differences.first().map_or(0, |one| one.len()));
     for difference in differences {
-        for (row, a) in sum.iter_mut().zip(difference) {
-            for (sum, b) in row.iter_mut().zip(difference) {
+        for (row, a) in sum.iter_mut().zip(difference.iter()) {
+            for (sum, b) in row.iter_mut().zip(difference.iter()) {
                 *sum += a * b;
             }
         }
@@ -64,11 +71,11 @@ pub fn covariances(counts: [u8; 3], knots: &[Covariance]) -> CovarianceSpec {
     }
 }
 
-/// Independent errors of every coordinate, the same everywhere. They grow in proportion to size, to
-/// `largest` focal lengths at the largest.
+/// Independent errors of every coordinate of four markers, the same everywhere. They grow in
+/// proportion to size, to `largest` focal lengths at the largest.
 pub fn even(largest: f64) -> CovarianceSpec {
     let at = |pose: &Pose| {
-        let mut covariance = Covariance::default();
+        let mut covariance = zeros(OF_FOUR);
         for (k, row) in covariance.iter_mut().enumerate() {
             row[k] = (largest * pose.size / LARGEST_SIZE).powi(2);
         }
@@ -90,7 +97,7 @@ mod tests {
     fn a_chip_reads_what_was_written() {
         let wave = |k: usize, pose: &Pose| -> Moved {
             let [x, y] = pose.place_mm;
-            std::array::from_fn(|i| {
+            Moved::from_fn(OF_FOUR, |i| {
                 pose.size * (0.1 + 0.01 * x * ((i + k) as f64).sin() + 0.01 * y)
             })
         };
@@ -99,7 +106,7 @@ mod tests {
         let spec = covariances(KNOTS, &all);
         let mut bytes = Vec::new();
         spec.push(&mut bytes);
-        let grid = CovarianceGrid::new(EQUATIONS, spec.counts, spec.end_mm, &bytes[8..]).unwrap();
+        let grid = CovarianceGrid::new(OF_FOUR, spec.counts, spec.end_mm, &bytes[8..]).unwrap();
         let limits = Limits {
             size: LARGEST_SIZE as f32,
             tilt: 0.6,
@@ -121,7 +128,7 @@ mod tests {
             };
             let (mut found, truth) = (ChipCovariance::EMPTY, truth(&pose));
             grid.put(&chip, &limits, &mut found);
-            for i in 0..EQUATIONS {
+            for i in 0..OF_FOUR {
                 for j in 0..=i {
                     let off = f64::from(found.entry(i, j)) - truth[i][j];
                     let whole = (truth[i][i] * truth[j][j]).sqrt();

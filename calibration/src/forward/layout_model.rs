@@ -24,7 +24,11 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::noise::{Line, MEAN_SIZE};
-use super::of_layout;
+use super::{FilmModel, of_layout};
+use crate::data::conditions;
+use crate::data::range::Range;
+use crate::data::rest;
+use crate::weights::{Training, Weights};
 
 /// Columns and rows of a frame.
 const SIZE: [u16; 2] = [320, 240];
@@ -35,7 +39,7 @@ const PRESSES: u64 = 300;
 /// The seed of noise and presses.
 const SEED: u64 = 11;
 /// Standard uncertainty of a coordinate before it is measured, px.
-const NOISE_PX: f64 = 0.011;
+pub(super) const UNMEASURED_PX: f64 = 0.011;
 /// Width that the mask adds to a dot's diameters, px.
 const EDGE_PX: f64 = 2.8;
 /// The calibrated range.
@@ -52,7 +56,7 @@ pub fn layout_model(layout: Layout, steps: u8) -> Result<ModelSpec> {
     let last_mm = Film::default().with_layout(layout)?.most_place_mm();
     let scene = layout_scene(layout)?;
     let camera = scene.camera();
-    let (forward, _) = of_layout(layout, steps, NOISE_PX, camera)?;
+    let (forward, _) = of_layout(layout, steps, UNMEASURED_PX, camera)?;
     let conditions = conditions();
     let spec = ModelSpec {
         conditions,
@@ -76,6 +80,54 @@ pub fn layout_model(layout: Layout, steps: u8) -> Result<ModelSpec> {
         },
     };
     seen_at_rest(spec, &scene)
+}
+
+/// The weights file of a layout's model: what `unit` begins with. It has no network.
+pub fn layout_weights(spec: &ModelSpec) -> Result<Weights> {
+    let forward = spec.forward.as_ref().context("the model has no film")?;
+    let double = |pair: [f32; 2]| pair.map(f64::from);
+    let Conditions { geometry, .. } = spec.conditions;
+    let conditions = conditions::Conditions {
+        threshold: spec.conditions.threshold.limits(),
+        dilations: spec.conditions.dilations,
+        centroid: spec.conditions.centroid,
+        markers: spec.rest.areas.len(),
+        ..conditions::Conditions::simulated(
+            spec.conditions.preset,
+            geometry.width,
+            geometry.height,
+            PixelFormat::Rgb565,
+        )
+    };
+    let CalibratedRange {
+        magnitude,
+        alpha,
+        beta,
+        place,
+    } = spec.range;
+    Ok(Weights {
+        format: Weights::format(),
+        conditions,
+        rest: rest::Rest::of_sensor(&spec.rest),
+        range: Range {
+            force_n: f64::from(magnitude.0) * 1e-6,
+            alpha_deg: f64::from(alpha.0) * 1e-3,
+            beta_deg: f64::from(beta.0) * 1e-3,
+            place_mm: f64::from(place.0) * 1e-3,
+        },
+        uncertainty: Default::default(),
+        training: Training::default(),
+        film: Some(FilmModel {
+            steps: forward.steps,
+            rest_px: forward.noise.rest_px.map(double),
+            noise_px: double(forward.noise.at_rest_px),
+            noise_at_four_areas: double(forward.noise.at_four_areas),
+            beside_px: 0.0,
+            others: None,
+            own: None,
+        }),
+        network: None,
+    })
 }
 
 /// The nominal sensor's scene with these dots.

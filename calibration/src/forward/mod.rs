@@ -18,21 +18,23 @@ mod weight;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, anyhow, ensure};
-use hivtac_sensor::force::forward::{self, Limits, Markers, RestImage, Stiffness};
+use hivtac_sensor::force::forward::{self, Limits, MOST_STEPS, Markers, RestImage, Stiffness};
 use hivtac_sensor::force::model::{ForwardSpec, TablesSpec, WeightSpec};
-use hivtac_twin::film::Film;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, NOMINAL_RADIUS_MM, Pose, Unit};
+use hivtac_twin::film::{Dots, Film};
 use hivtac_twin::{Camera, Disc, FILM_DISTANCE_MM, Load, Preset};
 use serde::{Deserialize, Serialize};
 
+use crate::data::conditions::layout;
 use crate::unit_fit::OwnFilm;
 use crate::weights::Weights;
 pub use contact_shapes::contact_shapes;
-use covariances::even;
-pub use covariances::{Covariance, EQUATIONS, KNOTS, Moved, covariances, knots, sum_of_squares};
+pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
+use covariances::{OF_FOUR, even};
 pub use dots::of_layout;
 pub use functions::{Sampled, compressed};
-pub use layout_model::{layout_model, layout_scene, rest_of, untared};
+use layout_model::UNMEASURED_PX;
+pub use layout_model::{layout_model, layout_scene, layout_weights, rest_of, untared};
 pub(crate) use least_squares::{LeastSquares, dot};
 pub use noise::Noise;
 pub use other_units::OtherUnits;
@@ -46,9 +48,9 @@ pub use weight::{Pressed, Weighed, everywhere, weight};
 pub struct FilmModel {
     /// Gauss–Newton steps from the network's answer, 0–3.
     pub steps: u8,
-    /// Rest position as a tare measures it, minus where markers 0–3 rest, px: the pixel grid's
+    /// Rest position as a tare measures it, minus where each marker rests, px: the pixel grid's
     /// effect.
-    pub rest_px: [[f64; 2]; 4],
+    pub rest_px: Dots<[f64; 2]>,
     /// Standard uncertainty of a marker in a frame, px, while it is as large as at rest: away from
     /// the pattern's middle, and across that direction.
     pub noise_px: [f64; 2],
@@ -87,7 +89,7 @@ impl FilmModel {
     pub fn nominal(steps: u8, noise: &Noise) -> Self {
         Self {
             steps,
-            rest_px: noise.rest_px,
+            rest_px: noise.rest_px.into(),
             noise_px: noise.at_rest_px,
             noise_at_four_areas: noise.at_four_areas,
             beside_px: 0.0,
@@ -153,7 +155,7 @@ impl FilmModel {
     pub fn spec(&self) -> Result<ForwardSpec> {
         self.check()?;
         let noise = forward::Noise {
-            rest_px: Markers::of(self.rest_px.map(|place| place.map(|part| part as f32))),
+            rest_px: self.rest_px.map(|place| place.map(|part| part as f32)),
             at_rest_px: self.noise_px.map(|part| part as f32),
             at_four_areas: self.noise_at_four_areas.map(|part| part as f32),
         };
@@ -161,6 +163,15 @@ impl FilmModel {
         let camera = Camera::new(Preset::Ov7725, 320, 240)?;
         if let Some(own) = &self.own {
             return own.spec(self.steps, noise, &camera);
+        }
+        if self.rest_px.len() != OF_FOUR / 2 {
+            let per_px = Some([1.0 / camera.focal_px() as f32, 0.0]);
+            return Ok(ForwardSpec {
+                steps: self.steps,
+                per_px,
+                noise,
+                ..other_layout(self.rest_px.len(), &camera)?
+            });
         }
         let nominal = nominal(&camera)?;
         Ok(ForwardSpec {
@@ -219,12 +230,24 @@ impl Weighed for UnitSetup<'_> {
 impl UnitSetup<'_> {
     /// All markers' images, each computed from the marker's number.
     fn images(&self, of_marker: impl Fn(usize) -> Result<[f64; 2]>) -> Result<Moved> {
-        let mut moved = Moved::default();
+        let mut moved = Moved::defaults(OF_FOUR);
         for (marker, place) in moved.as_chunks_mut::<2>().0.iter_mut().enumerate() {
             *place = of_marker(marker)?;
         }
         Ok(moved)
     }
+}
+
+/// The nominal film with the layout of this many dots; computed once.
+fn other_layout(count: usize, camera: &Camera) -> Result<ForwardSpec> {
+    static MADE: Mutex<Option<ForwardSpec>> = Mutex::new(None);
+    let mut made = MADE.lock().map_err(|error| anyhow!("{error}"))?;
+    if let Some(made) = made.as_ref().filter(|made| made.tables.dots.len() == count) {
+        return Ok(made.clone());
+    }
+    let (spec, _) = of_layout(layout(count)?, MOST_STEPS, UNMEASURED_PX, camera)?;
+    *made = Some(spec.clone());
+    Ok(spec)
 }
 
 fn nominal(camera: &Camera) -> Result<Nominal> {
@@ -315,7 +338,7 @@ mod tests {
             place_mm: pose.place_mm.map(|part| part as f32),
         };
         let predicted = (forward.tables).predict(&pose, &forward.limits, beside_mm);
-        std::array::from_fn(|k| predicted.moved[k].into())
+        covariances::Moved::from_fn(OF_FOUR, |k| predicted.moved[k].into())
     }
 
     fn film_model() -> FilmModel {
@@ -420,7 +443,7 @@ mod tests {
                 now: down.map(|part| part as f32),
             };
             let hanging = forward.hanging(turned, true).unwrap();
-            let mut told = forward::Prediction::zeros(EQUATIONS);
+            let mut told = forward::Prediction::zeros(OF_FOUR);
             let chip = forward::Pose {
                 size: pose.size as f32,
                 tilt: pose.tilt.map(|part| part as f32),

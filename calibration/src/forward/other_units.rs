@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
+use super::covariances::{Covariance, KNOTS, Moved, OF_FOUR, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
 
 /// Number of films that are drawn.
@@ -221,7 +221,7 @@ impl<'a> Other<'a> {
                     true => self.matched(&pose, &mut state, &mut stiffer)?,
                     false => Match {
                         magnitude_n: 0.0,
-                        left: Moved::default(),
+                        left: Moved::defaults(OF_FOUR),
                     },
                 });
             }
@@ -259,7 +259,7 @@ impl<'a> Other<'a> {
     /// place; and the remaining motion.
     fn nearest(&self, pose: &Pose, state: &Equilibrium) -> (f64, Moved) {
         let seen = self.seen(state);
-        let mut moved = Moved::default();
+        let mut moved = Moved::defaults(OF_FOUR);
         for (dot, parts) in moved.chunks_exact_mut(2).enumerate() {
             let px = [0, 1].map(|i| (seen[dot][i] - f64::from(self.rest_px[dot][i])) as f32);
             parts.copy_from_slice(&self.mounting.moved(px).map(f64::from));
@@ -276,11 +276,11 @@ impl<'a> Other<'a> {
                 .chip
                 .tables
                 .predict(&at, &self.chip.limits, &self.mounting.beside_mm);
-            left = std::array::from_fn(|k| moved[k] - f64::from(told.moved[k]));
+            left = Moved::from_fn(OF_FOUR, |k| moved[k] - f64::from(told.moved[k]));
             let slopes = told.slopes[0].map(f64::from);
             let [along, square] = slopes
                 .iter()
-                .zip(&left)
+                .zip(left.iter())
                 .fold([0.0; 2], |[along, square], (slope, left)| {
                     [along + slope * left, square + slope * slope]
                 });

@@ -1,5 +1,7 @@
 //! Fits a unit's own model to a data set of a handful of loads.
 
+use std::borrow::Cow;
+
 use anyhow::{Context, Result, ensure};
 
 use super::FilmModel;
@@ -10,7 +12,6 @@ use crate::loads::{Certainty, Rough, SeenLoad, loads_of};
 use crate::quantize::export;
 use crate::unit_fit::{Bench, FINENESS, Fit, OwnFilm, fit};
 use crate::weights::Weights;
-use hivtac_twin::film::MARKER_CENTRES_MM;
 use hivtac_twin::{Camera, Preset};
 
 /// Standard uncertainty of a marker's mean coordinates, px, from the pixel grid and the remaining
@@ -19,6 +20,11 @@ const MEAN_PX: f64 = 0.008;
 /// The fewest loads that determine a unit; and a film in a unit whose camera and dots are known.
 const FEWEST_LOADS: usize = 4;
 const FEWEST_SWAPPED: usize = 3;
+/// The model of the nominal film with the eight dots of `8v`.
+const EIGHT: usize = 8;
+const OF_EIGHT: &[u8] = include_bytes!("../../models/8v/default.hvtm");
+/// The tables of a fitted unit hold for places within this, ±, mm.
+const OWN_REACH_MM: f64 = 4.2;
 
 /// What is known before a unit is fitted.
 #[derive(Clone, Copy, Debug)]
@@ -52,7 +58,7 @@ impl Weights {
     /// The loads of a data set with their uncertainties.
     fn loads(&self, dataset: &Dataset, known: Known<'_>) -> Result<Vec<SeenLoad>> {
         let certainty = Certainty::of(self, known.gauge_n, known.place_mm);
-        let model = export(self)?;
+        let model = self.rough_model()?;
         let rough = Rough::new(&model, &dataset.rest()?)?;
         let loads = loads_of(dataset, &certainty, |seen| rough.place_mm(seen))?;
         rough.check(&loads)?;
@@ -64,6 +70,14 @@ impl Weights {
             loads.len()
         );
         Ok(loads)
+    }
+
+    /// A model that knows only a unit's rest position. That of eight dots takes a minute to make.
+    fn rough_model(&self) -> Result<Cow<'static, [u8]>> {
+        match self.conditions.markers {
+            EIGHT => Ok(OF_EIGHT.into()),
+            _ => Ok(export(self)?.into()),
+        }
     }
 
     /// These weights for the unit with this rest position and these loads. `down` is gravity in the
@@ -85,9 +99,9 @@ impl Weights {
         let bench = Bench {
             focal_px: camera.focal_px(),
             middle_px: [camera.width(), camera.height()].map(|side| (f64::from(side) - 1.0) / 2.0),
-            rest_px: places(&rest.features_px()).to_vec(),
+            rest_px: rest.places_px().to_vec(),
             noise_px: MEAN_PX,
-            dots_mm: MARKER_CENTRES_MM.to_vec(),
+            dots_mm: self.conditions.layout()?.centres_mm().to_vec(),
             // Tables are in focal lengths: all cameras have this lens.
             camera: Camera::new(Preset::Ov7725, 320, 240)?,
             down,
@@ -100,6 +114,7 @@ impl Weights {
             ..film
         });
         self.rest = rest;
+        self.range.place_mm = self.range.place_mm.min(OWN_REACH_MM);
         Ok((self, found))
     }
 
@@ -120,6 +135,12 @@ fn conditions_of(own: &Conditions, unit: &Conditions) -> Result<Conditions> {
         "the weights are for other frames than the data set's"
     );
     ensure!(
+        own.markers == unit.markers,
+        "the weights are for {} dots, and the unit has {}: take those for it (calibration/models)",
+        own.markers,
+        unit.markers
+    );
+    ensure!(
         own.pixel_format == unit.pixel_format,
         "the weights are for {}, and the unit sends {}: take those for it \
          (calibration/models), or `hivtac threshold --model`",
@@ -138,11 +159,6 @@ fn conditions_of(own: &Conditions, unit: &Conditions) -> Result<Conditions> {
         dilations: unit.dilations,
         ..own.clone()
     })
-}
-
-/// Markers 0–3 of a frame's features.
-fn places(features_px: &[f64]) -> [[f64; 2]; 4] {
-    std::array::from_fn(|k| [features_px[2 * k], features_px[2 * k + 1]])
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use hivtac_sensor::force::model::WeightSpec;
 use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
 use rayon::prelude::*;
 
-use super::covariances::{EQUATIONS, Moved};
+use super::covariances::Moved;
 use super::least_squares::LeastSquares;
 
 /// Number of directions of gravity around the film, in the planes of x and z and of y and z, at
@@ -110,7 +110,8 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
     let rows = around
         .iter()
         .map(|down| functions.at(0.0, single(*down)).map(f64::from));
-    fitted_parts(&rows.collect::<Vec<_>>(), |i, c| sides[i][c])
+    let coordinates = weightless.len();
+    fitted_parts(&rows.collect::<Vec<_>>(), coordinates, |i, c| sides[i][c])
 }
 
 /// The effect added under loads, by size, function of gravity, coordinate and term.
@@ -137,12 +138,13 @@ fn under_load(
         terms(place, tilt).map(f64::from)
     });
     let rows: Vec<[f64; TERMS]> = rows.collect();
+    let coordinates = at_rest[0].len();
     let mut under_load: [[Vec<[f64; TERMS]>; UNDER_LOAD]; SIZES] = Default::default();
     for (number, (of_size, size)) in under_load.iter_mut().zip(sizes).enumerate() {
         let softness = f64::from(soft(&functions.stiffness, size as f32));
         for (f, of_function) in of_size.iter_mut().enumerate() {
-            let found = fitted_parts(&rows, |i, c| sides[i][number][f][c] / softness)?;
-            *of_function = (0..EQUATIONS)
+            let found = fitted_parts(&rows, coordinates, |i, c| sides[i][number][f][c] / softness)?;
+            *of_function = (0..coordinates)
                 .map(|c| found.map(|of_term| of_term[c]))
                 .collect();
         }
@@ -150,10 +152,11 @@ fn under_load(
     Ok(under_load)
 }
 
-/// Coefficients of `N` functions, whose values are the rows, nearest to the known values of each
-/// coordinate.
+/// Coefficients of `N` functions, whose values are the rows, nearest to the known values of each of
+/// these coordinates.
 fn fitted_parts<const N: usize>(
     rows: &[[f64; N]],
+    coordinates: usize,
     known: impl Fn(usize, usize) -> f64,
 ) -> Result<[Moved; N]> {
     let through = LeastSquares::new(&rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>())?;
@@ -161,9 +164,9 @@ fn fitted_parts<const N: usize>(
         let samples: Vec<f64> = (0..rows.len()).map(|i| known(i, c)).collect();
         through.coefficients(&samples)
     };
-    let found: [Vec<f64>; EQUATIONS] = std::array::from_fn(of_coordinate);
+    let found: Vec<Vec<f64>> = (0..coordinates).map(of_coordinate).collect();
     Ok(std::array::from_fn(|f| {
-        std::array::from_fn(|c| found[c][f])
+        Moved::from_fn(coordinates, |c| found[c][f])
     }))
 }
 
@@ -186,7 +189,7 @@ fn added<F: Weighed>(
             let parts = functions.at(*size as f32, single(*down)).map(f64::from);
             let mut more = less(moved, weightless);
             for (part, column) in parts.iter().zip(at_rest) {
-                for (sum, value) in more.iter_mut().zip(column) {
+                for (sum, value) in more.iter_mut().zip(column.iter()) {
                     *sum -= part * value;
                 }
             }
@@ -203,15 +206,15 @@ fn added<F: Weighed>(
     let [along_x, along_y] = [more(along_x)?, more(along_y)?];
     let of_size = |k: usize| {
         let ((d, toward), (e, away)) = (&toward[k], &away[k]);
-        let square: Moved = std::array::from_fn(|c| (toward[c] / d - away[c] / e) / (d - e));
-        let first = std::array::from_fn(|c| toward[c] / d - square[c] * d);
+        let square = Moved::from_fn(toward.len(), |c| (toward[c] / d - away[c] / e) / (d - e));
+        let first = Moved::from_fn(toward.len(), |c| toward[c] / d - square[c] * d);
         [first, square, along_x[k].1, along_y[k].1]
     };
     Ok((0..sizes.len()).map(of_size).collect())
 }
 
 fn less(a: &Moved, b: &Moved) -> Moved {
-    std::array::from_fn(|c| a[c] - b[c])
+    Moved::from_fn(a.len(), |c| a[c] - b[c])
 }
 
 fn single(down: [f64; 3]) -> Gravity {

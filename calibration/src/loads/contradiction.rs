@@ -163,7 +163,7 @@ mod tests {
             direction_rad: 0.0,
             place_mm,
             each_place_mm: 0.0,
-            seen_px: [[0.0; 2]; 4],
+            seen_px: [[0.0; 2]; 4].into(),
             noise_px: 0.01,
             frames: 4,
         }

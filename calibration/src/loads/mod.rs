@@ -13,13 +13,14 @@ use std::cell::RefCell;
 
 use crate::data::dataset::{Dataset, Observation, Sample};
 use crate::data::loads::norm;
-use crate::data::rest::Rest;
+use crate::data::rest::{Rest, features_to_q16};
 use crate::evaluation::answer::Chip;
 use anyhow::{Result, anyhow};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
+use hivtac_twin::film::Dots;
 
 use crate::weights::Weights;
 
@@ -51,8 +52,8 @@ pub struct SeenLoad {
     /// Standard uncertainty of this place along x and y, without the part common to all places, mm;
     /// infinite if nobody noted it.
     pub each_place_mm: f64,
-    /// Seen positions of markers 0–3, mean of the frames, px.
-    pub seen_px: [[f64; 2]; 4],
+    /// Seen positions of the markers, mean of the frames, px.
+    pub seen_px: Dots<[f64; 2]>,
     /// Standard uncertainty of these coordinates, px.
     pub noise_px: f64,
     /// Number of frames.
@@ -132,7 +133,7 @@ fn noted(samples: &[Sample<'_>], certainty: &Certainty) -> Vec<SeenLoad> {
         let place_mm = sample.tip_mm.unwrap_or_default();
         let same =
             |load: &&mut SeenLoad| load.force_n == sample.force_n && load.place_mm == place_mm;
-        let seen_px = markers_px(sample.seen);
+        let seen_px = sample.seen.places_px();
         match loads.iter_mut().find(same) {
             Some(load) => load.add(&seen_px),
             None => loads.push(SeenLoad {
@@ -155,7 +156,7 @@ fn noted(samples: &[Sample<'_>], certainty: &Certainty) -> Vec<SeenLoad> {
 
 impl SeenLoad {
     /// The load's picture, with markers of these areas, px.
-    pub fn observation(&self, areas_px: [u32; 4]) -> Observation {
+    pub fn observation(&self, areas_px: Dots<u32>) -> Observation {
         let px = |part: f64| Px((part * f64::from(Px::ONE.0)) as i32);
         let markers = self.seen_px.map(|[x, y]| Marker {
             x: px(x),
@@ -163,7 +164,7 @@ impl SeenLoad {
             area: 1,
         });
         Observation {
-            features_q16: Features::of_markers(&markers).to_array(),
+            features_q16: features_to_q16(&Features::of_markers(&markers)),
             areas_px,
         }
     }
@@ -173,19 +174,13 @@ impl SeenLoad {
         norm(self.force_n)
     }
 
-    fn add(&mut self, seen_px: &[[f64; 2]; 4]) {
+    fn add(&mut self, seen_px: &[[f64; 2]]) {
         self.frames += 1;
         let now = seen_px.as_flattened();
         for (mean, now) in self.seen_px.as_flattened_mut().iter_mut().zip(now) {
             *mean += (now - *mean) / self.frames as f64;
         }
     }
-}
-
-/// Markers 0–3 of a frame, px.
-fn markers_px(seen: &Observation) -> [[f64; 2]; 4] {
-    let features = seen.features_px();
-    std::array::from_fn(|k| [features[2 * k], features[2 * k + 1]])
 }
 
 /// Estimates loads by a model that knows only a unit's rest position.

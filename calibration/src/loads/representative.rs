@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 
 use crate::data::dataset::{Observation, Sample};
 use crate::data::loads::norm;
-
-use super::markers_px;
+use hivtac_twin::film::Dots;
 
 /// The largest number of frames in a load.
 const MOST_FRAMES: usize = 8;
@@ -38,8 +37,8 @@ pub struct LoadFrames {
     pub clock_n: f64,
     /// Estimated place, mm.
     pub place_mm: [f64; 2],
-    /// Mean seen positions of markers 0–3, px.
-    pub seen_px: [[f64; 2]; 4],
+    /// Mean seen positions of the markers, px.
+    pub seen_px: Dots<[f64; 2]>,
     /// Number of frames.
     pub frames: usize,
 }
@@ -89,9 +88,9 @@ fn steady(rows: &[Sample<'_>]) -> usize {
         let size = norm(sample.force_n);
         sample.force_n.map(|part| part / size)
     };
-    let (mut size_n, mut mean_px) = (norm(first.force_n), markers_px(first.seen));
+    let (mut size_n, mut mean_px) = (norm(first.force_n), first.seen.places_px());
     for (count, row) in rows.iter().enumerate().take(MOST_FRAMES).skip(1) {
-        let (now_n, now_px) = (norm(row.force_n), markers_px(row.seen));
+        let (now_n, now_px) = (norm(row.force_n), row.seen.places_px());
         let [a, b] = [direction(first), direction(row)];
         let is_same = row.session == first.session && (0..3).all(|i| (a[i] - b[i]).abs() < 1e-6);
         let strays =
@@ -109,10 +108,11 @@ fn steady(rows: &[Sample<'_>]) -> usize {
     rows.len().min(MOST_FRAMES)
 }
 
-/// Root mean square of the eight coordinates' differences, px.
-fn apart_px(a: &[[f64; 2]; 4], b: &[[f64; 2]; 4]) -> f64 {
-    let pairs = a.as_flattened().iter().zip(b.as_flattened());
-    (pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 8.0).sqrt()
+/// Root mean square of the coordinates' differences, px.
+fn apart_px(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
+    let (a, b) = (a.as_flattened(), b.as_flattened());
+    let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+    (squares.sum::<f64>() / a.len() as f64).sqrt()
 }
 
 impl Group {
@@ -123,13 +123,13 @@ impl Group {
     ) -> Self {
         let count = frames.len() as f64;
         let mean = |of: &dyn Fn(&Sample<'_>) -> f64| frames.iter().map(of).sum::<f64>() / count;
-        let seen: Vec<[[f64; 2]; 4]> = frames.iter().map(|row| markers_px(row.seen)).collect();
+        let seen: Vec<Dots<[f64; 2]>> = frames.iter().map(|row| row.seen.places_px()).collect();
         let places: Vec<[f64; 2]> = frames.iter().map(|row| rough_place_mm(row.seen)).collect();
         let size_n = mean(&|row| norm(row.force_n));
         let scatter_n = mean(&|row| (norm(row.force_n) - size_n).powi(2)).sqrt();
         let rate_n = mean(&|row| row.clock_n.unwrap_or(UNKNOWN_RATE * size_n));
         let clock_n = rate_n.hypot(scatter_n / count.sqrt());
-        let seen_px = std::array::from_fn(|k| {
+        let seen_px = Dots::from_fn(seen[0].len(), |k| {
             [0, 1].map(|axis| seen.iter().map(|at| at[k][axis]).sum::<f64>() / count)
         });
         let moved_px = match frames.len() {

@@ -29,14 +29,16 @@ fn seen(force_n: f64, [x, y]: [f64; 2], off_px: f64) -> Observation {
         features_px[2 * k + 1] = 120.0 + down * apart + 2.0 * y + off_px;
     }
     Observation {
-        features_q16: features_px.map(|px| Q::from_bits((px * 65_536.0).round() as i64)),
-        areas_px: [190; 4],
+        features_q16: features_px
+            .map(|px| Q::from_bits((px * 65_536.0).round() as i64))
+            .into(),
+        areas_px: [190; 4].into(),
     }
 }
 
 /// The place of a press by that formula, mm.
 fn place_mm(seen: &Observation) -> [f64; 2] {
-    let px = markers_px(seen);
+    let px = seen.places_px();
     [(0, 160.0), (1, 120.0)].map(|(axis, middle)| {
         let mean = px.iter().map(|at| at[axis]).sum::<f64>() / 4.0;
         (mean - middle) / 2.0
@@ -112,7 +114,7 @@ fn rows_of_one_force_and_place_are_frames_of_one_load() {
     let frames: Vec<usize> = loads.iter().map(|load| load.frames).collect();
     assert_eq!(frames, [2, 2, 2, 3]);
     for (number, load) in loads.iter().enumerate() {
-        let expected = markers_px(&seen(0.1, [number as f64, 0.0], 0.0));
+        let expected = seen(0.1, [number as f64, 0.0], 0.0).places_px();
         let off = expected
             .as_flattened()
             .iter()
@@ -158,7 +160,7 @@ fn presses_anywhere_are_loads_of_unknown_places_beside_known_ones() {
     for load in loads.iter().filter(|load| load.direction_rad > 0.0) {
         assert!((load.direction_rad - 3_f64.to_radians()).abs() < 1e-12);
         assert_eq!(load.each_place_mm, f64::INFINITY);
-        let there = markers_px(&seen(load.magnitude_n(), load.place_mm, 0.0));
+        let there = seen(load.magnitude_n(), load.place_mm, 0.0).places_px();
         let off = there.as_flattened().iter().zip(load.seen_px.as_flattened());
         assert!(
             off.into_iter().all(|(a, b)| (a - b).abs() < 0.05),

@@ -106,7 +106,7 @@ fn network_in(file: &str) -> Result<Network, String> {
     let path = Path::new(file);
     let network = match path.extension().is_some_and(|it| it == "safetensors") {
         true => import::load(path),
-        false => Weights::load(path).map(|weights| weights.network),
+        false => Weights::load(path).and_then(|weights| weights.network().cloned()),
     };
     network.map_err(|error| format!("{error:#}"))
 }

@@ -71,7 +71,7 @@ impl Rows {
     ) -> Result<Self> {
         let scaling = input_scaling(&network.input)?;
         let steps = samples.features.iter().map(|row| {
-            let features = features_from_q16(&row.map(q16))?;
+            let features = features_from_q16(&row.map(q16).into())?;
             Ok(scale_inputs(
                 &scaling,
                 &features,

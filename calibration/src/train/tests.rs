@@ -22,14 +22,14 @@ fn weights(network: Network) -> Weights {
         format: Weights::format(),
         conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
         rest: Rest {
-            features_q16: [Q::from_int(16); INPUTS],
-            areas_px: [200; 4],
+            features_q16: [Q::from_int(16); INPUTS].into(),
+            areas_px: [200; 4].into(),
         },
         range: Range::default(),
         uncertainty: Uncertainty::default(),
         training: Training::default(),
         film: None,
-        network,
+        network: Some(network),
     }
 }
 
@@ -92,7 +92,7 @@ fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
     let model = Model::parse(&bytes).unwrap();
     let mut chip = ChipNetwork::new();
     for (i, q16) in q16.iter().enumerate() {
-        let features = features_from_q16(q16).unwrap();
+        let features = features_from_q16(&(*q16).into()).unwrap();
         let values = chip.run(&model, &features, &model.rest.features).values;
         for (o, &value) in values.iter().enumerate() {
             assert_eq!(

@@ -21,8 +21,11 @@ use crate::weights::Weights;
 use plan::MOST_LOADS;
 use verdict::Verdict;
 
-/// Weights of the firmware's model, made from the simulated sensor.
-const DEFAULT_WEIGHTS: &str = include_str!("../../models/default.weights");
+/// Weights of the models of the simulated sensor, by the number of dots.
+const DEFAULT_WEIGHTS: [(usize, &str); 2] = [
+    (4, include_str!("../../models/default.weights")),
+    (8, include_str!("../../models/8v/default.weights")),
+];
 /// Files in the recording's folder: the loads, the unit's weights and its model.
 const LOADS: &str = "loads.csv";
 const WEIGHTS: &str = "unit.weights";
@@ -77,10 +80,7 @@ impl GuideArgs {
     /// aligned with the gauge, or no unit explains them.
     pub fn lead(&self, into: &Path, weights: Option<&Path>, known: Known<'_>) -> Result<()> {
         let tasks = self.tasks(known.from.is_some())?;
-        let weights = match weights {
-            Some(file) => Weights::load(file)?,
-            None => Weights::parse(DEFAULT_WEIGHTS)?,
-        };
+        let weights = weights.map(Weights::load).transpose()?;
         let left =
             || Ok::<_, anyhow::Error>(poses::left(&tasks, &folder::done(into)?, |it| it.pose));
         if !left()?.is_empty() {
@@ -133,8 +133,12 @@ impl GuideArgs {
         record::record_tasks(&args, Some(tasks.to_vec()))
     }
 
-    fn fit(&self, into: &Path, weights: Weights, known: Known<'_>) -> Result<()> {
+    fn fit(&self, into: &Path, weights: Option<Weights>, known: Known<'_>) -> Result<()> {
         let recording = Recording::read(into)?;
+        let weights = match weights {
+            Some(weights) => weights,
+            None => default_weights(recording.conditions.markers)?,
+        };
         let gauge = Gauge::of(&self.gauge, self.gauge_port.gauge_unit)?;
         let how = How {
             unit: self.gauge_port.gauge_unit,
@@ -161,4 +165,11 @@ impl GuideArgs {
         );
         Ok(())
     }
+}
+
+/// The weights of the simulated sensor with this many dots.
+fn default_weights(markers: usize) -> Result<Weights> {
+    let known = DEFAULT_WEIGHTS.iter().find(|(of, _)| *of == markers);
+    let (_, text) = known.with_context(|| format!("no weights are known for {markers} dots"))?;
+    Weights::parse(text)
 }

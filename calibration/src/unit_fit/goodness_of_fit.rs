@@ -68,7 +68,7 @@ mod tests {
             direction_rad: 0.0,
             place_mm: [3.0, -1.5],
             each_place_mm: 0.0,
-            seen_px: [[0.0; 2]; 4],
+            seen_px: [[0.0; 2]; 4].into(),
             noise_px: 0.008,
             frames: 4,
         };

@@ -7,7 +7,9 @@ use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::forward::{MOST_TILTS, Noise, Stiffness};
 use hivtac_sensor::force::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use hivtac_shell::Equilibrium;
+use hivtac_terms::marker::{LEAST_MARKERS, MOST_MARKERS};
 use hivtac_twin::Camera;
+use hivtac_twin::film::MAX_PLACE_MM;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -19,12 +21,15 @@ use super::numbers::{Family, Number};
 use super::problem::{At, Problem, Rates, mesh_part, near_tip};
 use super::weight::OwnWeight;
 use crate::forward::{
-    Covariance, Dot, EQUATIONS, KNOTS, Moved, covariances, knots, limits, rest_image,
-    sum_of_squares, tables,
+    Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
 
-/// Nodes along each axis of a dot's table.
+/// Nodes along each axis of a dot's table, of four and of other dots. Others may be anywhere under
+/// the tip.
 const NODES: usize = 13;
+const MORE_NODES: usize = 14;
+/// The number of dots of the square layout.
+const SQUARE: usize = LEAST_MARKERS;
 
 /// A unit's film as fitted to its loads.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -140,13 +145,15 @@ impl OwnFilm {
             "film.own: {numbers:?} are no stiffness and no camera's scale"
         );
         ensure!(
-            2 * self.dots.len() == EQUATIONS && 2 * self.rest_px.len() == EQUATIONS,
-            "film.own: {} markers: this program knows {}",
+            (LEAST_MARKERS..=MOST_MARKERS).contains(&self.dots.len())
+                && self.rest_px.len() == self.dots.len(),
+            "film.own: tables of {} markers, rest positions of {}: use {LEAST_MARKERS} to \
+             {MOST_MARKERS} of both",
             self.dots.len(),
-            EQUATIONS / 2
+            self.rest_px.len()
         );
         if let Some(weight) = &self.weight {
-            weight.check()?;
+            weight.check(2 * self.dots.len())?;
         }
         self.covariance().map(|_| ())
     }
@@ -172,7 +179,9 @@ impl OwnFilm {
             tables: self.tables(),
             own: Some(self.covariance()?),
             other: None,
-            weight: self.weight.as_deref().map(OwnWeight::spec).transpose()?,
+            weight: (self.weight.as_deref())
+                .map(|weight| weight.spec(2 * self.dots.len()))
+                .transpose()?,
         })
     }
 
@@ -200,9 +209,10 @@ impl OwnFilm {
     /// # Errors
     /// When a knot has a different number of entries than a covariance.
     fn covariance(&self) -> Result<CovarianceSpec> {
+        let coordinates = 2 * self.dots.len();
         let factor = |entries: &Vec<f64>| -> Option<Vec<Vec<f64>>> {
-            let rows = entries.chunks(EQUATIONS).map(<[f64]>::to_vec);
-            (entries.len() == EQUATIONS * EQUATIONS).then(|| rows.collect())
+            let rows = entries.chunks(coordinates).map(<[f64]>::to_vec);
+            (entries.len() == coordinates * coordinates).then(|| rows.collect())
         };
         let factors = self.covariance.factors.iter().map(factor);
         Ok(CovarianceSpec {
@@ -228,7 +238,10 @@ fn mesh_px(family: Family) -> f64 {
 fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64)> {
     let dots: Vec<Dot> = dots_mm
         .iter()
-        .map(|place| Dot::new(*place, NODES))
+        .map(|place| match dots_mm.len() {
+            SQUARE => Dot::new(*place, NODES),
+            _ => Dot::within(*place, MORE_NODES, MAX_PLACE_MM),
+        })
         .collect();
     // A node's coefficients give all its loads, which are queried one after the other.
     let known: Mutex<HashMap<[u64; 3], Coefficients>> = Mutex::default();
@@ -282,7 +295,7 @@ fn remaining_covariance(
     let (sin, cos) = libm::sincos(at.made.roll_deg.to_radians());
     let of_pose = |((rates, moved_px), pose): ((&Rates, &Vec<f64>), &Pose)| -> Covariance {
         let along = |column: usize| -> Moved {
-            let mut moved = Moved::default();
+            let mut moved = Moved::defaults(2 * at.made.dots_mm.len());
             for (k, row) in held.iter().zip(&spread) {
                 for (sum, rate) in moved.iter_mut().zip(&rates.numbers[*k]) {
                     *sum += row[column] * rate;

@@ -197,6 +197,7 @@ impl Problem<'_> {
             design: Design {
                 fineness: bench.fineness,
                 gauss_points: 2,
+                dots_mm: bench.dots_mm.clone(),
                 ..Design::default()
             },
             dots_mm: bench.dots_mm.clone(),

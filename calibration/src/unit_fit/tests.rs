@@ -1,5 +1,6 @@
 use hivtac_sensor::force::forward::{self as chip, Forward};
 use hivtac_shell::{Design, Equilibrium, Film, Law};
+use hivtac_twin::film::{Dots, Layout};
 use hivtac_twin::{Camera, MARKERS, Preset};
 
 use super::problem::Made;
@@ -47,6 +48,8 @@ struct Truth {
     rest: Equilibrium,
     made: Made,
     camera: Camera,
+    /// Where its dots should be, mm.
+    nominal_mm: Vec<[f64; 2]>,
 }
 
 impl Truth {
@@ -55,15 +58,20 @@ impl Truth {
     }
 
     fn of(design: &Design) -> Truth {
+        Truth::with_dots(design, &MARKERS.map(|disc| disc.centre_mm))
+    }
+
+    /// Its dots are somewhat off these nominal places, mm.
+    fn with_dots(design: &Design, nominal_mm: &[[f64; 2]]) -> Truth {
         let film = Film::new(design).unwrap();
         let off = [[0.1, 0.05], [-0.08, 0.1], [0.0, -0.12], [-0.1, 0.03]];
-        let dot = |k: usize| [0, 1].map(|i| MARKERS[k].centre_mm[i] + off[k][i]);
+        let dot = |k: usize| [0, 1].map(|i| nominal_mm[k][i] + off[k % 4][i]);
         Truth {
             rest: film.rest(),
             made: Made {
                 design: film.design().clone(),
-                dots_mm: (0..4).map(dot).collect(),
-                rest_px: vec![[0.0; 2]; 4],
+                dots_mm: (0..nominal_mm.len()).map(dot).collect(),
+                rest_px: vec![[0.0; 2]; nominal_mm.len()],
                 roll_deg: 1.2,
                 focal_px: 176.5,
                 farther_mm: 0.0,
@@ -72,6 +80,7 @@ impl Truth {
             },
             film,
             camera: Camera::new(Preset::Ov7725, 320, 240).unwrap(),
+            nominal_mm: nominal_mm.to_vec(),
         }
     }
 
@@ -81,13 +90,13 @@ impl Truth {
     }
 
     /// Images of the dots, px, with errors of a few thousandths that differ from load to load.
-    fn seen_px(&self, state: &Equilibrium, number: usize) -> [[f64; 2]; 4] {
+    fn seen_px(&self, state: &Equilibrium, number: usize) -> Dots<[f64; 2]> {
         let view = View {
             film: &self.film,
             camera: &self.camera,
             farther_mm: 0.0,
         };
-        std::array::from_fn(|k| {
+        Dots::from_fn(self.made.dots_mm.len(), |k| {
             let [x, y] = self.made.to_px(view.image(state, self.made.dots_mm[k]));
             let off = |axis: usize| 0.006 * libm::sin((17 * number + 5 * k + 3 * axis) as f64);
             [
@@ -124,6 +133,7 @@ impl Truth {
             film,
             made: self.made.clone(),
             camera: self.camera,
+            nominal_mm: self.nominal_mm.clone(),
         }
     }
 
@@ -142,7 +152,7 @@ impl Truth {
             middle_px: [159.5, 119.5],
             rest_px: self.seen_px(&self.rest, 0).to_vec(),
             noise_px: 0.008,
-            dots_mm: MARKERS.iter().map(|disc| disc.centre_mm).collect(),
+            dots_mm: self.nominal_mm.clone(),
             camera: self.camera,
             down: None,
             fineness: FINENESS,
@@ -163,14 +173,15 @@ fn stiffer(fineness: f64) -> Truth {
 
 impl OwnFilm {
     /// Converts motions from focal lengths to px. The found numbers include the unit's camera.
-    fn to_px(&self, moved: &[f32]) -> [f64; 8] {
+    fn to_px(&self, moved: &[f32]) -> Vec<f64> {
         let [re, im] = self.per_px;
         let square = re * re + im * im;
-        std::array::from_fn(|k| {
+        let part = |k: usize| {
             let [x, y] = [moved[k - k % 2], moved[k - k % 2 + 1]];
             let [x, y] = [x, y].map(f64::from);
             [re * x + im * y, re * y - im * x][k % 2] / square
-        })
+        };
+        (0..moved.len()).map(part).collect()
     }
 }
 
@@ -239,9 +250,9 @@ fn predicts(fit: &Fit, chip: &Forward<'_>, truth: &Truth) {
         let pose = chip_pose(chip, force_n, place_mm);
         let told = chip
             .tables
-            .predict(&pose, &chip.limits, &chip::Markers::defaults(4));
+            .predict(&pose, &chip.limits, &chip::Markers::defaults(seen.len()));
         let px = fit.own.to_px(&told.moved);
-        for k in 0..4 {
+        for k in 0..seen.len() {
             for i in [0, 1] {
                 let off = px[2 * k + i] - (seen[k][i] - rest_px[k][i]);
                 assert!(
@@ -313,6 +324,28 @@ fn a_mounted_film_is_known_turned() {
             }
         }
     }
+}
+
+/// Ten loads find a unit with eight dots, and its model predicts how they all move.
+#[test]
+#[ignore = "slow"]
+fn a_unit_of_eight_dots_is_found_from_ten_loads() {
+    let design = Design {
+        tip_radius_mm: 0.4,
+        fineness: 0.6,
+        ..Design::default()
+    };
+    let layout: Layout = "8v".parse().unwrap();
+    let truth = Truth::with_dots(&design, &layout.centres_mm());
+    let loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
+    let fit = fit(&truth.bench(), &loads, 0.1, None).unwrap();
+    assert!(fit.chi_square < 1.5, "{}", fit.chi_square);
+    let film = FilmModel {
+        rest_px: Dots::defaults(8),
+        ..model_of(&fit)
+    };
+    let bytes = film.spec().unwrap().to_bytes();
+    predicts(&fit, &Forward::parse(&bytes).unwrap(), &truth);
 }
 
 /// Loads that the nominal family explains determine the tip's and the posts' numbers alone: ten

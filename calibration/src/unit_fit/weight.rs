@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::descent::Found;
 use super::field::force_n;
 use super::problem::{At, Problem};
-use crate::forward::{EQUATIONS, Moved, Pressed, Weighed, weight};
+use crate::forward::{Moved, Pressed, Weighed, weight};
 
 /// Places of the tip along each axis, mm, and tilts in its middle, in parts of the largest.
 const PLACES_MM: [f64; 3] = [-3.8, 0.0, 3.8];
@@ -59,19 +59,19 @@ impl OwnWeight {
         })
     }
 
-    /// Checks that every value is valid.
+    /// Checks that every value is valid, for this many coordinates of markers.
     ///
     /// # Errors
     /// Names the first that is not.
-    pub fn check(&self) -> Result<()> {
-        self.spec().map(|_| ())
+    pub fn check(&self, coordinates: usize) -> Result<()> {
+        self.spec(coordinates).map(|_| ())
     }
 
-    /// As a model file holds it.
+    /// As a model file holds it, of this many coordinates of markers.
     ///
     /// # Errors
     /// When numbers are missing, too many or not finite.
-    pub fn spec(&self) -> Result<WeightSpec> {
+    pub fn spec(&self, coordinates: usize) -> Result<WeightSpec> {
         let all = self.at_rest.iter().flatten();
         ensure!(
             all.chain(&self.down).all(|part| part.is_finite())
@@ -81,12 +81,15 @@ impl OwnWeight {
         let at_rest = <[Vec<f64>; AT_REST]>::try_from(self.at_rest.clone());
         let counts = "film.own.weight: numbers are missing, or too many";
         ensure!(
-            self.under_load.len() == SIZES * UNDER_LOAD * EQUATIONS * TERMS
-                && self.at_rest.iter().all(|column| column.len() == EQUATIONS),
+            self.under_load.len() == SIZES * UNDER_LOAD * coordinates * TERMS
+                && self
+                    .at_rest
+                    .iter()
+                    .all(|column| column.len() == coordinates),
             counts
         );
         let (terms, _) = self.under_load.as_chunks::<TERMS>();
-        let mut blocks = terms.chunks(EQUATIONS).map(|coordinates| {
+        let mut blocks = terms.chunks(coordinates).map(|coordinates| {
             let terms = coordinates.iter().map(|terms| terms.map(f64::from));
             terms.collect::<Vec<_>>()
         });
@@ -156,7 +159,7 @@ impl Weighed for Hung<'_> {
 impl Hung<'_> {
     fn beside_weightless(&self, film: &Film, state: &Equilibrium) -> Moved {
         let there = images(self.problem, self.at, film, state);
-        std::array::from_fn(|k| there[k] - self.images[k])
+        Moved::from_fn(there.len(), |k| there[k] - self.images[k])
     }
 }
 
@@ -171,6 +174,5 @@ fn turned(at: &At, down: [f64; 3]) -> Result<Film> {
 fn images(problem: &Problem<'_>, at: &At, film: &Film, state: &Equilibrium) -> Moved {
     let view = problem.view(&at.made, film);
     let images = view.images(state, &at.made.dots_mm);
-    let all = images.as_flattened();
-    std::array::from_fn(|k| all[k])
+    Moved::of(images.as_flattened().iter().copied())
 }

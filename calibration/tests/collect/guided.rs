@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex};
 
 use hivtac_calibration::data::collect::simulated::SimulatedGauge;
 use hivtac_calibration::data::dataset::{MarkerDetector, Recipe, Sensing};
-use hivtac_sensor::force::features::Features;
+use hivtac_calibration::data::rest::features_from_q16;
 use hivtac_sensor::force::model::Model;
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
@@ -78,7 +78,7 @@ fn film(pressed: Pressed) -> Film {
         };
         let rendered = scene.render_load(&load, frame.into()).unwrap();
         let seen = sensing.detect(&rendered).unwrap().unwrap();
-        let centroids = Features::from_array(seen.features_q16).centroids;
+        let centroids = features_from_q16(&seen.features_q16).unwrap().centroids;
         let marker = |k: usize| Marker {
             x: centroids[k].0,
             y: centroids[k].1,

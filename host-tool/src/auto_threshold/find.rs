@@ -2,6 +2,7 @@
 
 use super::levels::{Histogram, Scale};
 use hivtac_host::focus::checks::{DARKEST_VALUES, advice};
+use hivtac_host::focus::dots::Dots;
 use hivtac_host::focus::seen::{NotSeen, Spot, found_by_sensing};
 use hivtac_host::frame::Frame;
 use hivtac_terms::hsv::Hsv;
@@ -10,9 +11,8 @@ use hivtac_wire::message::DeviceHello;
 
 /// Distance between two limits that are tried.
 const STEP: usize = 4;
-/// Largest part of a picture that dots and other objects of their colour fill. Four dots fill a
-/// hundredth.
-const LARGEST_PART: f64 = 0.03;
+/// Largest part of a picture that is of the dots' colour, for each dot: three times what it fills.
+const DOT_PART: f64 = 0.0075;
 /// Fewest limits that must show the same number of blobs, for these to be objects instead of noise.
 const FEWEST: usize = 3;
 /// Margin of a threshold, in levels: above nearly all of the film, below nearly all of the dots.
@@ -37,6 +37,9 @@ const DARK: u8 = 20;
 /// From this median on, most of a picture is white.
 const WHITE: u8 = 240;
 
+/// A device, and the dots on its film.
+type Film<'a> = (&'a DeviceHello, Dots);
+
 /// Advice about pale dots.
 const PALE: &str = "use dots of a stronger colour, white light, and no light from outside";
 
@@ -58,7 +61,9 @@ pub struct Levels {
 pub struct Found {
     pub scale: Scale,
     pub levels: Levels,
-    /// First and last limit of the widest range in which the sensing finds the four markers.
+    /// The dots of the film.
+    pub dots: Dots,
+    /// First and last limit of the widest range in which the sensing finds all markers.
     pub span: [u8; 2],
     pub chosen: Threshold,
     /// The model's threshold, if that also separates dots from film.
@@ -95,7 +100,8 @@ pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
              switch the light on, then `hivtac expose`"
         ));
     }
-    of_brightness(frames, device, brightness).map_err(|why| match brightness {
+    let dots = Dots::of(device).map_err(|failure| failure.to_string())?;
+    of_brightness(frames, (device, dots), brightness).map_err(|why| match brightness {
         WHITE.. => format!(
             "the picture is white (half of it is at least {WHITE} of 255): less light, then \
              `hivtac expose`; {why}"
@@ -105,13 +111,13 @@ pub fn find(frames: &[Frame], device: &DeviceHello) -> Result<Found, String> {
 }
 
 /// Finds the threshold in pictures that are not dark.
-fn of_brightness(frames: &[Frame], device: &DeviceHello, brightness: u8) -> Result<Found, String> {
+fn of_brightness(frames: &[Frame], of: Film<'_>, brightness: u8) -> Result<Found, String> {
     let format = frames[0].format();
     let scale = Scale::of(format, brightness);
     let pictures: Vec<Picture> = frames.iter().map(|it| Picture::of(it, scale)).collect();
-    let span = span(&pictures, device, scale)?;
+    let span = span(&pictures, of, scale)?;
     let middle = span[0].midpoint(span[1]);
-    let spots = markers(&pictures, device, scale.threshold(middle)).map_err(|it| advice(&it))?;
+    let spots = markers(&pictures, of, scale.threshold(middle)).map_err(|it| advice(&it))?;
     let seen = levels(&pictures, &spots, f64::INFINITY);
     let level = limit(scale, &seen).map_err(|why| {
         let beside_dots = levels(&pictures, &spots, NEAR);
@@ -127,12 +133,14 @@ fn of_brightness(frames: &[Frame], device: &DeviceHello, brightness: u8) -> Resu
         (Threshold::Rgb565(it), Some(colour)) => Threshold::Rgb565(narrowed(it, &colour)),
         (threshold, _) => threshold,
     };
-    markers(&pictures, device, chosen).map_err(|it| advice(&it))?;
+    markers(&pictures, of, chosen).map_err(|it| advice(&it))?;
     let is_good = |it: &Threshold| {
-        separates(it, &seen, colour.as_ref()) && markers(&pictures, device, *it).is_ok()
+        separates(it, &seen, colour.as_ref()) && markers(&pictures, of, *it).is_ok()
     };
+    let (device, dots) = of;
     let model = device.model.as_ref().map(|model| model.threshold);
     Ok(Found {
+        dots,
         scale,
         levels: seen,
         span,
@@ -155,7 +163,7 @@ impl<'f> Picture<'f> {
     }
 
     /// Distance of a pixel from the nearest spot, in radii of that spot.
-    fn off(&self, index: usize, spots: &[Spot; 4]) -> f64 {
+    fn off(&self, index: usize, spots: &[Spot]) -> f64 {
         let width = usize::from(self.frame.width);
         let (x, y) = ((index % width) as f64, (index / width) as f64);
         let off = |spot: &Spot| (x - spot.centre[0]).hypot(y - spot.centre[1]) / spot.radius;
@@ -179,22 +187,23 @@ fn brightness(frames: &[Frame]) -> u8 {
 /// The markers in every picture, as the sensing finds them with a threshold.
 fn markers(
     pictures: &[Picture],
-    device: &DeviceHello,
+    (device, dots): Film<'_>,
     threshold: Threshold,
-) -> Result<Vec<[Spot; 4]>, NotSeen> {
-    let of_one = |picture: &Picture| found_by_sensing(picture.frame, device, threshold);
+) -> Result<Vec<Vec<Spot>>, NotSeen> {
+    let of_one = |picture: &Picture| found_by_sensing(picture.frame, device, dots, threshold);
     pictures.iter().map(of_one).collect()
 }
 
-/// The widest range of limits with which the sensing finds four markers in every picture.
-fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8; 2], String> {
+/// The widest range of limits with which the sensing finds all markers in every picture.
+fn span(pictures: &[Picture], of: Film<'_>, scale: Scale) -> Result<[u8; 2], String> {
+    let (_, dots) = of;
     let mut best: Option<[u8; 2]> = None;
     let mut row: Option<[u8; 2]> = None;
     let mut misses = Vec::new();
     let all = pictures.iter().flat_map(|it| it.levels.iter().copied());
-    let film = Histogram::of(all).quantile(1.0 - LARGEST_PART);
+    let film = Histogram::of(all).quantile(1.0 - DOT_PART * dots.count() as f64);
     for level in (STEP as u8..=u8::MAX).step_by(STEP) {
-        match markers(pictures, device, scale.threshold(level)) {
+        match markers(pictures, of, scale.threshold(level)) {
             Ok(_) => row = Some([row.map_or(level, |[from, _]| from), level]),
             Err(not_seen) => {
                 row = None;
@@ -211,8 +220,9 @@ fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8;
     }
     best.ok_or_else(|| {
         let why = match usual(&misses) {
-            Some(not_seen) if not_seen.blobs == 4 => format!(
-                "four things are seen, but with none they are whole, equal markers ({}): {PALE}",
+            Some(not_seen) if not_seen.blobs == dots.count() => format!(
+                "{} things are seen, but with none they are whole, equal markers ({}): {PALE}",
+                dots.in_words(),
                 not_seen.status.join(" ")
             ),
             Some(not_seen) => advice(not_seen),
@@ -221,8 +231,9 @@ fn span(pictures: &[Picture], device: &DeviceHello, scale: Scale) -> Result<[u8;
                 .to_owned(),
         };
         format!(
-            "with no limit of the {} four dots are found: {why}",
-            scale.name()
+            "with no limit of the {} {} dots are found: {why}",
+            scale.name(),
+            dots.in_words()
         )
     })
 }
@@ -236,7 +247,7 @@ fn usual(misses: &[NotSeen]) -> Option<&NotSeen> {
 }
 
 /// Levels of the dots, and of the film within `within` radii of a dot.
-fn levels(pictures: &[Picture], spots: &[[Spot; 4]], within: f64) -> Levels {
+fn levels(pictures: &[Picture], spots: &[Vec<Spot>], within: f64) -> Levels {
     let of = |is_wanted: &dyn Fn(f64) -> bool| {
         let both = pictures.iter().zip(spots);
         Histogram::of(both.flat_map(|(picture, spots)| {
@@ -303,7 +314,7 @@ fn separates(threshold: &Threshold, levels: &Levels, colour: Option<&Colour>) ->
     is_between && holds_colour
 }
 
-fn colour(pictures: &[Picture], spots: &[[Spot; 4]]) -> Colour {
+fn colour(pictures: &[Picture], spots: &[Vec<Spot>]) -> Colour {
     let both = pictures.iter().zip(spots);
     let core: Vec<Hsv> = both
         .flat_map(|(picture, spots)| {

@@ -13,7 +13,7 @@ use crate::snapshot::snapshot;
 use clap::Args;
 use find::{Found, find};
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::focus::four_dots;
+use hivtac_host::focus::dots::Dots;
 use hivtac_host::frame::Frame;
 use hivtac_host::look::{self, PASSED};
 use hivtac_host::shown::to_json;
@@ -53,7 +53,7 @@ pub struct AutoArguments {
 /// [`Kind::NotRight`] when the pictures do not separate dots from film; when the device refuses.
 pub fn run(arguments: &AutoArguments) -> Result<(), Failure> {
     let (mut link, hello) = arguments.device.connect()?;
-    four_dots(&hello)?;
+    Dots::of(&hello)?;
     let mut frames = Vec::new();
     for _ in 0..PICTURES {
         frames.push(snapshot(&mut link, arguments.device.timeout)?.frame);
@@ -144,8 +144,10 @@ impl<'a> Report<'a> {
                 self.colour_text()
             ),
             format!(
-                "separable  from {scale} {} to {} the sensing finds four dots",
-                found.span[0], found.span[1]
+                "separable  from {scale} {} to {} the sensing finds {} dots",
+                found.span[0],
+                found.span[1],
+                found.dots.in_words()
             ),
             format!("chosen     {}: {}", text(&self.wanted()), self.why()),
             format!(

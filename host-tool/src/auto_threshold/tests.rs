@@ -3,7 +3,7 @@
 use super::find::{Levels, find, limit};
 use super::levels::Scale;
 use super::*;
-use crate::simulated::{device, frame};
+use crate::simulated::{device, device_of_eight, frame};
 use hivtac_terms::threshold::{HsvBox, Mono, Yuv422};
 use hivtac_twin::{Format, Options as Scene, Paint, Patch};
 use hivtac_wire::message::{ModelIdentity, ModelSource};
@@ -158,4 +158,22 @@ fn a_limit_keeps_its_margins() {
         "{error}"
     );
     assert!(error.contains("24 are needed between them"), "{error}");
+}
+
+/// Eight dots are found, and a missing one is told.
+#[test]
+fn it_separates_eight_dots() {
+    let eight = |missing: bool| {
+        frame(|options| {
+            options.layout = "8v".parse().unwrap();
+            options.missing = hivtac_twin::film::Dots::from_fn(8, |dot| missing && dot == 5);
+        })
+    };
+    let found = find(&[eight(false)], &device_of_eight()).unwrap();
+    let Threshold::Rgb565(it) = found.chosen else {
+        panic!("{:?}", found.chosen);
+    };
+    assert!((80..=160).contains(&it.saturation_low), "{it:?}");
+    let seven = find(&[eight(true)], &device_of_eight()).unwrap_err();
+    assert!(seven.contains("7 of eight markers are seen"), "{seven}");
 }

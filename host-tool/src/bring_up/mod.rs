@@ -18,7 +18,8 @@ use crate::output::print;
 use crate::snapshot::snapshot;
 use clap::Args;
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::focus::{Focus, four_dots};
+use hivtac_host::focus::Focus;
+use hivtac_host::focus::dots::Dots;
 use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::stop;
@@ -116,7 +117,7 @@ impl<'a> BringUp<'a> {
             return Ok(());
         }
         let patience = self.arguments.device.timeout;
-        four_dots(&self.hello)?;
+        Dots::of(&self.hello)?;
         let (step, inspection) = camera::step(&mut self.link, patience)?;
         show(self.arguments, report, step);
         let Some(inspection) = inspection.filter(|_| report.is_right()) else {
@@ -152,7 +153,7 @@ impl<'a> BringUp<'a> {
         self.person
             .ask("Take the card away and put the film on; nothing touches it.")?;
         let taken = snapshot(&mut self.link, self.arguments.device.timeout)?;
-        let focus = Focus::of(&taken.frame, &self.hello);
+        let focus = Focus::of(&taken.frame, &self.hello)?;
         let said = match focus.right {
             true => "sharp, bright, of the right size, in the right place (`hivtac focus`)",
             false => "not as they should be; `hivtac focus` shows them until they are",

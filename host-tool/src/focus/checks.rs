@@ -3,6 +3,7 @@
 //!
 //! `docs/building-a-sensor.md` has the same limits for a builder.
 
+use super::dots::Dots;
 use super::seen::{Marker, NotSeen, Seen};
 use crate::frame::Frame;
 use hivtac_terms::threshold::Threshold;
@@ -106,21 +107,29 @@ pub fn checks(frame: &Frame, seen: &Seen) -> Vec<Check> {
     checks
 }
 
-/// Advice about a picture that does not show four markers.
+/// Advice about a picture that does not show all markers.
 pub fn advice(not_seen: &NotSeen) -> String {
-    let NotSeen { blobs, status } = not_seen;
+    let NotSeen {
+        dots,
+        blobs,
+        status,
+    } = not_seen;
+    let (wanted, pattern) = match dots {
+        Dots::Four => (dots.in_words(), "on a square"),
+        Dots::EightV => (dots.in_words(), "as those of 8v"),
+    };
     let why = status.join(" ");
     match blobs {
         0 => format!(
             "no marker is seen ({why}): take the cap off the lens, switch the light on, and look \
              with `hivtac snapshot`"
         ),
-        1..4 => format!(
-            "{blobs} of four markers are seen ({why}): turn or move the camera until all are in \
+        few if *few < dots.count() => format!(
+            "{blobs} of {wanted} markers are seen ({why}): turn or move the camera until all are in \
              the picture, and light all of them"
         ),
         _ => format!(
-            "no four of {blobs} things of the markers' colour lie on a square ({why}): take what \
+            "no {wanted} of {blobs} things of the markers' colour lie {pattern} ({why}): take what \
              else is red out of view"
         ),
     }

@@ -1,6 +1,7 @@
 //! Checks a picture: how sharp, bright and well placed its markers are.
 
 pub mod checks;
+pub mod dots;
 mod rim;
 pub mod seen;
 #[cfg(test)]
@@ -8,32 +9,13 @@ mod simulated;
 #[cfg(test)]
 mod tests;
 
-use crate::failure::{Failure, Kind};
+use crate::failure::Failure;
 use crate::frame::Frame;
 use checks::{Check, advice, checks};
-use hivtac_terms::marker::LEAST_MARKERS;
+use dots::Dots;
 use hivtac_wire::message::DeviceHello;
 use seen::look;
 use serde::Serialize;
-
-/// Refuses a device whose model is for other dots than four in a square: what looks at pictures
-/// here knows these alone.
-pub fn four_dots(device: &DeviceHello) -> Result<(), Failure> {
-    match device
-        .model
-        .as_ref()
-        .map_or(LEAST_MARKERS, |model| model.markers.into())
-    {
-        LEAST_MARKERS => Ok(()),
-        markers => Err(Failure::new(
-            Kind::NotRight,
-            format!(
-                "this knows films of four dots; the device's model is for {markers}: look at its \
-                 picture with `hivtac view`"
-            ),
-        )),
-    }
-}
 
 /// The order in which faults must be corrected: in the dark nothing is sharp.
 const ORDER: [&str; 8] = [
@@ -53,7 +35,7 @@ pub struct Focus {
     frame: u32,
     /// Whether everything is right.
     pub right: bool,
-    /// The checks; empty if the picture does not show four markers.
+    /// The checks; empty if the picture does not show all markers.
     pub checks: Vec<Check>,
     /// Faults with advice, in the order in which to correct them.
     pub wrong: Vec<String>,
@@ -61,8 +43,12 @@ pub struct Focus {
 
 impl Focus {
     /// The checks of a frame of this device.
-    pub fn of(frame: &Frame, device: &DeviceHello) -> Focus {
-        let (checks, wrong) = match look(frame, device) {
+    ///
+    /// # Errors
+    /// When the layout of its dots is unknown.
+    pub fn of(frame: &Frame, device: &DeviceHello) -> Result<Focus, Failure> {
+        let dots = Dots::of(device)?;
+        let (checks, wrong) = match look(frame, device, dots) {
             Ok(seen) => {
                 let checks = checks(frame, &seen);
                 let wrong = ORDER.iter().filter_map(|what| said(&checks, what));
@@ -71,12 +57,12 @@ impl Focus {
             }
             Err(not_seen) => (Vec::new(), vec![advice(&not_seen)]),
         };
-        Focus {
+        Ok(Focus {
             frame: frame.number,
             right: wrong.is_empty(),
             checks,
             wrong,
-        }
+        })
     }
 
     /// A table of the markers with the limits, a line about the pattern, and the advice.
@@ -87,7 +73,9 @@ impl Focus {
                 "marker",
                 ["rim, px", "width, px", "colour", "brightness", "film"],
             ));
-            lines.extend((0..4).map(|id| self.marker_row(id)));
+            let ids = self.checks.iter().filter_map(|check| check.marker);
+            let markers = ids.max().map_or(0, |last| last + 1);
+            lines.extend((0..markers).map(|id| self.marker_row(id)));
             lines.push(self.limits_row());
             let pattern = self.checks.iter().filter(|check| check.marker.is_none());
             let pattern: Vec<_> = pattern.map(of_pattern).collect();

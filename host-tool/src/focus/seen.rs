@@ -1,16 +1,19 @@
-//! Measures the four markers in a frame: their edges, colours and pattern.
+//! Measures the markers in a frame: their edges, colours and pattern.
 
+use super::dots::Dots;
 use super::rim::{Edge, Field, edge};
 use crate::frame::Frame;
 use crate::look;
+use hivtac_sensor::force::forward::Drift;
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker as terms;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
-use hivtac_terms::units::Px;
+use hivtac_terms::units::{Micrometres, Px};
 use hivtac_wire::message::DeviceHello;
-use std::f64::consts::{FRAC_PI_2, FRAC_PI_4, PI};
+use std::f64::consts::PI;
 
 /// A marker's colour is that of the pixels within this part of its radius.
 const CORE: f64 = 0.5;
@@ -30,52 +33,63 @@ pub struct Marker {
     pub film: [f64; 3],
 }
 
-/// Four markers, from the upper left clockwise.
-#[derive(Clone, Copy, Debug)]
+/// All markers, by identity.
+#[derive(Clone, Debug)]
 pub struct Seen {
     /// Each.
-    pub markers: [Marker; 4],
+    pub markers: Vec<Marker>,
     /// Shift of the markers' mean from the picture's middle, to the right and down, px.
     pub shift_px: [f64; 2],
-    /// Turn of the pattern, from x towards y, degrees, −45 to 45.
+    /// Turn of the pattern, from x towards y, degrees.
     pub turn_deg: f64,
     /// Mean distance of the markers from their mean, relative to the geometry's at rest.
     pub size: f64,
 }
 
-/// Why four markers cannot be seen in a frame.
+/// Why the markers cannot be seen in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NotSeen {
+    /// The dots that should be.
+    pub dots: Dots,
     /// Number of blobs of the markers' colour.
     pub blobs: usize,
     /// Names of the sensing's status bits.
     pub status: Vec<&'static str>,
 }
 
-/// Measures the markers in a frame of this device.
+/// Measures the markers of these dots in a frame of this device.
 ///
 /// # Errors
-/// When there are not four blobs around the picture's middle.
-pub fn look(frame: &Frame, device: &DeviceHello) -> Result<Seen, NotSeen> {
+/// When there are not as many blobs, placed as the dots.
+pub fn look(frame: &Frame, device: &DeviceHello, dots: Dots) -> Result<Seen, NotSeen> {
     let geometry = geometry(frame, device);
-    let spots = spots(frame, device, geometry)?;
+    let spots = spots(frame, device, dots, geometry)?;
     let colours = look::levels(frame);
     let field = Field::new(frame.width, contrast(frame.format(), &colours));
-    let middle = mean(spots.map(|spot| spot.centre));
-    let away = |spot: &Spot| (spot.centre[0] - middle[0]).hypot(spot.centre[1] - middle[1]);
-    let distance = spots.iter().map(away).sum::<f64>() / 4.0;
-    let markers = spots.map(|spot| Marker {
+    let middle = middle(&spots);
+    let off: Vec<[f64; 2]> = spots
+        .iter()
+        .map(|spot| [0, 1].map(|i| spot.centre[i] - middle[i]))
+        .collect();
+    let far_mm = dots
+        .centres_mm(&geometry)
+        .into_iter()
+        .map(|[x, y]| x.hypot(y));
+    let seen = spots.iter().zip(&off).zip(far_mm);
+    let markers = seen.map(|((spot, [x, y]), far_mm)| Marker {
         edge: edge(&field, spot.centre, spot.radius),
-        expected_px: expected_px(&geometry, away(&spot)),
-        colour: mean_colour(&colours, frame.width, &spot, [0.0, CORE]),
-        film: mean_colour(&colours, frame.width, &spot, AROUND),
+        expected_px: expected_px(&geometry, x.hypot(*y), far_mm),
+        colour: mean_colour(&colours, frame.width, spot, [0.0, CORE]),
+        film: mean_colour(&colours, frame.width, spot, AROUND),
     });
     let (x, y) = geometry.center();
+    let nominal = dots.seen_px(&geometry);
+    let distance = |places: &[[f64; 2]]| places.iter().map(|[x, y]| x.hypot(*y)).sum::<f64>();
     Ok(Seen {
-        markers,
+        markers: markers.collect(),
         shift_px: [middle[0] - x.to_f64(), middle[1] - y.to_f64()],
-        turn_deg: turn(&spots, middle).to_degrees(),
-        size: distance / geometry.rest_distance().to_f64(),
+        turn_deg: turn(&nominal, &off).to_degrees(),
+        size: distance(&off) / distance(&nominal),
     })
 }
 
@@ -103,44 +117,61 @@ impl Spot {
     }
 }
 
-/// The markers as the sensing finds them, or else the four largest blobs if they lie around their
-/// own middle. The latter serve for a picture that must be corrected.
-fn spots(frame: &Frame, device: &DeviceHello, geometry: Geometry) -> Result<[Spot; 4], NotSeen> {
+/// The markers as the sensing finds them, or else the largest blobs if they lie as the dots. The
+/// latter serve for a picture that must be corrected.
+fn spots(
+    frame: &Frame,
+    device: &DeviceHello,
+    dots: Dots,
+    geometry: Geometry,
+) -> Result<Vec<Spot>, NotSeen> {
     let mut sensor = Box::default();
-    let not_seen = match sensed(&mut sensor, frame, device, geometry, frame.threshold) {
+    let not_seen = match sensed(
+        &mut sensor,
+        frame,
+        device,
+        (dots, geometry),
+        frame.threshold,
+    ) {
         Ok(spots) => return Ok(spots),
         Err(not_seen) => not_seen,
     };
     let mut blobs: Vec<_> = sensor.blobs().iter().take(not_seen.blobs).collect();
     blobs.sort_by_key(|blob| std::cmp::Reverse(blob.area));
-    let largest = blobs.iter().take(4).map(|blob| {
+    let largest = blobs.iter().take(dots.count()).map(|blob| {
         let (x, y) = blob.centroid();
         Spot::new(x, y, blob.area)
     });
-    let four: Result<[Spot; 4], _> = largest.collect::<Vec<_>>().try_into();
-    four.ok().and_then(clockwise).ok_or(not_seen)
+    matched(&largest.collect::<Vec<_>>(), &dots.seen_px(&geometry)).ok_or(not_seen)
 }
 
 /// The markers as the sensing finds them with a threshold of the frame's format.
 ///
 /// # Errors
-/// When the sensing does not find four markers.
+/// When the sensing does not find all of them.
 pub fn found_by_sensing(
     frame: &Frame,
     device: &DeviceHello,
+    dots: Dots,
     threshold: Threshold,
-) -> Result<[Spot; 4], NotSeen> {
+) -> Result<Vec<Spot>, NotSeen> {
     let geometry = geometry(frame, device);
-    sensed(&mut Box::default(), frame, device, geometry, threshold)
+    sensed(
+        &mut Box::default(),
+        frame,
+        device,
+        (dots, geometry),
+        threshold,
+    )
 }
 
 fn sensed(
     sensor: &mut Sensor<64>,
     frame: &Frame,
     device: &DeviceHello,
-    geometry: Geometry,
+    (dots, geometry): (Dots, Geometry),
     threshold: Threshold,
-) -> Result<[Spot; 4], NotSeen> {
+) -> Result<Vec<Spot>, NotSeen> {
     let settings = Settings {
         threshold,
         dilations: device.dilations,
@@ -149,52 +180,69 @@ fn sensed(
     };
     if sensor.configure(settings, None).is_err() {
         return Err(NotSeen {
+            dots,
             blobs: 0,
             status: Vec::new(),
         });
     }
+    sensor.set_tare(dots.rest(&geometry), Drift::NONE);
     let measurement = sensor.measure_frame(&frame.pixels());
     let spot = |marker: terms::Marker| Spot::new(marker.x, marker.y, marker.area);
-    let markers = measurement.markers.and_then(|markers| markers.exactly());
-    let markers = markers.map(|four| four.map(spot));
+    let whole = measurement.lost == Lost::NONE;
+    let markers = measurement
+        .markers
+        .filter(|markers| whole && markers.len() == dots.count());
+    let markers = markers.map(|markers| markers.into_iter().map(spot).collect());
     markers.ok_or_else(|| NotSeen {
+        dots,
         blobs: sensor.blobs().len(),
         status: measurement.status.names().collect(),
     })
 }
 
-/// The spots from the upper left clockwise; `None` unless one is on each side of their middle.
-fn clockwise(mut spots: [Spot; 4]) -> Option<[Spot; 4]> {
-    let middle = mean(spots.map(|spot| spot.centre));
-    spots.sort_by(|one, other| angle(one, middle).total_cmp(&angle(other, middle)));
-    let step = |i: usize| {
-        let to = angle(&spots[(i + 1) % 4], middle);
-        (to - angle(&spots[i], middle)).rem_euclid(4.0 * FRAC_PI_2)
+/// The spots in the order of the dots' nominal places around their middle; `None` unless there are as
+/// many, and each is nearest to a place of its own.
+fn matched(spots: &[Spot], nominal: &[[f64; 2]]) -> Option<Vec<Spot>> {
+    let middle = middle(spots);
+    let mut all = vec![None; nominal.len()];
+    for spot in spots {
+        let far = |[x, y]: &[f64; 2]| {
+            (spot.centre[0] - middle[0] - x).hypot(spot.centre[1] - middle[1] - y)
+        };
+        let places = nominal.iter().enumerate();
+        let (nearest, _) = places.min_by(|(_, a), (_, b)| far(a).total_cmp(&far(b)))?;
+        if all[nearest].replace(*spot).is_some() {
+            return None;
+        }
+    }
+    all.into_iter().collect()
+}
+
+/// The turn of places around their middle from the nominal ones, by least squares, rad.
+fn turn(nominal: &[[f64; 2]], places: &[[f64; 2]]) -> f64 {
+    let both = nominal.iter().zip(places);
+    let [along, across] = both.fold([0.0; 2], |[along, across], ([a, b], [x, y])| {
+        [along + a * x + b * y, across + a * y - b * x]
+    });
+    across.atan2(along)
+}
+
+/// Diameter that the optics give a marker at a distance from the middle, px, that is this far from
+/// the film's middle, mm.
+fn expected_px(geometry: &Geometry, distance: f64, far_mm: f64) -> f64 {
+    let geometry = Geometry {
+        marker_radius: Micrometres((1e3 * far_mm).round() as u32),
+        ..*geometry
     };
-    let even = (0..4).all(|i| (FRAC_PI_4..3.0 * FRAC_PI_4).contains(&step(i)));
-    even.then_some(spots)
-}
-
-/// Angle of a spot around the middle, from x towards y.
-fn angle(spot: &Spot, middle: [f64; 2]) -> f64 {
-    (spot.centre[1] - middle[1]).atan2(spot.centre[0] - middle[0])
-}
-
-/// The mean angle of the spots from their diagonals.
-fn turn(spots: &[Spot; 4], middle: [f64; 2]) -> f64 {
-    let off = |spot: &Spot| angle(spot, middle).rem_euclid(FRAC_PI_2) - FRAC_PI_4;
-    spots.iter().map(off).sum::<f64>() / 4.0
-}
-
-/// Diameter that the optics give a marker at a distance from the middle, px.
-fn expected_px(geometry: &Geometry, distance: f64) -> f64 {
     let distance = Px((distance * 65_536.0) as i32);
     let [across, along] = [geometry.across(distance), geometry.along_flat(distance)];
     (across.to_f64() * along.to_f64()).sqrt()
 }
 
-fn mean(points: [[f64; 2]; 4]) -> [f64; 2] {
-    [0, 1].map(|i| points.iter().map(|point| point[i]).sum::<f64>() / 4.0)
+/// The mean of the spots' centres.
+fn middle(spots: &[Spot]) -> [f64; 2] {
+    let count = spots.len() as f64;
+    [0, 1].map(|i| spots.iter().map(|spot| spot.centre[i]).sum::<f64>() / count)
 }
 
 /// The quantity that distinguishes a marker from the film, proportional to light: Cr for red

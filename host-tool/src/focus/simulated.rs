@@ -4,7 +4,7 @@ use hivtac_host::frame::Frame;
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
 use hivtac_twin::{Format, Load, Options, Preset, Scene};
-use hivtac_wire::message::DeviceHello;
+use hivtac_wire::message::{DeviceHello, ModelIdentity, ModelSource};
 
 const RED: [u8; 6] = [170, 10, 100, 255, 45, 255];
 
@@ -25,6 +25,23 @@ pub fn device() -> DeviceHello {
         centroid: CentroidEstimator::RednessWeighted,
         name: Default::default(),
         filter: Default::default(),
+    }
+}
+
+/// The same with a model for the eight dots of `8v`.
+pub fn device_of_eight() -> DeviceHello {
+    let device = device();
+    let model = ModelIdentity {
+        markers: 8,
+        crc: 0,
+        name: "model".try_into().unwrap(),
+        simulated: true,
+        threshold: device.threshold,
+        source: ModelSource::Kept,
+    };
+    DeviceHello {
+        model: Some(model),
+        ..device
     }
 }
 

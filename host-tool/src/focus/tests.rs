@@ -1,15 +1,20 @@
 //! Tests on good and bad pictures of the simulated sensor.
 
-use super::simulated::{device, frame};
+use super::simulated::{device, device_of_eight, frame};
 use super::*;
 use hivtac_twin::Format;
 
 /// The faults of a frame, in the order in which they are shown.
 fn wrong(frame: &Frame) -> Vec<String> {
-    let focus = Focus::of(frame, &device());
+    wrong_of(frame, &device(), 4)
+}
+
+/// The same for a device with this many dots.
+fn wrong_of(frame: &Frame, device: &DeviceHello, dots: usize) -> Vec<String> {
+    let focus = Focus::of(frame, device).unwrap();
     let checks = focus.checks.iter();
     assert_eq!(focus.right, focus.wrong.is_empty());
-    let all_right = checks.clone().all(|check| check.right) && checks.len() == 23;
+    let all_right = checks.clone().all(|check| check.right) && checks.len() == 5 * dots + 3;
     assert_eq!(focus.right, all_right, "{}", focus.text());
     focus.wrong
 }
@@ -138,9 +143,50 @@ fn a_picture_without_four_markers_is_told() {
     );
 }
 
+/// A film of eight dots with some options changed.
+fn eight(change: impl Fn(&mut hivtac_twin::Options)) -> Vec<String> {
+    let frame = frame(|options| {
+        options.layout = "8v".parse().unwrap();
+        options.missing = hivtac_twin::film::Dots::defaults(8);
+        change(options);
+    });
+    wrong_of(&frame, &device_of_eight(), 8)
+}
+
+#[test]
+fn eight_dots_are_right_in_both_formats() {
+    for format in [Format::Rgb565, Format::Yuv422] {
+        assert_eq!(eight(|options| options.format = format), [""; 0]);
+    }
+}
+
+#[test]
+fn faults_of_a_film_of_eight_dots_are_told() {
+    let blurred = eight(|options| options.lens.blur_px = 2.0);
+    assert!(blurred[0].starts_with("rim of marker 0, 1, 2, 3, 4, 5, 6, 7:"));
+    let turned = eight(|options| options.mounting.roll_deg = 8.0);
+    assert!(turned[0].starts_with("turn: 8."), "{turned:?}");
+    let shifted = eight(|options| options.mounting.shift_px = [12.0, -5.0]);
+    assert!(shifted[0].contains("12 px to the right"), "{shifted:?}");
+    let seven = eight(|options| options.missing[5] = true);
+    assert!(seven[0].starts_with("7 of eight markers"), "{seven:?}");
+    let four = wrong_of(&frame(|_| {}), &device_of_eight(), 8);
+    assert!(four[0].starts_with("4 of eight markers"), "{four:?}");
+}
+
+#[test]
+fn a_layout_that_nobody_knows_is_refused() {
+    let mut device = device_of_eight();
+    device.model.as_mut().unwrap().markers = 5;
+    let refused = Focus::of(&frame(|_| {}), &device).map(|_| ());
+    let failure = refused.unwrap_err().to_string();
+    assert!(failure.contains("model is for 5"), "{failure}");
+}
+
 #[test]
 fn a_person_sees_a_table_with_the_limits() {
-    let text = Focus::of(&frame(|options| options.lens.blur_px = 1.5), &device()).text();
+    let blurred = frame(|options| options.lens.blur_px = 1.5);
+    let text = Focus::of(&blurred, &device()).unwrap().text();
     let lines: Vec<_> = text.lines().collect();
     assert_eq!(lines[0], "frame 7");
     assert!(lines[1].starts_with("  marker          rim, px"), "{text}");

@@ -1,7 +1,7 @@
 //! Encodes a frame for the page: a line of JSON, then its pixels, then its mask.
 
 use super::Limits;
-use crate::focus::{Focus, four_dots};
+use crate::focus::Focus;
 use crate::frame::Taken;
 use crate::look::{self, PASSED};
 use crate::marker_fields::MarkerJson;
@@ -23,7 +23,7 @@ struct Told {
     /// The device's markers; `None` if it found none.
     markers: Option<Vec<MarkerJson>>,
     /// Faults of the picture with advice. Empty while something presses the film, which moves and
-    /// changes the markers, and for other dots than four in a square.
+    /// changes the markers, and for dots of an unknown layout.
     wrong: Vec<String>,
 }
 
@@ -42,9 +42,9 @@ pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
         threshold: Limits::of(&frame.threshold),
         passed: mask.iter().filter(|&&level| level == PASSED).count(),
         markers: markers.map(MarkerJson::all),
-        wrong: match is_pressed || four_dots(device).is_err() {
+        wrong: match is_pressed {
             true => Vec::new(),
-            false => Focus::of(frame, device).wrong,
+            false => Focus::of(frame, device).map_or_else(|_| Vec::new(), |focus| focus.wrong),
         },
     };
     let line = to_json(&told) + "\n";

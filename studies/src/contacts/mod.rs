@@ -15,6 +15,7 @@ use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_shell::{Design, Film};
 use hivtac_terms::contact_shape::ContactShape;
+use hivtac_twin::film::Layout;
 use rayon::prelude::*;
 
 use crate::anywhere::WEIGHTS;
@@ -29,7 +30,8 @@ use row::Row;
 /// it.
 #[derive(Args)]
 pub struct Contacts {
-    /// A weights file of a network that tells places, with its film.
+    /// A weights file with its film: of a network that tells places, or of another layout of dots,
+    /// whose results are printed and no page.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Presses of each kind.
@@ -81,21 +83,28 @@ impl Contacts {
         if self.truth {
             return page::print_rows(&presses);
         }
-        let rows = self.rows(&model, &film, &presses)?;
+        let layout = weights.conditions.layout()?;
+        let rows = self.rows(&model, &film, layout, &presses)?;
         if self.json {
             return page::print_rows(&rows);
         }
         let table = row::table(&rows);
         print!("{table}");
-        if self.plane || self.near_dots {
+        if self.plane || self.near_dots || layout != Layout::default() {
             return Ok(());
         }
         page::write("contacts.md", include_str!("page.md"), &table)
     }
 
     /// The rows of all settings.
-    fn rows(&self, model: &Model<'_>, film: &Film, presses: &[Press]) -> Result<Vec<Row>> {
-        let reader = Reader::new(model, film, (self.frames, self.seed, self.plane))?;
+    fn rows(
+        &self,
+        model: &Model<'_>,
+        film: &Film,
+        layout: Layout,
+        presses: &[Press],
+    ) -> Result<Vec<Row>> {
+        let reader = Reader::new(model, film, layout, (self.frames, self.seed, self.plane))?;
         let numbered = presses.par_iter().enumerate();
         let read = numbered.map(|(number, press)| {
             let shapes = Setting::ALL.map(|setting| setting.shape(press));

@@ -6,7 +6,8 @@ use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_shell::{Film, pressed};
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_twin::{Frame, Load, MARKERS, Options};
+use hivtac_twin::film::Layout;
+use hivtac_twin::{Disc, Frame, Load, Options};
 
 use super::presses::Press;
 use crate::press::{Tared, TestedUnit};
@@ -35,9 +36,13 @@ impl<'m> Reader<'m> {
     pub fn new(
         model: &'m Model<'m>,
         film: &'m Film,
+        layout: Layout,
         (frames, seed, plane): (u32, u64, bool),
     ) -> Result<Reader<'m>> {
-        let options = Options::of(model.conditions.preset);
+        let options = Options {
+            layout,
+            ..Options::of(model.conditions.preset)
+        };
         let unit = TestedUnit::new(&model.conditions, options, TIP_RADIUS_MM, seed)?;
         Ok(Reader {
             rest: unit.rest(model)?,
@@ -80,7 +85,9 @@ impl<'m> Reader<'m> {
     fn frame(&self, press: &Press, number: u64) -> Result<Frame> {
         let scene = &self.unit.scene;
         if self.plane {
-            let film = pressed(self.film, &press.state, MARKERS.into_iter())?;
+            let dots = scene.options().layout.centres_mm();
+            let discs = dots.into_iter().map(Disc::marker);
+            let film = pressed(self.film, &press.state, discs)?;
             return Ok(scene.render_pressed(film, &Load::REST, number));
         }
         let moved = |rest_mm| self.film.displacement(&press.state, rest_mm);
@@ -113,7 +120,7 @@ mod tests {
         let press = Press::solve(&film, &camera, (Kind::Needle, drawn), &[[0.0; 2]; 4]);
         let press = press.unwrap();
         let most = |plane| {
-            let reader = Reader::new(&model, &film, (5, 1, plane)).unwrap();
+            let reader = Reader::new(&model, &film, Layout::default(), (5, 1, plane)).unwrap();
             let [answers] = reader.read((0, &press), [press.shape]).unwrap();
             for answer in answers {
                 let force = answer.force.ok_or(answer.status).unwrap();

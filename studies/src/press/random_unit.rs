@@ -1,6 +1,7 @@
 //! Draws random units, as people build them.
 
 use hivtac_twin::Options;
+use hivtac_twin::film::Layout;
 use hivtac_twin::units::{TIP_RADIUS_MM, random_unit};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -18,10 +19,10 @@ pub struct RandomUnit {
 }
 
 impl RandomUnit {
-    /// The unit with this number, with a camera's focal length in px.
-    pub fn new(number: u64, focal_px: f64) -> Self {
+    /// The unit with this number and these dots, with a camera's focal length in px.
+    pub fn new(number: u64, layout: Layout, focal_px: f64) -> Self {
         let mut random = seeded(number);
-        let options = random_unit(|| normal(&mut random), FOCAL_UM, focal_px);
+        let options = random_unit(|| normal(&mut random), layout, FOCAL_UM, focal_px);
         let [from, to] = TIP_RADIUS_MM;
         Self {
             options,

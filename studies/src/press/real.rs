@@ -4,7 +4,7 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::Result;
 use hivtac_shell::{Design, Equilibrium, Film, Law, Material, pressed};
-use hivtac_twin::film::{MARKER_CENTRES_MM, Pressed};
+use hivtac_twin::film::Pressed;
 use hivtac_twin::{Disc, Load, Options};
 use rand::Rng;
 
@@ -120,8 +120,8 @@ fn random_design(number: u64, options: &Options, tip_radius_mm: f64) -> Design {
             break vector.map(|part| part / length);
         }
     };
-    let dots_mm = MARKER_CENTRES_MM.iter().zip(options.glued_mm.array::<4>());
-    let dots_mm = dots_mm
+    let centres_mm = options.layout.centres_mm();
+    let dots_mm = (centres_mm.iter().zip(options.glued_mm.iter()))
         .map(|([x, y], [right, down])| [x + right, y + down])
         .collect();
     Design {

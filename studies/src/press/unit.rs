@@ -5,12 +5,13 @@ use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
 use hivtac_sensor::force::rest::Rest;
+use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
-use hivtac_twin::film::Pressed;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
+use hivtac_twin::film::{Dots, Layout, Pressed};
 use hivtac_twin::{Frame, Load, Options, Scene, Truth};
 
 use super::{RandomUnit, RealFilm};
@@ -41,7 +42,7 @@ pub struct Answer {
     /// Why it was refused, or how reliable it is.
     pub status: Status,
     /// Error of each marker's centroid, px; `None` if the markers were not found.
-    pub off_px: Option<[[f64; 2]; 4]>,
+    pub off_px: Option<Dots<[f64; 2]>>,
 }
 
 impl TestedUnit {
@@ -64,19 +65,19 @@ impl TestedUnit {
         })
     }
 
-    /// The unit with this number among randomly drawn units.
-    pub fn random(conditions: &Conditions, number: u64) -> Result<Self> {
+    /// The unit with this number and these dots among randomly drawn units.
+    pub fn random(conditions: &Conditions, layout: Layout, number: u64) -> Result<Self> {
         let focal_px = conditions.geometry.focal.to_f64();
         let RandomUnit {
             options,
             tip_radius_mm,
-        } = RandomUnit::new(number, focal_px);
+        } = RandomUnit::new(number, layout, focal_px);
         Self::new(conditions, options, tip_radius_mm, number)
     }
 
     /// The same unit with the film of this number among randomly drawn films.
-    pub fn with_real_film(conditions: &Conditions, number: u64) -> Result<Self> {
-        let unit = Self::random(conditions, number)?;
+    pub fn with_real_film(conditions: &Conditions, layout: Layout, number: u64) -> Result<Self> {
+        let unit = Self::random(conditions, layout, number)?;
         let options = unit.scene.options();
         let film = RealFilm::random(number, options, unit.tip_radius_mm)?;
         Ok(unit.on_film(film))
@@ -135,7 +136,7 @@ impl TestedUnit {
             let [x, y] = marker.centroid_px;
             within(x, sides[0]) && within(y, sides[1])
         });
-        Ok(inside.count() == 4)
+        Ok(inside.count() == self.scene.options().layout.count())
     }
 
     /// Whether the tables of the scene's film cover a press.
@@ -213,13 +214,15 @@ impl Tared<'_> {
         load: Load,
         frames: u64,
         number: u64,
-    ) -> Result<[[f64; 2]; 4]> {
-        let mut mean = [[0.0; 2]; 4];
+    ) -> Result<Dots<[f64; 2]>> {
+        let mut mean = Dots::defaults(unit.scene.options().layout.count());
         for frame in 0..frames {
             let picture = unit.frame(&load, number + frame)?;
-            let markers = self.measure(&picture).markers;
+            let seen = self.measure(&picture);
+            let markers = seen.markers.filter(|_| seen.lost == Lost::NONE);
             let markers = markers.ok_or_else(|| anyhow!("no markers under a load"))?;
             for (mean, marker) in mean.iter_mut().zip(markers) {
+                let mean: &mut [f64; 2] = mean;
                 mean[0] += marker.x.to_f64() / frames as f64;
                 mean[1] += marker.y.to_f64() / frames as f64;
             }
@@ -234,15 +237,16 @@ impl Tared<'_> {
         let seen = self.measure(&frame);
         let off = |k: usize| {
             let [x, y] = frame.truth.markers[k]?.centroid_px;
-            let marker = seen.markers?[k];
+            let marker = seen.markers?.get(k).copied()?;
             Some([marker.x.to_f64() - x, marker.y.to_f64() - y])
         };
-        let off_px: Vec<_> = (0..4).filter_map(off).collect();
+        let dots = unit.scene.options().layout.count();
+        let off_px: Vec<[f64; 2]> = (0..dots).filter_map(off).collect();
         Ok(Answer {
             load,
             force: seen.force,
             status: seen.status,
-            off_px: off_px.try_into().ok(),
+            off_px: (off_px.len() == dots).then(|| Dots::of(off_px)),
         })
     }
 }

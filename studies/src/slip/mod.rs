@@ -16,6 +16,7 @@ use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::temporal::{Moment, Temporal};
 use hivtac_terms::status::Status;
+use hivtac_twin::film::Layout;
 use hivtac_twin::{Load, Options, Shutter};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
@@ -100,7 +101,7 @@ impl Slip {
     fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Scores> {
         let conditions = &model.conditions;
         let nominal = TestedUnit::new(conditions, Options::default(), 0.5, number)?;
-        let drawn = TestedUnit::random(conditions, number)?;
+        let drawn = TestedUnit::random(conditions, Layout::default(), number)?;
         let own = (Bench::Ten)
             .calibrate(weights, &drawn, &mut drawn.tare(model)?, number)
             .and_then(|own| export(&own))

@@ -6,8 +6,8 @@ use hivtac_calibration::forward::Known;
 use hivtac_calibration::loads::{Rough, SeenLoad};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
-use hivtac_sensor::force::features::Features;
 use hivtac_twin::Load;
+use hivtac_twin::film::Dots;
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
 
@@ -93,10 +93,7 @@ impl Bench {
         number: u64,
     ) -> Result<Weights> {
         let rest = tared.sensor.tare().context("no rest position")?;
-        let rest = Rest {
-            features_q16: Features::to_array(&rest.features),
-            areas_px: rest.areas.array(),
-        };
+        let rest = Rest::of_sensor(rest);
         let known = Known {
             gauge_n: GAUGE_N,
             stage_mm: STAGE_MM,
@@ -196,7 +193,7 @@ impl Jig {
 /// A load with this force, N, changed by the gauge's error, with this place, mm, and the markers'
 /// places, px.
 fn with_gauge_error(
-    seen_px: [[f64; 2]; 4],
+    seen_px: Dots<[f64; 2]>,
     force_n: [f64; 3],
     place_mm: [f64; 2],
     random: &mut ChaCha8Rng,

@@ -11,6 +11,7 @@ use clap::Args;
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
+use hivtac_twin::film::Layout;
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -23,7 +24,8 @@ pub use stretched::Stretched;
 /// Draw units as people build them; measure them with a tare alone, and after they were calibrated.
 #[derive(Args)]
 pub struct Units {
-    /// A weights file of a network that tells places, with its film.
+    /// A weights file with its film: of a network that tells places, or of another layout of dots,
+    /// whose results are printed and no page.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Units drawn.
@@ -120,6 +122,9 @@ impl Units {
             }
         }
         print!("{text}");
+        if weights.conditions.layout()? != Layout::default() {
+            return Ok(());
+        }
         match self.films {
             Films::Nominal => page::write("units.md", include_str!("units.md"), &text),
             Films::Real => page::write("real-films.md", include_str!("real.md"), &text),
@@ -127,9 +132,10 @@ impl Units {
     }
 
     fn test(&self, weights: &Weights, model: &Model<'_>, number: u64) -> Result<Tested> {
+        let layout = weights.conditions.layout()?;
         let unit = match self.films {
-            Films::Nominal => TestedUnit::random(&model.conditions, number)?,
-            Films::Real => TestedUnit::with_real_film(&model.conditions, number)?,
+            Films::Nominal => TestedUnit::random(&model.conditions, layout, number)?,
+            Films::Real => TestedUnit::with_real_film(&model.conditions, layout, number)?,
         };
         let mut tared = unit.tare(model)?;
         let mut tested = vec![Ok(self.answers(&mut tared, &unit, number)?)];

@@ -9,7 +9,7 @@ use hivtac_calibration::quantize::export;
 use hivtac_calibration::weights::Weights;
 use hivtac_sensor::force::model::Model;
 use hivtac_twin::Load;
-use hivtac_twin::film::DiscMotion;
+use hivtac_twin::film::{DiscMotion, Layout};
 use serde_json::{Value, json};
 
 use super::Bench;
@@ -40,7 +40,7 @@ impl Stretched {
         let weights = Weights::load(&self.weights)?;
         let file = export(&weights)?;
         let model = Model::parse(&file).map_err(|error| anyhow!("{error}"))?;
-        let unit = TestedUnit::with_real_film(&model.conditions, NUMBER)?;
+        let unit = TestedUnit::with_real_film(&model.conditions, Layout::default(), NUMBER)?;
         let mut tared = unit.tare(&model)?;
         let own = export(&Bench::Ten.calibrate(&weights, &unit, &mut tared, NUMBER)?)?;
         let loads = FORCES_N.map(|force_n| {

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::features::Features;
-use hivtac_terms::marker::Marker;
+use hivtac_terms::marker::MarkerList;
 
 use super::align::{Alignment, RadiusSample, Search, align};
 use super::folder::{Kept, Recording};
@@ -18,6 +18,7 @@ use super::steady_intervals::steady_frames;
 use crate::data::dataset::{About, Dataset, Free, Loads, Observation, Place, Row};
 use crate::data::loads::{PaperPoses, norm};
 use crate::data::range::Range;
+use crate::data::rest::features_to_q16;
 
 /// Where the gauge's readings are.
 #[derive(Clone, Debug)]
@@ -292,11 +293,13 @@ fn radius_samples(kept: &[&Kept], times: &[f64]) -> Result<Vec<RadiusSample>> {
 }
 
 /// Mean distance of the markers from their middle, px.
-fn mean_radius_px(markers: &[Marker; 4]) -> f64 {
+fn mean_radius_px(markers: &MarkerList) -> f64 {
+    let count = markers.len() as f64;
+    let all = 0..markers.len();
     let px = |m: usize, axis: usize| [markers[m].x, markers[m].y][axis].to_f64();
-    let middle = [0, 1].map(|axis| (0..4).map(|m| px(m, axis)).sum::<f64>() / 4.0);
+    let middle = [0, 1].map(|axis| all.clone().map(|m| px(m, axis)).sum::<f64>() / count);
     let distance = |m: usize| (px(m, 0) - middle[0]).hypot(px(m, 1) - middle[1]);
-    (0..4).map(distance).sum::<f64>() / 4.0
+    all.map(distance).sum::<f64>() / count
 }
 
 /// One run with its clocks aligned.
@@ -406,9 +409,9 @@ fn reach_mm(recording: &Recording) -> f64 {
     far.fold(0.0, f64::max)
 }
 
-fn observation(markers: &[Marker; 4]) -> Observation {
+fn observation(markers: &MarkerList) -> Observation {
     Observation {
-        features_q16: Features::of_markers(markers).to_array(),
+        features_q16: features_to_q16(&Features::of_markers(markers)),
         areas_px: markers.map(|marker| marker.area),
     }
 }

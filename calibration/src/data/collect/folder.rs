@@ -18,7 +18,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use hivtac_terms::down::Direction;
-use hivtac_terms::marker::{LEAST_MARKERS, Marker};
+use hivtac_terms::marker::{LEAST_MARKERS, Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
 use hivtac_twin::Contact;
@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use super::poses::{self, Pose};
 use super::series::LARGEST_S;
-use crate::data::conditions::{Conditions, OriginName};
+use crate::data::conditions::{Conditions, OriginName, layout};
 use crate::data::dataset::{LARGEST_AREA, check_down};
 
 const SAMPLES: &str = "samples.csv";
@@ -37,9 +37,12 @@ const COVERED: &str = "covered.csv";
 const DOWN: &str = "down.csv";
 const UNIT: &str = "unit.json";
 
-const SAMPLE_COLUMNS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status,\
-x0_q16,y0_q16,area0_px,x1_q16,y1_q16,area1_px,x2_q16,y2_q16,area2_px,\
-x3_q16,y3_q16,area3_px,x_mm,y_mm";
+/// Columns of the samples before and after those of the markers.
+const BEFORE_MARKERS: &str = "run,host_s,device_us,frame,sequence,alpha_deg,beta_deg,status";
+const AFTER_MARKERS: &str = "x_mm,y_mm";
+/// The first column of the markers, and how many each has: x, y and its area.
+const MARKERS_AT: usize = 8;
+const OF_MARKER: usize = 3;
 const GAUGE_COLUMNS: &str = "run,host_s,line";
 const TAKE_COLUMNS: &str = "run,alpha_deg,beta_deg,samples,lost,x_mm,y_mm";
 const COVERED_COLUMNS: &str = "run,x_mm,y_mm,force_n";
@@ -65,6 +68,8 @@ pub struct Folder {
     pub gauge: File,
     /// Number of this run, from 0.
     pub run: usize,
+    /// Number of markers.
+    markers: usize,
     /// Poses whose takes were finished in earlier runs.
     pub done: Vec<Pose>,
     /// Coverage and lengths of presses anywhere in earlier runs.
@@ -99,7 +104,7 @@ impl Folder {
     pub fn open(path: &Path, conditions: &Conditions) -> Result<Self> {
         fs::create_dir_all(path).with_context(|| format!("cannot make {}", path.display()))?;
         same_unit(&path.join(UNIT), conditions)?;
-        let samples = append(&path.join(SAMPLES), SAMPLE_COLUMNS)?;
+        let samples = append(&path.join(SAMPLES), &sample_columns(conditions.markers))?;
         let gauge = append(&path.join(GAUGE), GAUGE_COLUMNS)?;
         let takes = append(&path.join(TAKES), TAKE_COLUMNS)?;
         let covered = append(&path.join(COVERED), COVERED_COLUMNS)?;
@@ -113,6 +118,7 @@ impl Folder {
             down,
             gauge,
             run: before.runs(),
+            markers: conditions.markers,
             done,
             before: Before {
                 lasted_s: before.lasted_s(),
@@ -153,11 +159,11 @@ impl Folder {
             pair(pose.map(|pose| pose.angles_deg)),
             reasons(sample)
         );
-        match sample.markers.exactly::<4>() {
-            Some(markers) => markers.iter().for_each(|m| {
+        match sample.markers.len() == self.markers {
+            true => sample.markers.iter().for_each(|m| {
                 line += &format!(",{},{},{}", m.x.0, m.y.0, m.area);
             }),
-            None => line += &",".repeat(12),
+            false => line += &",".repeat(OF_MARKER * self.markers),
         }
         line += &format!(",{}", pair(pose.and_then(|pose| pose.place_mm)));
         write_line(&mut self.samples, &line, SAMPLES)
@@ -283,11 +289,7 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
         .model
         .as_ref()
         .map_or(LEAST_MARKERS, |model| model.markers.into());
-    ensure!(
-        markers == LEAST_MARKERS,
-        "units with four dots are calibrated; this device's model is for {markers}: go back to one \
-         of four with `hivtac update model`, if that is its film"
-    );
+    layout(markers).context("the device's model")?;
     let threshold = hello.threshold;
     crate::data::conditions::preset(&hello.preset)
         .context("the sensor says what this program does not know")?;
@@ -301,6 +303,7 @@ pub fn conditions_of(hello: &DeviceHello) -> Result<Conditions> {
         centroid: hello.centroid,
         contact: Contact::default(),
         origin: OriginName::unit(hello.device_id),
+        markers,
     })
 }
 
@@ -329,7 +332,7 @@ pub struct Kept {
     /// The pose; `None` for the untouched film.
     pub pose: Option<Pose>,
     /// The markers, or names of the status bits by which they are missing or unreliable.
-    pub seen: Result<[Marker; 4], String>,
+    pub seen: Result<MarkerList, String>,
 }
 
 #[derive(Deserialize, Serialize)]
@@ -367,9 +370,12 @@ impl Recording {
     /// # Errors
     /// When one is damaged; names the file and the line. When the sensor was turned between runs.
     pub fn parse(unit: &str, samples: &str, gauge: &str, down: &str) -> Result<Self> {
-        let conditions =
+        let conditions: Conditions =
             serde_json::from_str(unit).with_context(|| format!("{UNIT} is damaged"))?;
-        let samples = rows([SAMPLES, samples], sample, SAMPLE_COLUMNS)?;
+        conditions.layout().context(UNIT)?;
+        let of_line = |record: &csv::StringRecord| sample(record, conditions.markers);
+        let columns = sample_columns(conditions.markers);
+        let samples = rows([SAMPLES, samples], of_line, &columns)?;
         let gauge_line = |record: &csv::StringRecord| {
             let line: GaugeLine = record.deserialize(Some(&GAUGE_COLUMNS.split(',').collect()))?;
             on_a_clock(line.host_s)?;
@@ -467,13 +473,20 @@ fn direction(record: &csv::StringRecord) -> Result<(usize, [f64; 3])> {
     Ok((record[0].parse()?, down))
 }
 
-fn sample(record: &csv::StringRecord) -> Result<Kept> {
+/// The columns of samples with this many markers.
+fn sample_columns(markers: usize) -> String {
+    let of_marker = |k| format!("x{k}_q16,y{k}_q16,area{k}_px");
+    let of_markers: Vec<String> = (0..markers).map(of_marker).collect();
+    [BEFORE_MARKERS, &of_markers.join(","), AFTER_MARKERS].join(",")
+}
+
+fn sample(record: &csv::StringRecord, count: usize) -> Result<Kept> {
     let number = |i: usize| -> Result<i64> { Ok(record[i].parse()?) };
     let seen = match &record[7] {
         "" => {
-            let mut markers = [Marker::default(); 4];
+            let mut markers = MarkerList::defaults(count);
             for (m, marker) in markers.iter_mut().enumerate() {
-                let first = 8 + 3 * m;
+                let first = MARKERS_AT + OF_MARKER * m;
                 let (x, y, area) = (number(first)?, number(first + 1)?, number(first + 2)?);
                 ensure!(
                     [x, y].iter().all(|at| (0..=FARTHEST_MARKER).contains(at))
@@ -498,7 +511,7 @@ fn sample(record: &csv::StringRecord) -> Result<Kept> {
         run: record[0].parse()?,
         host_s,
         device_us,
-        pose: pose(record, [5, 20])?,
+        pose: pose(record, [5, MARKERS_AT + OF_MARKER * count])?,
         seen,
     })
 }
@@ -557,10 +570,10 @@ pub fn done(folder: &Path) -> Result<Vec<Pose>> {
 mod tests {
     use super::*;
     use hivtac_terms::conditions::CentroidEstimator;
-    use hivtac_terms::marker::MarkerList;
     use hivtac_terms::threshold::PixelFormat;
     use hivtac_terms::threshold::Yuv422;
     use hivtac_terms::threshold::{HsvBox, Threshold};
+    use hivtac_wire::message::{ModelIdentity, ModelSource};
 
     fn conditions() -> Conditions {
         Conditions {
@@ -729,7 +742,23 @@ mod tests {
         assert_eq!(yuv422.threshold, [170, 0, 0, 0, 0, 0]);
         let model = yuv422.to_model().unwrap();
         assert_eq!(model.threshold, hello.threshold);
+        assert_eq!(yuv422.markers, 4);
+        let mut of = |markers| {
+            hello.model = Some(ModelIdentity {
+                markers,
+                crc: 0,
+                name: "model".try_into().unwrap(),
+                simulated: true,
+                threshold: hello.threshold,
+                source: ModelSource::BuiltIn,
+            });
+            conditions_of(&hello)
+        };
+        assert_eq!(of(8).unwrap().markers, 8);
+        let error = format!("{:#}", of(5).unwrap_err());
+        assert!(error.contains("5 markers"), "{error}");
         hello.threshold = Threshold::Rgb565(HsvBox::of_limits([1, 2, 3, 4, 5, 6]));
+        hello.model = None;
         let rgb565 = conditions_of(&hello).unwrap();
         assert_eq!(rgb565.pixel_format, PixelFormat::Rgb565);
         assert_eq!(rgb565.threshold, [1, 2, 3, 4, 5, 6]);

@@ -153,7 +153,7 @@ impl FreeTake {
                 format!("{:4.0} mN at x {x:+.1}, y {y:+.1} mm", 1e3 * force_n)
             }
             None if sample.found().is_some() => "nothing presses the film".to_owned(),
-            None => "NO four markers are seen".to_owned(),
+            None => "NOT all markers are seen".to_owned(),
         }
     }
 

@@ -191,7 +191,7 @@ impl Recorder {
         self.folder.take_done(None, rest.samples, rest.lost)?;
         ensure!(
             rest.good >= FEWEST_AT_REST,
-            "{} of {} frames of the untouched film show the four markers: at least \
+            "{} of {} frames of the untouched film show all markers: at least \
              {FEWEST_AT_REST} are needed (see `hivtac monitor`)",
             rest.good,
             rest.samples
@@ -421,8 +421,8 @@ fn live(gauge_n: Option<f64>, sample: &Sample) -> String {
     let gauge = gauge_n.map_or(String::new(), |n| format!("gauge {:7.1} mN, ", 1e3 * n));
     let sensor = match &sample.force {
         Some(force) => format!("sensor about {:5.0} mN", f64::from(force.magnitude.0) / 1e3),
-        None if sample.found().is_some() => "sensor sees four markers".to_owned(),
-        None => "sensor sees NO four markers".to_owned(),
+        None if sample.found().is_some() => "sensor sees all markers".to_owned(),
+        None => "sensor does NOT see all markers".to_owned(),
     };
     format!("{:<60}", gauge + &sensor)
 }

@@ -3,7 +3,6 @@
 use std::sync::Mutex;
 
 use anyhow::{Result, anyhow};
-use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::settings::Settings;
@@ -14,6 +13,7 @@ use hivtac_terms::threshold::{ByteOrder, Threshold};
 use hivtac_twin::Frame;
 
 use super::{Observation, Recipe};
+use crate::data::rest::features_to_q16;
 
 /// What was found in a frame, or the reason for a refusal.
 pub type Detection = Result<Observation, String>;
@@ -73,8 +73,8 @@ impl MarkerDetector for Sensing<'_> {
         let refused = reasons(measurement.status);
         Ok(match (measurement.markers, measurement.features) {
             (Some(markers), Some(features)) if refused.is_empty() => Ok(Observation {
-                features_q16: Features::to_array(&features),
-                areas_px: markers.map(|m| m.area).array(),
+                features_q16: features_to_q16(&features),
+                areas_px: markers.map(|m| m.area),
             }),
             _ => Err(refused),
         })

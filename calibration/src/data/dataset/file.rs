@@ -12,11 +12,10 @@ use std::str::FromStr;
 
 use anyhow::{Context, Result, bail, ensure};
 use csv::StringRecord;
-use hivtac_sensor::force::features::FEATURES;
-use hivtac_terms::fixed::Q;
+use hivtac_twin::film::Dots;
 
 use super::{About, Dataset, Observation, Place, Row, check_down};
-use crate::data::rest::q16;
+use crate::data::rest::{AFTER_COORDINATES, FeatureList, q16};
 
 const FORMAT: &str =
     "# hivtac-dataset 2; forces in N in the film frame, features in px (area in px²), areas in px";
@@ -26,24 +25,10 @@ const FIRST_COLUMNS: [&str; 5] = ["session", "pose", "fx_n", "fy_n", "fz_n"];
 const PLACE_COLUMNS: [&str; 2] = ["x_mm", "y_mm"];
 /// Columns of a data set with presses at unknown places.
 const FREE_COLUMNS: [&str; 1] = ["clock_n"];
-const LAST_COLUMNS: [&str; 16] = [
-    "x0_px",
-    "y0_px",
-    "x1_px",
-    "y1_px",
-    "x2_px",
-    "y2_px",
-    "x3_px",
-    "y3_px",
-    "rect_x_px",
-    "rect_y_px",
-    "rect_area_px2",
-    "area0_px",
-    "area1_px",
-    "area2_px",
-    "area3_px",
-    "status",
-];
+/// Columns of the markers' rectangle, after their coordinates.
+const RECT_COLUMNS: [&str; AFTER_COORDINATES] = ["rect_x_px", "rect_y_px", "rect_area_px2"];
+/// The last column.
+const STATUS_COLUMN: &str = "status";
 /// Limits of numbers, ±: a force's component, N; a tip's coordinate, mm; a feature, px or px². Sums
 /// and differences of such numbers stay far inside their types.
 pub const LARGEST_N: f64 = 1e3;
@@ -60,7 +45,9 @@ const LARGEST_DEG: f64 = 90.0;
 
 /// The columns of a data set, and where they are.
 struct Columns {
-    names: Vec<&'static str>,
+    names: Vec<String>,
+    /// Number of markers.
+    markers: usize,
     knows_places: bool,
     has_free: bool,
 }
@@ -69,23 +56,34 @@ impl Columns {
     fn of(about: &About) -> Self {
         let has_free = about.free.is_some();
         let knows_places = has_free || about.range.knows_places();
-        let (mut names, last) = (FIRST_COLUMNS.to_vec(), &LAST_COLUMNS);
-        names.extend(PLACE_COLUMNS.iter().filter(|_| knows_places));
-        names.extend(FREE_COLUMNS.iter().filter(|_| has_free));
-        names.extend(last);
+        let markers = about.conditions.markers;
+        let places = PLACE_COLUMNS.iter().filter(|_| knows_places);
+        let free = FREE_COLUMNS.iter().filter(|_| has_free);
+        let before = FIRST_COLUMNS.iter().chain(places).chain(free);
+        let mut names: Vec<String> = before.map(|name| (*name).to_owned()).collect();
+        names.extend((0..markers).flat_map(|k| [format!("x{k}_px"), format!("y{k}_px")]));
+        names.extend(RECT_COLUMNS.map(str::to_owned));
+        names.extend((0..markers).map(|k| format!("area{k}_px")));
+        names.push(STATUS_COLUMN.to_owned());
         Self {
             names,
+            markers,
             knows_places,
             has_free,
         }
     }
 
     fn features_at(&self) -> usize {
-        self.names.len() - LAST_COLUMNS.len()
+        self.areas_at() - self.features()
+    }
+
+    /// Number of features.
+    fn features(&self) -> usize {
+        2 * self.markers + AFTER_COORDINATES
     }
 
     fn areas_at(&self) -> usize {
-        self.features_at() + FEATURES
+        self.status_at() - self.markers
     }
 
     fn status_at(&self) -> usize {
@@ -135,6 +133,7 @@ impl Dataset {
             .and_then(|line| line.strip_prefix("# "))
             .context("line 2 says nothing about it")?;
         let about: About = serde_json::from_str(about).context("line 2")?;
+        about.conditions.layout().context("line 2")?;
         if let Some(down) = &about.down {
             check_down(down).context("line 2")?;
         }
@@ -150,7 +149,7 @@ impl Dataset {
             .comment(Some(b'#'))
             .from_reader(text.as_bytes());
         ensure!(
-            table.headers()?.iter().eq(columns.names.iter().copied()),
+            table.headers()?.iter().eq(columns.names.iter()),
             "the columns are not {}",
             columns.names.join(",")
         );
@@ -209,7 +208,8 @@ fn fields(row: &Row, columns: &Columns) -> Vec<String> {
     }
     match &row.seen {
         Ok(seen) => {
-            fields.extend(seen.features_px().iter().map(f64::to_string));
+            let features = seen.features_q16.iter().map(|number| number.to_f64());
+            fields.extend(features.map(|number| number.to_string()));
             fields.extend(seen.areas_px.iter().map(u32::to_string));
             fields.push(String::new());
         }
@@ -274,8 +274,8 @@ impl Record<'_> {
 
     fn observation(&self) -> Result<Observation> {
         let mut seen = Observation {
-            features_q16: [Q::default(); FEATURES],
-            areas_px: [0; 4],
+            features_q16: FeatureList::defaults(self.columns.features()),
+            areas_px: Dots::defaults(self.columns.markers),
         };
         for (i, feature) in seen.features_q16.iter_mut().enumerate() {
             let number = self.number(self.columns.features_at() + i, LARGEST_FEATURE)?;
@@ -305,7 +305,7 @@ impl Record<'_> {
 
     /// A number within ±`most`.
     fn number(&self, column: usize, most: f64) -> Result<f64> {
-        let (text, name) = (&self.record[column], self.columns.names[column]);
+        let (text, name) = (&self.record[column], &self.columns.names[column]);
         match text.parse::<f64>() {
             Ok(value) if value.abs() <= most => Ok(value),
             Ok(value) if value.is_finite() => {
@@ -320,6 +320,7 @@ impl Record<'_> {
 mod tests {
     use super::super::tests::example;
     use super::*;
+    use hivtac_terms::fixed::Q;
 
     fn saved(dataset: &Dataset) -> String {
         let directory = tempfile::tempdir().unwrap();
@@ -343,6 +344,28 @@ mod tests {
         ] {
             assert!(text.contains(words), "no `{words}` in:\n{text}");
         }
+    }
+
+    /// A data set of eight dots has columns of each, and says so.
+    #[test]
+    fn eight_dots_come_back() {
+        let mut dataset = example();
+        dataset.about.conditions.markers = 8;
+        for seen in dataset
+            .rows
+            .iter_mut()
+            .filter_map(|row| row.seen.as_mut().ok())
+        {
+            seen.features_q16 = FeatureList::from_fn(19, |i| Q::from_bits(i as i64));
+            seen.areas_px = Dots::from_fn(8, |i| 190 + i as u32);
+        }
+        let text = saved(&dataset);
+        assert!(text.contains("\"markers\":8"), "{text}");
+        assert!(text.contains(",x7_px,y7_px,rect_x_px,"), "{text}");
+        assert!(text.contains(",190,191,192,193,194,195,196,197,"), "{text}");
+        let none = text.replace("\"markers\":8", "\"markers\":7");
+        let error = format!("{:#}", Dataset::parse(&none).unwrap_err());
+        assert!(error.contains("line 2: 7 markers"), "{error}");
     }
 
     #[test]

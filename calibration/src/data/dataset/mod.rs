@@ -13,11 +13,12 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::features::FEATURES;
 use hivtac_terms::fixed::Q;
+use hivtac_twin::film::Dots;
 use serde::{Deserialize, Serialize};
 
 use crate::data::conditions::Conditions;
 use crate::data::range::Range;
-use crate::data::rest::Rest;
+use crate::data::rest::{AFTER_COORDINATES, FeatureList, Rest, features_px, places_px};
 
 pub use detector::{Detection, Detectors, MarkerDetector, Sensing, measure, reasons};
 pub use file::{LARGEST_AREA, LARGEST_N};
@@ -137,16 +138,21 @@ impl<'a> Sample<'a> {
 /// What the pipeline measured in a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
-    /// The eleven features, px and the last in px².
-    pub features_q16: [Q<16, i64>; FEATURES],
-    /// Areas of markers 0–3 in the mask, px.
-    pub areas_px: [u32; 4],
+    /// The features, px and the last in px².
+    pub features_q16: FeatureList,
+    /// Areas of the markers in the mask, px.
+    pub areas_px: Dots<u32>,
 }
 
 impl Observation {
-    /// The features in px (px²); exact, because they are below 2⁵³ steps.
+    /// The features of four markers in px (px²).
     pub fn features_px(&self) -> [f64; FEATURES] {
-        self.features_q16.map(|number| number.to_f64())
+        features_px(&self.features_q16)
+    }
+
+    /// The markers' places, px.
+    pub fn places_px(&self) -> Dots<[f64; 2]> {
+        places_px(&self.features_q16)
     }
 }
 
@@ -244,12 +250,13 @@ impl Dataset {
         let count =
             count.context("the data set has no accepted row without force, so no rest position")?;
         let mean = |sum: i64| (2 * sum + count).div_euclid(2 * count);
+        let markers = self.about.conditions.markers;
         Ok(Rest {
-            features_q16: std::array::from_fn(|i| {
+            features_q16: FeatureList::from_fn(2 * markers + AFTER_COORDINATES, |i| {
                 let sum = seen.iter().map(|s| s.features_q16[i].bits()).sum();
                 Q::from_bits(mean(sum))
             }),
-            areas_px: std::array::from_fn(|i| {
+            areas_px: Dots::from_fn(markers, |i| {
                 mean(seen.iter().map(|s| i64::from(s.areas_px[i])).sum()) as u32
             }),
         })
@@ -264,8 +271,8 @@ mod tests {
 
     pub(super) fn example() -> Dataset {
         let seen = |x: i64| Observation {
-            features_q16: std::array::from_fn(|i| Q::from_bits(x + i as i64)),
-            areas_px: [200; 4],
+            features_q16: FeatureList::from_fn(FEATURES, |i| Q::from_bits(x + i as i64)),
+            areas_px: [200; 4].into(),
         };
         let about = About {
             conditions: Conditions::simulated(Preset::Ov7725, 320, 240, PixelFormat::Rgb565),
@@ -319,10 +326,10 @@ mod tests {
             tip_mm: None,
             clock_n: None,
             seen: Ok(Observation {
-                features_q16: std::array::from_fn(|f| {
+                features_q16: FeatureList::from_fn(FEATURES, |f| {
                     Q::from_bits((1000 * session + 10 * i + f) as i64)
                 }),
-                areas_px: [200; 4],
+                areas_px: [200; 4].into(),
             }),
         };
         let session = |s: usize| {
@@ -356,7 +363,7 @@ mod tests {
         let rest = example().rest().unwrap();
         assert_eq!(
             rest.features_q16,
-            std::array::from_fn(|i| Q::from_bits(11 + i as i64)),
+            FeatureList::from_fn(FEATURES, |i| Q::from_bits(11 + i as i64)),
             "10.5 rounds up"
         );
         assert_eq!(rest.areas_px, [200; 4]);

@@ -1,4 +1,5 @@
 use hivtac_terms::geometry::Preset;
+use hivtac_terms::marker::Marker;
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_terms::units::Px;
 
@@ -53,7 +54,7 @@ fn recording() -> Recording {
                 angles_deg: [8.0, 0.0],
                 place_mm: Some([0.0; 2]),
             }),
-            seen: Ok(markers(force_n(time_s))),
+            seen: Ok(markers(force_n(time_s)).into()),
         }
     };
     Recording {
@@ -196,7 +197,7 @@ fn free_recording(seconds: u32) -> (Recording, Series) {
             host_s: time_s,
             device_us: (time_s * 1e6) as u64,
             pose: (time_s > 3.0).then_some(Pose::anywhere([0.0; 2])),
-            seen: Ok(markers_of(&pressed.unwrap_or(Load::REST))),
+            seen: Ok(markers_of(&pressed.unwrap_or(Load::REST)).into()),
         }
     };
     let mut gauge = Series::default();
