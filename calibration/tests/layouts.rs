@@ -14,6 +14,7 @@ use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::{Refusal, TareBuilder};
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_twin::film::{Dots, Layout};
@@ -133,6 +134,26 @@ fn eight_dots_give_a_force_with_an_honest_uncertainty() {
         within.iter().all(|part| *part >= 33),
         "{within:?} of {shown}"
     );
+}
+
+/// There is no table of shapes for eight dots: whatever is not known to be a needle is known less
+/// well.
+#[test]
+fn a_contact_of_unknown_shape_is_less_certain() {
+    let scene = nominal();
+    let mut sensor = tared(&scene);
+    for (number, load) in loads().take(8) {
+        let sigmas = [ContactShape::Needle, ContactShape::Unknown].map(|shape| {
+            sensor.set_contact_shape(shape);
+            let force = seen(&mut sensor, &scene, &load, number).force.unwrap();
+            let place = force.place.unwrap().sigma.0;
+            [force.direction_sigma.0, force.magnitude_sigma.0, place].map(f64::from)
+        });
+        let (of_needle, of_unknown) = (sigmas[0], sigmas[1]);
+        for ((needle, unknown), times) in of_needle.iter().zip(of_unknown).zip([2.9, 2.9, 1.8]) {
+            assert!(unknown >= times * needle, "{number}: {sigmas:?}");
+        }
+    }
 }
 
 /// Any of the eight, as if it had peeled off.

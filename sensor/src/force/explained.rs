@@ -44,6 +44,9 @@ const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// small. Chosen on presses beside markers (`hivtac-studies contacts --near-dots --seed 11`).
 const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
+/// The same for a layout without a table of shapes, wherever it is pressed. Chosen on the presses of
+/// `hivtac-studies contacts --weights calibration/models/8v/default.weights`.
+const WITHOUT_TABLE: [u32; 3] = [3, 3, 2];
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
 /// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
@@ -318,6 +321,9 @@ impl Resting {
         let (mut force, by_noise) = force(&forward.strength(self.is_own), estimate);
         if self.is_beside_a_marker(forward, estimate) {
             widen(&mut force, BESIDE);
+        }
+        if self.shape != ContactShape::Needle && forward.shapes.is_none() {
+            widen(&mut force, WITHOUT_TABLE);
         }
         let mut status = trust(&force, by_noise, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
