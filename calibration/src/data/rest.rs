@@ -81,7 +81,7 @@ pub fn q16(px: f64) -> Q<16, i64> {
     Q::from_bits((px * f64::from(Px::ONE.0)).round() as i64)
 }
 
-/// The sensor's features as numbers: the markers' coordinates, then the rectangle's centre and area.
+/// The sensor's features as numbers: markers' coordinates, then the rectangle's centre and area.
 pub fn features_to_q16(features: &Features) -> FeatureList {
     let coordinates = features.centroids.iter().flat_map(|(x, y)| [*x, *y]);
     let (x, y) = features.rect_center;

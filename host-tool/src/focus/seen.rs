@@ -200,8 +200,8 @@ fn sensed(
     })
 }
 
-/// The spots in the order of the dots' nominal places around their middle; `None` unless there are as
-/// many, and each is nearest to a place of its own.
+/// The spots in the order of the dots' nominal places around their middle; `None` unless there are
+/// as many, and each is nearest to a place of its own.
 fn matched(spots: &[Spot], nominal: &[[f64; 2]]) -> Option<Vec<Spot>> {
     let middle = middle(spots);
     let mut all = vec![None; nominal.len()];
