@@ -47,7 +47,8 @@ fn info_for_a_person() {
              the middle of its exposure\n\
              health     started by power-on; 41.5 °C; 6120 of 24576 bytes of stack used\n\
              problems   none\n\
-             at start   no problem\n",
+             at start   no problem\n\
+             supply     a reset below 2.7 V\n",
             device.port
         )
     );

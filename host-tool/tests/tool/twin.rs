@@ -206,8 +206,8 @@ fn a_twin_of_eight_dots_tells_all_of_them_and_names_another_model() {
     assert!(!last.unwrap().ends_with(','), "{rows}");
     assert!(std::fs::metadata(&bag).unwrap().len() > 10_000);
 
-    let focus = twin.run(&["focus"]);
-    assert!(focus.stderr.contains("model is for 8"), "{focus:?}");
+    let focus = twin.done(&["focus"]);
+    assert!(focus.contains("  7   ") && focus.contains("all is right"), "{focus}");
     twin.done(&["update", "model", MODEL]);
     let samples = twin.samples(&["--frames", "20"]);
     let last = samples.last().unwrap();
