@@ -207,7 +207,10 @@ fn a_twin_of_eight_dots_tells_all_of_them_and_names_another_model() {
     assert!(std::fs::metadata(&bag).unwrap().len() > 10_000);
 
     let focus = twin.done(&["focus"]);
-    assert!(focus.contains("  7   ") && focus.contains("all is right"), "{focus}");
+    assert!(
+        focus.contains("  7   ") && focus.contains("all is right"),
+        "{focus}"
+    );
     twin.done(&["update", "model", MODEL]);
     let samples = twin.samples(&["--frames", "20"]);
     let last = samples.last().unwrap();

@@ -349,7 +349,7 @@ impl Mcu for Chip {
         if let Some(mpu) = &mut self.mpu {
             mpu.reset();
         }
-        Device::reset(&mut self.dma);
+        self.dma.part_reset();
         Device::reset(&mut self.mdma);
         Device::reset(&mut self.crc);
         Device::reset(&mut self.crs);

@@ -15,10 +15,10 @@ use std::path::Path;
 const ASKED: u16 = 40;
 /// The bug's frame is measured at about 260 ms. The program is back on USB 140 ms later, and fails
 /// again 260 ms later.
-const BACK_MS: u64 = 430;
+const BACK_MS: u64 = 480;
 
 fn seeded() -> Setup {
-    Setup::new(other("seeded-bugs"), 460).ask_health_at(BACK_MS, ASKED)
+    Setup::new(other("seeded-bugs"), 510).ask_health_at(BACK_MS, ASKED)
 }
 
 fn health(run: &Run) -> &Health {
@@ -93,6 +93,7 @@ fn a_stack_that_is_used_up_is_told() {
 
 /// Thread mode stands still at about 220 ms. The watchdog counts from its last food on.
 #[test]
+#[ignore = "15 s: until the watchdog ends it"]
 fn a_program_that_stands_still_is_told() {
     let setup = Setup::new(other("seeded-bugs"), 2_700).ask_health_at(2_650, ASKED);
     let run = setup.run_with(Bug::Hang);
@@ -104,6 +105,7 @@ fn a_program_that_stands_still_is_told() {
 
 /// The reset button leaves the memory, and the failure is older by a start.
 #[test]
+#[ignore = "30 s: several starts"]
 fn a_failure_is_told_until_the_power_is_cut() {
     let run = |restart: Restart| {
         let setup = Setup::new(other("seeded-bugs"), 620).restart_at(400, restart);
@@ -123,6 +125,7 @@ fn a_failure_is_told_until_the_power_is_cut() {
 
 /// The firmware that is written over USB makes the addresses of the one before worthless.
 #[test]
+#[ignore = "30 s: several starts"]
 fn a_failure_is_forgotten_with_new_firmware() {
     let loader = Action::Send(command(41, Request::StartLoader));
     let run = Setup::new(other("seeded-bugs"), 1_400)
@@ -178,6 +181,7 @@ fn a_program_that_stands_still_in_its_start_ends_in_the_loader() {
 /// Neither pulls of the reset line, as of a supply that comes and goes, nor power cuts count; and
 /// after one of them the program has four starts again.
 #[test]
+#[ignore = "70 s: many starts"]
 fn a_supply_that_comes_and_goes_does_not_end_in_the_loader() {
     for restart in [Restart::Button, Restart::PowerCycle] {
         let image = Image::of_elf(&std::fs::read(firmware()).unwrap()).unwrap();
@@ -195,6 +199,7 @@ fn a_supply_that_comes_and_goes_does_not_end_in_the_loader() {
 
 /// Nobody is plugged in, and each start fails 6 s later: they were good.
 #[test]
+#[ignore = "30 s: several seconds of virtual time"]
 fn without_a_host_a_start_that_lasts_is_good() {
     let report = sealed(Bug::FaultLate, |setup| Setup {
         virtual_ms: 30_500,

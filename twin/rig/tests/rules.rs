@@ -152,7 +152,12 @@ fn a_program_that_breaks_its_own_protection_gets_no_further() {
     const MPU_CTRL: u32 = 0xE000_ED94;
     const PRIVILEGED_DEFAULT: u32 = 1 << 2;
     const READ_ONLY: u32 = 0b110 << 24;
+    // External memory, of which there is none.
+    const NO_EXTERNAL: u32 = 0b1000_0111 << 8 | 31 << 1 | 1;
     let mut writes = vec![
+        (MPU_CTRL + 4, 1),
+        (MPU_CTRL + 8, 0),
+        (MPU_CTRL + 12, NO_EXTERNAL),
         (MPU_CTRL + 4, 0),
         (MPU_CTRL + 8, 0x2400_0000),
         (MPU_CTRL + 12, READ_ONLY | 15 << 1 | 1),

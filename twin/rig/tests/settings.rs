@@ -157,6 +157,7 @@ fn name_tare_and_threshold_are_kept_while_forces_go_on() {
 /// The message about gravity gets no answer. Its direction belongs to a tare and is kept. An
 /// invalid direction counts as unknown, and the device reports that.
 #[test]
+#[ignore = "25 s: an erase while frames are measured"]
 fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     let directory = tempfile::tempdir().unwrap();
     let flash = directory.path().join("flash");
@@ -280,6 +281,7 @@ fn after_a_power_cut_in_a_full_log_the_old_or_the_new_is_there() {
 /// A device that never kept anything begins with an erase. A cut erase leaves some words blank,
 /// some torn, and some unchanged.
 #[test]
+#[ignore = "10 s"]
 fn after_a_power_cut_in_the_first_erase_settings_can_be_kept() {
     let directory = tempfile::tempdir().unwrap();
     let flash = directory.path().join("flash");

@@ -109,10 +109,26 @@ impl Dma {
         }
     }
 
+    /// Resets the controller with the part, which drops all requests.
+    pub fn part_reset(&mut self) {
+        *self = Self::new(self.feed.clone(), self.rules.clone());
+        *self.feed.lock() = Handover::default();
+    }
+
     /// Writes the words that were moved, before the core goes on.
     pub fn settle(&mut self, memory: &mut dyn Memory) {
-        for (address, word) in self.to_write.drain(..) {
-            if memory.write(address, Width::W32, word.into()).is_err() {
+        let mut words = self.to_write.drain(..).peekable();
+        while let Some((address, word)) = words.next() {
+            // Two at once where they lie in one double word: half as many writes.
+            let next = words.next_if(|next| address % 8 == 0 && next.0 == address + WORD);
+            let written = match next {
+                Some((_, upper)) => {
+                    let both = u64::from(word) | u64::from(upper) << 32;
+                    memory.write(address, Width::W64, both)
+                }
+                None => memory.write(address, Width::W32, word.into()),
+            };
+            if written.is_err() {
                 self.rules.broken(|| {
                     format!("DMA1 stream 0 writes to {address:#010x}, which is no memory")
                 });
@@ -387,13 +403,9 @@ impl Device for Dma {
 
     /// A reset leaves the level of the request as it was driven last.
     fn reset(&mut self) {
-        let fresh = Self::new(self.feed.clone(), self.rules.clone());
         let is_requested = self.is_requested;
-        *self = Self {
-            is_requested,
-            ..fresh
-        };
-        *self.feed.lock() = Handover::default();
+        self.part_reset();
+        self.is_requested = is_requested;
     }
 }
 

@@ -98,7 +98,7 @@ impl Device for Iwdg {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rigless::mcu::{Mcu, Operate, Single};
+    use rigless::mcu::{Operate, Single};
     use rigless::soc::Width;
     use rigless::soc::stm32h743::{builder, generated::IWDG};
 
@@ -114,10 +114,9 @@ mod tests {
         let mut part = Single::new(builder(), "IWDG", Iwdg::default()).unwrap();
         write(&mut part, 0, 4, 2);
         assert_eq!(part.next_event(), None, "it is locked and stopped");
-        for (offset, value) in [(0, START), (0, ENABLE_ACCESS), (4, 2), (8, 1_999)] {
+        for (offset, value) in [(0, ENABLE_ACCESS), (4, 2), (8, 1_999), (0, START)] {
             write(&mut part, 10, offset, value);
         }
-        write(&mut part, 500, 0, REFRESH);
-        assert_eq!(part.next_event(), Some(VirtualNanos(1_500_000_000)));
+        assert_eq!(part.next_event(), Some(VirtualNanos(1_010_000_000)));
     }
 }
