@@ -286,7 +286,8 @@ fn taken() -> String {
     second.replace(&device.port, "/dev/ttyACM0")
 }
 
-/// The tool's message, as other tests expect it: here no port can be plugged in, nor is ROS 2 built.
+/// The tool's message, as other tests expect it: here no port can be plugged in, and ROS 2 is not
+/// built.
 fn in_tests_of(file: &str, quoted: &str) -> String {
     let source = root_file(file);
     let (_, tests) = source.split_once("#[cfg(test)]").unwrap_or(("", &source));

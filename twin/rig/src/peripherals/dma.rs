@@ -1,8 +1,8 @@
 //! DMA1's stream 0, which writes the camera interface's words into memory.
 //!
 //! RM0433 rev 7 chapter 15. Simulated: words from a peripheral in direct mode, one block or
-//! circular, double buffer, registers locked while the stream runs, flags, interrupt. Not simulated:
-//! other streams, directions, sizes and the FIFO. Their use ends the run with an error.
+//! circular, double buffer, registers locked while the stream runs, flags, interrupt. Not
+//! simulated: other streams, directions, sizes and the FIFO. Their use ends the run with an error.
 //!
 //! A word is a read of the bus, as on the chip. Words of a line that flows come by a [`Feed`], all
 //! at once: a frame then costs half as much.
