@@ -158,6 +158,7 @@ fn a_contact_of_unknown_shape_is_less_certain() {
 
 /// Any of the eight, as if it had peeled off.
 #[test]
+#[ignore = "40 s: each dot of two layouts"]
 fn a_dot_that_is_lost_costs_no_force() {
     for lost in [0, 5] {
         let mut sensor = tared(&nominal());

@@ -108,6 +108,7 @@ mod tests {
 
     /// A needle that presses hard beside a dot bends it more than anything else.
     #[test]
+    #[ignore = "10 s: frames with rims by the film"]
     fn a_dot_that_a_needle_bends_is_still_a_marker() {
         let path = Path::new("..").join(crate::anywhere::WEIGHTS);
         let weights = Weights::load(&path).unwrap();

@@ -64,6 +64,7 @@ fn tables_are_the_full_solution() {
 }
 
 #[test]
+#[ignore = "10 s: full solutions"]
 fn a_film_built_by_hand_is_its_full_solution() {
     let unit = Unit {
         stiffness: 0.8,
@@ -119,6 +120,7 @@ fn off_px(with: &[Images; 2], without: &[Images; 2]) -> f64 {
 
 /// The effect of weight, without the errors of the tables for a weightless film.
 #[test]
+#[ignore = "15 s: full solutions"]
 fn weight_does_what_the_full_solution_says() {
     let cases = [
         ([0.0, 0.0, -0.004], [1.0, -2.0], 0.5),
@@ -150,6 +152,7 @@ fn weight_does_what_the_full_solution_says() {
 }
 
 #[test]
+#[ignore = "10 s: full solutions"]
 fn labels_of_a_stage_are_the_full_solution() {
     let label = |n: f64, alpha: f64, beta: f64, contact: Contact| {
         let load = Load::from_angles(n, alpha, beta).unwrap();

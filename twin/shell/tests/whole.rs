@@ -53,6 +53,7 @@ fn check_film_built_by_hand(loads: usize, threads: usize) {
 }
 
 #[test]
+#[ignore = "10 s: full solutions"]
 fn dots_of_a_film_built_by_hand_move_as_in_its_full_solution() {
     check_film_built_by_hand(2, 1);
 }
