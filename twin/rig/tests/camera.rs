@@ -70,6 +70,7 @@ fn no_frame_depends_on_a_register_that_nobody_wrote() {
 /// Reserved bits of some revisions of the part read back otherwise than written. The camera is set
 /// up a second time, in case it lost its supply, and then used; health and inspection name it.
 #[test]
+#[ignore = "15 s: several cameras"]
 fn reserved_bits_that_read_back_otherwise_are_told_and_frames_come() {
     for seed in [2, 3] {
         let setup = Setup {

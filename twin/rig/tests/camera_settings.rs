@@ -154,6 +154,7 @@ fn a_gain_alone_follows_the_light_and_then_stays() {
 
 /// An eighth of the light that the film needs: a search would find more.
 #[test]
+#[ignore = "15 s: an erase while frames are measured"]
 fn a_kept_exposure_is_used_at_the_start_in_place_of_the_search() {
     let Device { flash, .. } = &Device::new();
     let dark = exposed(500, Some(16));

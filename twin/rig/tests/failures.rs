@@ -55,6 +55,7 @@ fn a_device_that_never_failed_tells_none() {
 }
 
 #[test]
+#[ignore = "15 s: two starts with frames"]
 fn a_bus_error_is_told_after_the_reset_with_its_place() {
     let run = seeded().run_with(Bug::BusFault);
     let health = health(&run);
@@ -84,6 +85,7 @@ fn a_panic_is_told_with_its_source_line() {
 
 /// The stack's memory cannot take the registers, so where it was is not known.
 #[test]
+#[ignore = "15 s: two starts with frames"]
 fn a_stack_that_is_used_up_is_told() {
     let run = seeded().run_with(Bug::StackOverflow);
     let failure = failure(health(&run));
