@@ -109,8 +109,7 @@ pub struct Chip {
     iwdg_slot: usize,
     flash_slot: usize,
     vsync: Level,
-    /// Time of its last change, and the longest time from one to its handler, ns.
-    vsync_at_ns: u64,
+    /// The longest time from one of its changes to the handler, ns.
     latest_stamp_ns: u64,
     wiring: Wiring,
 }
@@ -202,7 +201,6 @@ impl Chip {
             crs_slot,
             iwdg_slot,
             vsync: Level::Low,
-            vsync_at_ns: 0,
             latest_stamp_ns: 0,
             wiring: Wiring::default(),
         };
@@ -305,7 +303,7 @@ impl Chip {
     /// Handles an access by the core: a read or a write.
     pub fn accessed(&mut self, access: &Access, value: u64) {
         if access.kind == AccessKind::Write && access.address == late_line::CLEAR {
-            let taken_ns = access.virtual_time.0 - self.vsync_at_ns;
+            let taken_ns = access.virtual_time.0 - self.dcmi.vsync_at().0;
             self.latest_stamp_ns = self.latest_stamp_ns.max(taken_ns);
         }
         self.late.accessed(access, value);
@@ -316,7 +314,7 @@ impl Chip {
     /// Sets the pin of VSYNC to the line's level.
     fn drive_vsync(&mut self, at: VirtualNanos) {
         if self.dcmi.vsync() != self.vsync {
-            (self.vsync, self.vsync_at_ns) = (self.dcmi.vsync(), at.0);
+            self.vsync = self.dcmi.vsync();
             let level = Some(self.vsync);
             self.part
                 .drive_port(at, board::VSYNC_PORT, |port, registers, context| {

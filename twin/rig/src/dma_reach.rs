@@ -85,7 +85,6 @@ pub fn check_types(
     rules: &Rules,
 ) {
     let Stream { controller, number } = stream;
-    let name = format!("{controller} stream {number}");
     let bytes = value_at(stream, 0x04, registers) << (control >> MEMORY_SIZE & 3);
     let is_to_memory = control >> DIRECTION & 3 != 1;
     let second = (control & DOUBLE_BUFFER != 0).then_some(0x10);
@@ -95,7 +94,8 @@ pub fn check_types(
             true => (None, memory),
             false => (memory, None),
         };
-        types.check_dma(&name, source, target, rules);
+        let name = format_args!("{controller} stream {number}");
+        types.check_dma(name, source, target, rules);
     }
 }
 

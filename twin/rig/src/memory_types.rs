@@ -3,6 +3,7 @@
 //! Both caches of this firmware are on, and the emulator has none. So a wrong memory type would go
 //! unnoticed here, and on silicon it gives stale pixels or a core that waits for ever.
 
+use std::fmt::Display;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::rules::Rules;
@@ -102,7 +103,7 @@ impl MemoryTypes {
     /// writes to `target`. Ranges are a first address and a length in bytes.
     pub fn check_dma(
         &self,
-        name: &str,
+        name: impl Display,
         source: Option<(u64, u64)>,
         target: Option<(u64, u64)>,
         rules: &Rules,

@@ -96,9 +96,7 @@ fn with_an_untrimmed_oscillator_usb_never_enumerates() {
 /// Returns the message with which a run ends that breaks a rule.
 fn broken_rule(setup: Setup, bug: Bug) -> String {
     let directory = tempfile::tempdir().unwrap();
-    let outcome = setup
-        .choosing(bug, directory.path())
-        .try_run(&directory.path().join("truth"));
+    let outcome = setup.with(bug, |setup| setup.try_run(&directory.path().join("truth")));
     outcome.map(drop).unwrap_err().to_string()
 }
 

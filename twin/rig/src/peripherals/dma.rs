@@ -5,7 +5,7 @@
 //! simulated: other streams, directions, sizes and the FIFO. Their use ends the run with an error.
 //!
 //! A word is a read of the bus, as on the chip. Words of a line that flows come by a [`Feed`], all
-//! at once: a frame then costs half as much.
+//! at once, which spares the emulator its bus.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -76,9 +76,8 @@ impl Feed {
 pub struct Dma {
     feed: Feed,
     rules: Rules,
-    /// Words of a block, of the present block, and of it still to come.
+    /// Words of a block, which a stream that runs has locked, and those still to come.
     programmed: u64,
-    block: u64,
     left: u64,
     target: u64,
     is_requested: bool,
@@ -98,7 +97,6 @@ impl Dma {
             feed,
             rules,
             programmed: 0,
-            block: 0,
             left: 0,
             target: 0,
             is_requested: false,
@@ -215,7 +213,7 @@ impl Dma {
         let control = registers.get(Register::S0cr);
         let second = control & (control::DOUBLE_BUFFER | control::SECOND);
         let is_second = second == control::DOUBLE_BUFFER | control::SECOND;
-        (self.block, self.left) = (self.programmed, self.programmed);
+        self.left = self.programmed;
         self.target = registers.get(match is_second {
             true => Register::S0m1ar,
             false => Register::S0m0ar,
@@ -263,7 +261,7 @@ impl Dma {
 
     /// Returns whether half of the block was moved.
     fn is_half(&self) -> bool {
-        2 * (self.block - self.left) >= self.block
+        2 * (self.programmed - self.left) >= self.programmed
     }
 
     fn end_block(&mut self, registers: &mut RegisterFile) {

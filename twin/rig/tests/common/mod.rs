@@ -209,15 +209,9 @@ impl Setup {
         self.with(bug, Self::run)
     }
 
-    /// Chooses a bug, or none, and passes the set-up on.
-    pub fn with<R>(self, bug: impl Into<Option<Bug>>, run: impl FnOnce(Self) -> R) -> R {
-        let directory = tempfile::tempdir().unwrap();
-        run(self.choosing(bug, directory.path()))
-    }
-
-    /// Chooses a bug of firmware with seeded bugs, by the last word of flash, whose file is in this
-    /// folder.
-    pub fn choosing(mut self, bug: impl Into<Option<Bug>>, directory: &Path) -> Self {
+    /// Chooses a bug of firmware with seeded bugs, or none, by the last word of flash; passes the
+    /// set-up on.
+    pub fn with<R>(mut self, bug: impl Into<Option<Bug>>, run: impl FnOnce(Self) -> R) -> R {
         let flash = self
             .flash
             .as_deref()
@@ -226,10 +220,11 @@ impl Setup {
         let last = contents.array.len() - 4;
         let number = bug.into().map_or(u32::MAX, |bug| bug as u32);
         contents.array[last..].copy_from_slice(&number.to_le_bytes());
-        let file = directory.join("flash");
+        let directory = tempfile::tempdir().unwrap();
+        let file = directory.path().join("flash");
         contents.save(&file).unwrap();
         self.flash = Some(file);
-        self
+        run(self)
     }
 
     /// Enforces the firmware's own regions of memory. Elsewhere they are not enforced, which is

@@ -140,16 +140,10 @@ impl Mdma {
         match asked_for(&|row| registers.get(register(nth, row)), value) {
             Ok(block) => {
                 if let Some(types) = &self.types {
-                    let (from, to) = (
-                        (block.source, block.bytes),
-                        (block.destination, block.bytes),
-                    );
-                    types.check_dma(
-                        &format!("MDMA channel {nth}"),
-                        Some(from),
-                        Some(to),
-                        &self.rules,
-                    );
+                    let name = format_args!("MDMA channel {nth}");
+                    let [from, to] =
+                        [block.source, block.destination].map(|at| Some((at, block.bytes)));
+                    types.check_dma(name, from, to, &self.rules);
                 }
                 let cycles = block.bytes.div_ceil(BUFFER_BYTES) * BUFFER_CYCLES;
                 let end = context.now().0 + patience * cycles * 1_000_000_000 / BUS_HZ;
