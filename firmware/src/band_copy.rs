@@ -11,7 +11,7 @@
 use crate::bands::{self, BAND_LENGTH, SHAPE};
 use crate::block_move::{BlockMove, End};
 use embassy_stm32::{Peri, peripherals};
-use hivtac_capture::Band;
+use hivtac_portable::capture::Band;
 use static_cell::ConstStaticCell;
 
 const CHANNEL: usize = 0;

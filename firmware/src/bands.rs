@@ -5,7 +5,7 @@
 use crate::block_move::BUFFER_BYTES;
 use crate::camera::{HEIGHT, USUAL_FORMAT, WIDTH};
 use core::mem::MaybeUninit;
-use hivtac_capture::Shape;
+use hivtac_portable::capture::Shape;
 
 /// Rows of a band: as many as the sensing takes at a time, because each call costs some hundred
 /// cycles.

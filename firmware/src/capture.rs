@@ -5,7 +5,7 @@
 //! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots
 //! in AXI SRAM (`bands`). The ring holds slightly more than a frame at 320 × 240, four tenths of
 //! one at 800 × 600. Each finished band causes one interrupt, as do the end of a frame (the VSYNC
-//! pulse) and an overrun. The handlers follow `hivtac_capture::Tracker`, and pass its events to the
+//! pulse) and an overrun. The handlers follow `hivtac_portable::capture::Tracker`, and pass its events to the
 //! pipeline. The pipeline has finished bands copied to DTCM (`band_copy`) and scans one while the
 //! next ones arrive. A frame is measured as soon as its last band is scanned. If more data follows,
 //! it counts as too long, and the next sample reports a lost frame.
@@ -46,7 +46,7 @@ use embassy_stm32::{Peri, peripherals, rcc};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
-use hivtac_capture::{Edge, Event, Interface, Tracker};
+use hivtac_portable::capture::{Edge, Event, Interface, Tracker};
 
 /// The tracker and the hardware that it directs. Used by the capture handlers, the capture task and
 /// the pipeline, one at a time.

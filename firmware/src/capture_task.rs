@@ -12,7 +12,7 @@ use embassy_futures::select::{Either4, select4};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Timer};
-use hivtac_capture::Event;
+use hivtac_portable::capture::Event;
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::fixed::Q;
 use hivtac_wire::message::{DeviceMessage, Inspection, LogLevel, Outcome};

@@ -19,7 +19,7 @@ use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
 use cortex_m::peripheral::SCB;
 use heapless::String;
-use hivtac_device::answer::text;
+use hivtac_portable::device::answer::text;
 use hivtac_wire::failure::{Failure, FailureKind, PLACE_BYTES};
 
 core::arch::global_asm!(include_str!("hard_fault.s"));

@@ -17,7 +17,7 @@ use embassy_stm32::pac::flash::Bank;
 use embassy_stm32::pac::{FLASH, PWR};
 use embassy_stm32::{Peri, peripherals};
 use embassy_time::{Duration, Timer};
-use hivtac_storage::flash::{Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
+use hivtac_portable::storage::flash::{Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
 
 /// Address of the second bank.
 pub const BASE: u32 = 0x0810_0000;

@@ -2,7 +2,7 @@
 
 use crate::settings::{name, of_pipeline};
 use crate::{board, camera};
-use hivtac_device::answer::{self, Identity};
+use hivtac_portable::device::answer::{self, Identity};
 use hivtac_wire::message::DeviceHello;
 
 /// The device's hello.

@@ -4,7 +4,7 @@ use crate::outbox;
 use core::fmt;
 use embassy_time::Instant;
 use heapless::String;
-use hivtac_device::answer::text;
+use hivtac_portable::device::answer::text;
 use hivtac_wire::message::{DeviceMessage, LogLevel, LogLine};
 
 /// Sends a line. A line that is too long is cut; if the host's queue is full, the line goes to the

@@ -67,8 +67,8 @@ use defmt_rtt as _;
 use dtcm_table::Sensor;
 use embassy_executor::{Executor, InterruptExecutor, SpawnToken, Spawner};
 use embassy_stm32::interrupt;
-use hivtac_image::header::{Header, Mark};
 use hivtac_terms::camera::CameraSettings;
+use hivtac_wire::image::header::{Header, Mark};
 use hivtac_wire::kept::Record;
 use memory::Memory;
 use model::Chosen;
@@ -175,7 +175,7 @@ fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
         defmt::warn!("the kept radius of what presses is out of range");
     }
     sensor.set_contact_shape(settings::contact_shape());
-    hivtac_device::model::start(sensor, kept, |unusable| {
+    hivtac_portable::device::model::start(sensor, kept, |unusable| {
         defmt::warn!(
             "a kept setting cannot be used: {}",
             defmt::Debug2Format(&unusable)

@@ -5,11 +5,11 @@ use crate::dtcm_table::Sensor;
 use crate::flash::SecondBank;
 use crate::model_slots;
 use core::ops::Range;
-use hivtac_device::model::{Fitting, Refusal};
+use hivtac_portable::device::model::{Fitting, Refusal};
+use hivtac_portable::storage::blob;
+use hivtac_portable::storage::flash::{Flash, WORD_BYTES};
 use hivtac_sensor::force::model::{AlignedFile, Model};
 use hivtac_sensor::known_answer::Answer;
-use hivtac_storage::blob;
-use hivtac_storage::flash::{Flash, WORD_BYTES};
 use hivtac_wire::kept::KeptModel;
 use hivtac_wire::message::{MODEL_BYTES, ModelSource};
 

@@ -24,7 +24,7 @@ impl InUse {
     }
 }
 
-/// Replaces the sensor's model, as [`Fitting::replace`](hivtac_device::model::Fitting::replace)
+/// Replaces the sensor's model, as [`Fitting::replace`](hivtac_portable::device::model::Fitting::replace)
 /// says. Returns the wanted threshold if its pixels differ from the camera's.
 pub fn bring_into_use(
     next: Chosen,

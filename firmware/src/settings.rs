@@ -4,7 +4,7 @@
 use crate::dtcm_table::Sensor;
 use core::cell::Cell;
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
-pub use hivtac_device::settings::{InUse, OfPipeline, rest, tared};
+pub use hivtac_portable::device::settings::{InUse, OfPipeline, rest, tared};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_wire::message::{ModelSource, Outcome};
@@ -51,7 +51,7 @@ pub fn name() -> Name {
 
 /// Sets the direction of gravity from the next frame on: unknown if it is not a valid direction.
 pub fn set_down(down: Down) {
-    DOWN.lock(|cell| cell.set(hivtac_device::settings::known(down)));
+    DOWN.lock(|cell| cell.set(hivtac_portable::device::settings::known(down)));
 }
 
 /// Returns the known direction of gravity.

@@ -4,7 +4,7 @@ use crate::camera;
 use crate::dtcm_table::Sensor;
 use crate::session;
 use embassy_time::{Duration, Instant};
-use hivtac_device::answer;
+use hivtac_portable::device::answer;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::TareBuilder;

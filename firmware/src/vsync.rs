@@ -10,7 +10,7 @@ use embassy_stm32::interrupt::{self, InterruptExt};
 use embassy_stm32::pac::{self, EXTI, SYSCFG};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::Instant;
-use hivtac_capture::Edge;
+use hivtac_portable::capture::Edge;
 
 /// The newest edge. Written by the handler below, and set to zero by the capture task; read by the
 /// capture handlers, the capture task, the pipeline and the USB tasks.

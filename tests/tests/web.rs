@@ -14,12 +14,12 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use hivtac_host::recording::Recording;
-use hivtac_image::{Image, examples};
 use hivtac_live::camera::Kind;
 use hivtac_tests::artifact;
 use hivtac_tests::browser::Browser;
 use hivtac_twin::{Load, Preset, Scene};
 use hivtac_web::{photograph, same_bits};
+use hivtac_wire::image::{Image, examples};
 use hivtac_wire::message::DeviceMessage;
 use serde_json::Value;
 

@@ -1,7 +1,7 @@
 //! New firmware for a device, of a file that the user chose: checked, and divided into what the
 //! page's script writes by the device's loader.
 
-use hivtac_image::{FIRST_LOOK, Image, PROGRAM};
+use hivtac_wire::image::{FIRST_LOOK, Image, PROGRAM};
 use serde_json::{Value, json};
 
 /// A checked image; `None` before there is one.
@@ -50,8 +50,8 @@ impl Firmware {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_image::FIRST_STAGE;
-    use hivtac_image::examples;
+    use hivtac_wire::image::FIRST_STAGE;
+    use hivtac_wire::image::examples;
 
     #[test]
     fn an_image_is_checked_and_divided() {

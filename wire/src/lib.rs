@@ -2,16 +2,17 @@
 //! text: `docs/wire.md`.
 //!
 //! A frame on the wire is `COBS(postcard(message) ++ CRC-32) ++ 0x00`.
-#![no_std]
+#![cfg_attr(not(feature = "images"), no_std)]
 #![forbid(unsafe_code)]
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "images")))]
 extern crate std;
 
 pub mod decoder;
 pub mod failure;
 pub mod frame;
 pub mod health;
+pub mod image;
 pub mod kept;
 pub mod message;
 pub mod settings;

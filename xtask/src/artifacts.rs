@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use anyhow::{Context, Result, ensure};
-use hivtac_image::Image;
+use hivtac_wire::image::Image;
 use serde_json::Value;
 
 use crate::process;
@@ -187,7 +187,7 @@ pub fn lint_as_built() {
 fn host_cargo(verb: &str) -> Command {
     let mut command = cargo(verb, "");
     command.args(["--profile", TOOLS, "--ignore-rust-version", "--workspace"]);
-    command.args(["--exclude", "hivtac-firmware", "--exclude", "hivtac-board"]);
+    command.args(["--exclude", "hivtac-firmware"]);
     if LINTING.load(Ordering::Relaxed) {
         toolchain::lint(&mut command);
     }

@@ -5,7 +5,7 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use hivtac_image::Image;
+use hivtac_wire::image::Image;
 use serde_json::Value;
 
 use crate::{artifacts, process, python, toolchain, web};

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use hivtac_image::Image;
+use hivtac_wire::image::Image;
 
 use crate::{artifacts, process, toolchain};
 

@@ -32,7 +32,7 @@ pub enum Told {
 pub const OV7725: Identity = Identity {
     name: "OV7725",
     address: 0x21,
-    number: hivtac_device::camera::ov7725::ID,
+    number: hivtac_portable::device::camera::ov7725::ID,
     told: Told::InBytes([0x0A, 0x0B]),
     feature: "board-weact",
 };
@@ -42,7 +42,7 @@ pub const OV7725: Identity = Identity {
 pub const MT9V034: Identity = Identity {
     name: "MT9V034",
     address: 0x5C,
-    number: hivtac_device::camera::mt9v034::ID,
+    number: hivtac_portable::device::camera::mt9v034::ID,
     told: Told::InWord(0x00),
     feature: "board-openmv-h7",
 };

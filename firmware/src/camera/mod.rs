@@ -30,7 +30,7 @@ use core::cell::Cell;
 use core::sync::atomic::{AtomicI32, Ordering};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::{Duration, Instant};
-use hivtac_capture::Edge;
+use hivtac_portable::capture::Edge;
 use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};

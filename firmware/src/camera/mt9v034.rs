@@ -10,10 +10,10 @@ use super::registers::{Demand, Registers};
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, problems, store};
 use crate::log;
 use embassy_time::{Duration, Timer};
-pub use hivtac_device::camera::mt9v034::{
+pub use hivtac_portable::device::camera::mt9v034::{
     HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
 };
-use hivtac_device::camera::mt9v034::{longest_exposure, middle_us, rows_in, rows_us};
+use hivtac_portable::device::camera::mt9v034::{longest_exposure, middle_us, rows_in, rows_us};
 use hivtac_terms::camera::{CameraSettings, LEAST_GAIN};
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::message::LogLevel;

@@ -6,7 +6,7 @@
 
 use super::{HEIGHT, WIDTH};
 use crate::seeded_bugs;
-use hivtac_device::camera::mt9v034::{ROW_CLOCKS, blank_rows, longest_exposure};
+use hivtac_portable::device::camera::mt9v034::{ROW_CLOCKS, blank_rows, longest_exposure};
 use hivtac_terms::camera::Rate;
 use hivtac_terms::threshold::PixelFormat;
 

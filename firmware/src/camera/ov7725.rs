@@ -10,10 +10,10 @@ use super::registers::{Demand, Registers};
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, problems, store};
 use crate::log;
 use embassy_time::{Duration, Timer};
-pub use hivtac_device::camera::ov7725::{
+pub use hivtac_portable::device::camera::ov7725::{
     HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
 };
-use hivtac_device::camera::ov7725::{LINES, LONGEST_EXPOSURE, exposed, lines, middle_us};
+use hivtac_portable::device::camera::ov7725::{LINES, LONGEST_EXPOSURE, exposed, lines, middle_us};
 use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::message::LogLevel;

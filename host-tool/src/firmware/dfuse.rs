@@ -6,7 +6,7 @@
 
 use dfu_core::functional_descriptor::FunctionalDescriptor;
 use dfu_core::{DfuIo, DfuProtocol, State, Status};
-use hivtac_image::{FLASH, SECTOR_BYTES};
+use hivtac_wire::image::{FLASH, SECTOR_BYTES};
 use std::fmt;
 use std::thread::sleep;
 use std::time::{Duration, Instant};

@@ -20,7 +20,7 @@ use hivtac_host::link::Link;
 use hivtac_host::port::Address;
 use hivtac_host::shown::shown;
 use hivtac_host::stop;
-use hivtac_image::Image;
+use hivtac_wire::image::Image;
 use hivtac_wire::message::{DeviceHello, Request};
 use serde_json::json;
 use std::time::{Duration, Instant};

@@ -5,8 +5,8 @@ use super::dfuse::Trouble;
 use dfu_core::functional_descriptor::FunctionalDescriptor;
 use dfu_core::memory_layout::MemoryLayout;
 use dfu_core::{DfuIo, DfuProtocol};
-use hivtac_image::header::CRC_AT;
-use hivtac_image::{FIRST_STAGE, FLASH, HEADER_AT, Image, PROGRAM, SECTOR_BYTES};
+use hivtac_wire::image::header::CRC_AT;
+use hivtac_wire::image::{FIRST_STAGE, FLASH, HEADER_AT, Image, PROGRAM, SECTOR_BYTES};
 use std::cell::{RefCell, RefMut};
 use std::rc::Rc;
 

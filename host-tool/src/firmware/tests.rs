@@ -4,8 +4,8 @@ use super::dfuse::Loader;
 use super::simulated::{Device, Fault, Usb, starts};
 use super::write::{Progress, write};
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_image::examples;
-use hivtac_image::{FIRST_STAGE, FLASH, Image, PROGRAM, SECTOR_BYTES};
+use hivtac_wire::image::examples;
+use hivtac_wire::image::{FIRST_STAGE, FLASH, Image, PROGRAM, SECTOR_BYTES};
 use std::cell::RefCell;
 use std::rc::Rc;
 

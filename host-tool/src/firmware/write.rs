@@ -3,7 +3,7 @@
 use super::dfuse::{Loader, Trouble, Usb};
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::stop;
-use hivtac_image::{FIRST_LOOK, FIRST_STAGE, Image, Part};
+use hivtac_wire::image::{FIRST_LOOK, FIRST_STAGE, Image, Part};
 
 /// What is told while an image is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 
 use crate::fake::*;
 use crate::run::*;
-use hivtac_image::examples;
+use hivtac_wire::image::examples;
 use hivtac_wire::message::*;
 use hivtac_wire::version::HelloPrefix;
 

@@ -403,7 +403,7 @@ fn what_cannot_be_simulated_is_said() {
 fn a_twin_has_no_loader() {
     let twin = Twin::of(&["--scene", "rest"]);
     let file = text(&twin.folder, "firmware.bin");
-    let image = hivtac_image::examples::image("weact-h743", "1.2", 5_000, 1);
+    let image = hivtac_wire::image::examples::image("weact-h743", "1.2", 5_000, 1);
     std::fs::write(&file, image.bytes()).unwrap();
     let refused = twin.run(&["update", "firmware", &file]);
     assert_eq!(refused.code, Some(6), "{refused:?}");

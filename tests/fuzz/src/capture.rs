@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use arbitrary::{Result, Unstructured};
-use hivtac_capture::{
+use hivtac_portable::capture::{
     Action, Band, Delivery, Edge, Event, Follower, Interface, Shape, Tally, Tracker,
 };
 

@@ -5,8 +5,8 @@ use core::pin::pin;
 use core::task::{Context, Poll, Waker};
 
 use arbitrary::{Result, Unstructured};
-use hivtac_storage::flash::{BLANK, Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
-use hivtac_storage::{Log, PAYLOAD_LIMIT};
+use hivtac_portable::storage::flash::{BLANK, Failed, Flash, Place, Unreadable, WORD_BYTES, Word};
+use hivtac_portable::storage::{Log, PAYLOAD_LIMIT};
 
 const SECTOR_WORDS: u32 = 24;
 const WORDS: usize = 2 * SECTOR_WORDS as usize;

@@ -1,7 +1,7 @@
 //! The camera: its settings, the light that it needs, and its times.
 
-use hivtac_device::camera::{mt9v034, ov7725};
-use hivtac_device::model::Fitting;
+use hivtac_portable::device::camera::{mt9v034, ov7725};
+use hivtac_portable::device::model::Fitting;
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
 use hivtac_terms::fixed::Q;

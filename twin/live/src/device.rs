@@ -10,10 +10,10 @@ mod tests;
 
 use crate::camera::{Camera, Kind};
 use crate::outbox::Outbox;
-use hivtac_device::answer::{self, Identity, text};
-use hivtac_device::kept::Keeper;
-use hivtac_device::model::{self, Fitting};
-use hivtac_device::settings::{InUse, OfPipeline, known};
+use hivtac_portable::device::answer::{self, Identity, text};
+use hivtac_portable::device::kept::Keeper;
+use hivtac_portable::device::model::{self, Fitting};
+use hivtac_portable::device::settings::{InUse, OfPipeline, known};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::{Measurement, Sensor};

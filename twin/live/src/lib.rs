@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Frames come at the camera's own rate, from the very scene that tests and calibration use.
-//! Sensing and settings are the code that the firmware runs (`hivtac-sensor`, `hivtac-device`).
+//! Sensing and settings are the code that the firmware runs (`hivtac-sensor`, `hivtac-portable`).
 //! Only the chip is missing: its capture, its USB and its flash. So nothing is kept once the twin
 //! ends.
 //!

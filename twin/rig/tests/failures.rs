@@ -2,12 +2,12 @@
 //! seeded bugs, and of starts that fail again and again.
 
 use crate::common::{Bug, Run, Setup, command, elf, firmware, hello, other};
-use hivtac_image::{FLASH, Image};
 use hivtac_rig::report::Report;
 use hivtac_rig::script::{Action, Restart};
 use hivtac_rig::usb_host::Port;
 use hivtac_wire::failure::{Failure, FailureKind};
 use hivtac_wire::health::{BrownOut, Health, Problem, ResetReason};
+use hivtac_wire::image::{FLASH, Image};
 use hivtac_wire::message::{Outcome, Request};
 use object::{Object, ObjectSymbol};
 use std::path::Path;

@@ -2,11 +2,11 @@
 //! and cut. The loader's stand-in is absent from USB, and starts the flash again after 0.3 s.
 
 use crate::common::{Setup, command, elf, firmware, hello_of, other};
-use hivtac_image::header::CRC_AT;
-use hivtac_image::{FLASH, HEADER_AT, Image, PROGRAM, SECTOR_BYTES};
 use hivtac_rig::report::Report;
 use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
+use hivtac_wire::image::header::CRC_AT;
+use hivtac_wire::image::{FLASH, HEADER_AT, Image, PROGRAM, SECTOR_BYTES};
 use hivtac_wire::message::{Outcome, Request};
 use hivtac_wire::version::HelloPrefix;
 

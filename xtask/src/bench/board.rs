@@ -6,13 +6,15 @@ use anyhow::{Context, Result, ensure};
 
 use super::measure;
 use super::tables::decimal;
-use crate::{artifacts, process, toolchain};
+use crate::artifacts::{self, Board};
+use crate::{process, toolchain};
 
-const PACKAGE: &str = "hivtac-board";
+/// The image, an example of the firmware.
+const EXAMPLE: &str = "benchmark";
 
 /// Builds the image, flashes it, and prints the board's output.
 pub fn run() -> Result<()> {
-    let image = artifacts::build(&mut command()?, PACKAGE)?;
+    let image = artifacts::build(&mut command()?, EXAMPLE)?;
     let list = process::output(&mut process::command("probe-rs list"));
     let list = list.context("the image is built; to run it: `cargo install probe-rs-tools`")?;
     let is_there = !list.contains("No debug probes");
@@ -32,11 +34,9 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Builds the image and lints it, without a board. Its dependencies are the firmware's, with the
-/// same features, and are built once.
+/// Builds the image and lints it, without a board.
 pub fn lint() -> Result<()> {
     let mut command = command()?;
-    command.args(["--package", "hivtac-firmware", "--bin", PACKAGE]);
     toolchain::lint_for_target(&mut command)?;
     artifacts::without_warnings(command)
 }
@@ -44,9 +44,9 @@ pub fn lint() -> Result<()> {
 fn command() -> Result<Command> {
     let data = toolchain::work_folder("bench")?;
     measure::cases(&data)?;
-    let mut command = toolchain::build_for_target("");
+    let mut command = artifacts::firmware_command(Board::Weact, "");
     command.env("HIVTAC_BOARD_DATA", data);
-    command.args(["--package", PACKAGE]);
+    command.args(["--example", EXAMPLE]);
     Ok(command)
 }
 

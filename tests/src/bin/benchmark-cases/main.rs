@@ -2,7 +2,7 @@
 //! prints what they are, one JSON object a line:
 //! `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
 //! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
-//! board can hold of them it writes as `board.rs`, too, for `tests/board`.
+//! board can hold of them it writes as `board.rs`, too, for `firmware/examples/benchmark`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -1,8 +1,8 @@
 //! Carries out the host's requests and answers them.
 
 use super::Device;
-use hivtac_device::kept;
-use hivtac_device::settings;
+use hivtac_portable::device::kept;
+use hivtac_portable::device::settings;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;

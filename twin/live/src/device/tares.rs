@@ -1,8 +1,8 @@
 //! Takes a tare over the next good frames.
 
 use super::Device;
-use hivtac_device::answer::{given_up, refused};
-use hivtac_device::settings::tared;
+use hivtac_portable::device::answer::{given_up, refused};
+use hivtac_portable::device::settings::tared;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::TareBuilder;
