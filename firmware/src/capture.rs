@@ -5,10 +5,10 @@
 //! DCMI and its DMA run without a pause. The DMA writes *bands* of 8 rows into a ring of 32 slots
 //! in AXI SRAM (`bands`). The ring holds slightly more than a frame at 320 × 240, four tenths of
 //! one at 800 × 600. Each finished band causes one interrupt, as do the end of a frame (the VSYNC
-//! pulse) and an overrun. The handlers follow `hivtac_portable::capture::Tracker`, and pass its events to the
-//! pipeline. The pipeline has finished bands copied to DTCM (`band_copy`) and scans one while the
-//! next ones arrive. A frame is measured as soon as its last band is scanned. If more data follows,
-//! it counts as too long, and the next sample reports a lost frame.
+//! pulse) and an overrun. The handlers follow `hivtac_portable::capture::Tracker`, and pass its
+//! events to the pipeline. The pipeline has finished bands copied to DTCM (`band_copy`) and scans
+//! one while the next ones arrive. A frame is measured as soon as its last band is scanned. If more
+//! data follows, it counts as too long, and the next sample reports a lost frame.
 //!
 //! After any unexpected event, DCMI is reset and set up anew, and the DMA begins a new band: the
 //! next frame is captured from its beginning. Between two good frames the hardware is not touched.

@@ -129,7 +129,7 @@ impl Image {
     }
 
     /// What is written into a device, one part for each sector, in this order. `found` is how its
-    /// flash begins ([`FIRST_LOOK`](crate::image::FIRST_LOOK) bytes). A first stage that is there stays:
+    /// flash begins ([`FIRST_LOOK`](super::FIRST_LOOK) bytes). A first stage that is there stays:
     /// until the last byte is written it finds a wrong checksum, and starts the loader again. Where
     /// none is, it comes first.
     ///
