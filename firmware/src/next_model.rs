@@ -24,7 +24,8 @@ impl InUse {
     }
 }
 
-/// Replaces the sensor's model, as [`hivtac_portable::device::model::Fitting::replace`] says. Returns the wanted threshold if its pixels differ from the camera's.
+/// Replaces the sensor's model, as [`hivtac_portable::device::model::Fitting::replace`] says.
+/// Returns the wanted threshold if its pixels differ from the camera's.
 pub fn bring_into_use(
     next: Chosen,
     afresh: bool,
