@@ -50,11 +50,11 @@ fn model() -> &'static [u8] {
 
 #[test]
 fn the_report_says_what_it_is_and_needs_nothing_else() {
-    let poses = data(Loads::PaperPoses(2), 2);
+    let poses = data(Loads::PaperPoses(1), 2);
     let evaluation = Evaluation::of(model(), &poses).unwrap();
     let [(_, all), (_, weak), (_, strong)] = evaluation.groups();
     let (all, weak, strong) = (all.unwrap(), weak.unwrap(), strong.unwrap());
-    assert_eq!((all.frames, weak.frames + strong.frames), (714, 714));
+    assert_eq!((all.frames, weak.frames + strong.frames), (357, 357));
     assert!(strong.direction_deg.value < 0.25, "{evaluation}");
     assert!(strong.direction_deg.value < weak.direction_deg.value);
     assert!(all.force_rmse_n.value < 0.5e-3, "{evaluation}");

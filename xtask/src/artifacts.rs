@@ -20,6 +20,8 @@ pub const TOOLS: &str = "tools";
 pub const RIG_TESTS: [&str; 2] = ["--test", "rig"];
 /// See [`RIG_TESTS`].
 pub const ROOMS_TESTS: [&str; 2] = ["--test", "rooms"];
+/// Arguments for the tests of studies, all slow.
+pub const STUDIES_TESTS: [&str; 4] = ["--bin", "hivtac-studies", "--test", "scene"];
 
 /// The boards for which there is firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -154,21 +156,30 @@ fn host_command(program: &str) -> Command {
 }
 
 /// The cargo command that runs tests of the workspace, including those after a failure. It uses the
-/// profile of the programs that tests run, and dependencies are built once.
-pub fn test() -> Command {
+/// profile of the programs that tests run, and dependencies are built once. `which` are cargo's
+/// arguments that choose tests.
+pub fn test(which: &[&str]) -> Command {
     let mut command = host_cargo("test");
-    command.arg("--no-fail-fast");
+    command.args(which).arg("--no-fail-fast");
     command
 }
 
-/// The cargo commands that build all programs and tests for this computer. Those of `hivtac serve`
-/// need many more packages, and are among them if `serving` is set.
-pub fn everything(serving: bool) -> Vec<Command> {
-    let [mut all, mut by_name] = [(); 2].map(|()| host_cargo("build"));
-    all.arg("--all-targets");
+/// The cargo commands that build programs and tests for this computer: those that are not slow, or
+/// all. Those of `hivtac serve` need many more packages, and are slow.
+pub fn everything(all: bool) -> Vec<Command> {
+    let [mut usual, mut by_name] = [(); 2].map(|()| host_cargo("build"));
+    match all {
+        true => usual.arg("--all-targets"),
+        // The first page of code that a newcomer reads, of all examples.
+        false => usual.args(["--lib", "--bins", "--tests", "--example", "force"]),
+    };
     by_name.args(RIG_TESTS).args(ROOMS_TESTS);
-    let serving = serving.then(serving_command);
-    [all, by_name].into_iter().chain(serving).collect()
+    let mut commands = vec![usual, by_name];
+    if all {
+        commands[1].args(STUDIES_TESTS);
+        commands.push(serving_command());
+    }
+    commands
 }
 
 /// Whether builds for this computer also lint this project's packages, and those with seeded bugs.

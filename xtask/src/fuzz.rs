@@ -34,9 +34,9 @@ pub fn obstacle() -> Option<&'static str> {
 /// Builds and runs every attack, as many at a time as there are cores. If one finds a fault, its
 /// input is saved and the fault is shown.
 pub fn run() -> Result<()> {
-    let programs = build()?;
-    let attacks = targets()?.into_par_iter();
-    let ended: Vec<_> = attacks.map(|target| attack(&programs, &target)).collect();
+    let program = build()?;
+    let attacks = names()?.into_par_iter();
+    let ended: Vec<_> = attacks.map(|name| attack(&program, &name)).collect();
     let mut failed = 0;
     for end in ended {
         process::say(&end.unwrap_or_else(|error| {
@@ -48,52 +48,53 @@ pub fn run() -> Result<()> {
     Ok(())
 }
 
-/// Builds the attacks; returns the folder of the programs. With a named target, build scripts are
-/// not instrumented, and are shared with other tests.
+/// Builds the program of all attacks. With a named target, build scripts are not instrumented, and
+/// are shared with other tests.
 fn build() -> Result<PathBuf> {
-    let mut command = cargo("build --package hivtac-fuzz --bins --profile", "");
+    let mut command = cargo("build --package hivtac-fuzz --profile", "");
     command.args([
         artifacts::TOOLS,
         "--target",
         &toolchain::rustc("--print host-tuple")?,
     ]);
     command.args(LINKED);
-    let program = artifacts::build(command.env("RUSTFLAGS", COVERAGE), "model")?;
-    Ok(program.with_file_name(""))
+    artifacts::build(command.env("RUSTFLAGS", COVERAGE), "hivtac-fuzz")
 }
 
-/// The names of the attacks.
-fn targets() -> Result<Vec<String>> {
-    let folder = toolchain::at("tests/fuzz/targets").read_dir();
-    let paths = folder.context("reading tests/fuzz/targets")?.flatten();
-    let name = |path: PathBuf| Some(path.file_stem()?.display().to_string());
-    let mut names: Vec<_> = paths.filter_map(|entry| name(entry.path())).collect();
+/// The names of the attacks, those of their corpora.
+fn names() -> Result<Vec<String>> {
+    let folder = toolchain::at("tests/fuzz/corpus").read_dir();
+    let entries = folder.context("reading tests/fuzz/corpus")?.flatten();
+    let mut names: Vec<_> = entries
+        .map(|entry| entry.file_name().display().to_string())
+        .collect();
     names.sort();
     Ok(names)
 }
 
-/// Runs one attack; returns the number of inputs that the target withstood. New inputs that reach
+/// Runs one attack; returns the number of inputs that the attack withstood. New inputs that reach
 /// further, and inputs that fail, go to `found`, not into the corpus.
-fn attack(programs: &Path, target: &str) -> Result<String> {
-    let found = toolchain::work_folder(&format!("fuzz/found/{target}"))?;
-    let mut command = Command::new(programs.join(target));
+fn attack(program: &Path, name: &str) -> Result<String> {
+    let found = toolchain::work_folder(&format!("fuzz/found/{name}"))?;
+    let mut command = Command::new(program);
     command
+        .env("HIVTAC_ATTACK", name)
         .arg(&found)
-        .arg(toolchain::at("tests/fuzz/corpus").join(target));
+        .arg(toolchain::at("tests/fuzz/corpus").join(name));
     command.arg("-print_final_stats=1").args(LIMITS);
     command.arg(format!("-artifact_prefix={}/", found.display()));
     let output = command
         .output()
-        .with_context(|| format!("attacking {target}"))?;
+        .with_context(|| format!("attacking {name}"))?;
     let (said, found) = (String::from_utf8_lossy(&output.stderr), found.display());
     let is_well = output.status.success();
     ensure!(
         is_well,
-        "{said}\n{target} found something: see above, and {found}"
+        "{said}\n{name} found something: see above, and {found}"
     );
     let tried = said.lines().find_map(|line| line.strip_prefix(TRIED));
     Ok(format!(
-        "{target}: {} inputs withstood",
+        "{name}: {} inputs withstood",
         tried.unwrap_or("?").trim()
     ))
 }

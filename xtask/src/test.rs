@@ -182,8 +182,7 @@ impl Shared {
     fn tests(&self, which: [&str; 2]) -> Result<Command> {
         let programs = self.programs.wait().as_ref();
         let programs = programs.context("not run: the firmware could not be built")?;
-        let mut command = artifacts::test();
-        command.args(which);
+        let mut command = artifacts::test(&which);
         programs.name_to(&mut command);
         Ok(command)
     }
@@ -227,7 +226,13 @@ fn target_lints() -> Result<()> {
 }
 
 fn host_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
-    shared.run(artifacts::test(), tally)
+    let tests = shared.run(artifacts::test(&["--tests"]), tally);
+    let of_studies = match shared.all {
+        true => shared.run(artifacts::test(&artifacts::STUDIES_TESTS), tally),
+        false => Ok(()),
+    };
+    let of_docs = run_tests(&mut artifacts::test(&["--doc"]), tally);
+    tests.and(of_studies).and(of_docs)
 }
 
 fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {

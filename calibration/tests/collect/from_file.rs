@@ -7,7 +7,7 @@ use hivtac_calibration::data::dataset::{Dataset, Loads};
 
 use hivtac_wire::message::Outcome;
 
-use crate::fake::*;
+use super::fake::*;
 
 /// 100 frames per second, however fast the computer is.
 fn clock() -> Clock {
@@ -141,6 +141,7 @@ fn from_a_recording_to_a_model_for_the_unit() {
 }
 
 #[test]
+#[ignore = "20 s: a second recording"]
 fn an_interrupted_recording_goes_on_with_the_poses_that_are_left() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();

@@ -14,7 +14,7 @@ use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, Unsi
 use hivtac_twin::Load;
 use hivtac_wire::message::Sample;
 
-use crate::fake::*;
+use super::fake::*;
 
 /// α and β in degrees, x and y in mm; each pressed with 0.1 N.
 const LOADS: [[f64; 4]; 6] = [

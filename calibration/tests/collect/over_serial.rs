@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 use rustix::fs::{Mode, OFlags};
 use rustix::pty::OpenptFlags;
 
-use crate::fake::*;
+use super::fake::*;
 
 /// Both ends of a new pseudo-terminal, and its name.
 pub fn pseudo_terminal() -> (File, File, String) {

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::fake::start;
-use crate::free::{record, sensor};
+use super::fake::start;
+use super::free::{record, sensor};
 
 /// The page's host and path, once the program has printed them.
 fn address(here: &Path) -> (String, String) {

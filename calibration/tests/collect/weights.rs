@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex};
 
 use hivtac_calibration::data::dataset::Dataset;
 
-use crate::fake::*;
+use super::fake::*;
 
 /// Time between frames, s.
 const FRAME_S: f64 = 0.04;
@@ -57,6 +57,7 @@ fn notes(begun_s: &[f64]) -> String {
 
 /// The loads are those of the weights; the program reports that three are too few for a fit.
 #[test]
+#[ignore = "20 s: guided and fitted as with a gauge"]
 fn a_person_with_weights_is_led_to_loads() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();

@@ -1,7 +1,7 @@
 //! Tests frames at the limits: full, empty, at every border, with the most runs and labels, the
 //! largest.
 
-use crate::reference::{Mask, scan, settings};
+use super::reference::{Mask, scan, settings};
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::scanner::{
     MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, ScanSettings, Scanner,

@@ -1,6 +1,6 @@
 //! Compares the scanner with a pixel-by-pixel reference on random masks.
 
-use crate::reference::{Mask, scan, settings};
+use super::reference::{Mask, scan, settings};
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
 use hivtac_sensor::markers::tables::{ByteTable, Pixels, Table};
 use hivtac_terms::status::Status;

@@ -5,7 +5,7 @@ use hivtac_sensor::markers::tables::{ByteTable, Table};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, HsvBox, ThresholdError};
 
-use crate::reference::{Mask, scan, settings};
+use super::reference::{Mask, scan, settings};
 
 #[test]
 fn missing_extra_and_wrong_rows_make_a_frame_incomplete() {

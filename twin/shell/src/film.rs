@@ -651,6 +651,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "10 s: full solutions"]
     fn the_mesh_converges() {
         let depth = |fineness| {
             let film = film(fineness);
@@ -663,6 +664,7 @@ mod tests {
     }
 
     #[test]
+    #[ignore = "10 s: full solutions"]
     fn a_thin_film_takes_force_with_the_cube_of_depth() {
         let mut design = Design {
             fineness: 0.5,

@@ -246,6 +246,7 @@ fn a_stretched_film_draws_its_edges_in() {
 }
 
 #[test]
+#[ignore = "10 s: full solutions"]
 fn slack_films_bulge_where_they_are_drawn() {
     for fineness in [0.25, 0.5] {
         for (down, way) in [(0.0, -1.0), (1.0, 1.0), (-1.0, -1.0)] {

@@ -3,17 +3,18 @@
 //! reached the code under attack.
 //!
 //! `cargo xtask test --all attacks` runs each for some seconds if there is a C++ compiler. The
-//! tests here run its corpus without one. [`ATTACKS`] is the list.
+//! tests here run its corpus without one. [`ATTACKS`] is the list; `HIVTAC_ATTACK` chooses one.
 //!
-//! To attack longer (`-help=1` shows libFuzzer's options; cargo-fuzz can run the targets as well),
-//! and to try an input that an attack found:
+//! To attack longer (`-help=1` shows libFuzzer's options), and to try an input that an attack found:
 //!
 //! ```sh
 //! cd target/xtask/fuzz
-//! x86_64-unknown-linux-gnu/tools/model found/model ../../../../tests/fuzz/corpus/model \
+//! export HIVTAC_ATTACK=model
+//! x86_64-unknown-linux-gnu/tools/hivtac-fuzz found/model ../../../../tests/fuzz/corpus/model \
 //!     -artifact_prefix=found/model/ -max_total_time=1800
-//! cargo run -p hivtac-fuzz --bin model -- found/model/crash-*
+//! cargo run -p hivtac-fuzz -- found/model/crash-*
 //! ```
+#![cfg_attr(fuzzing, no_main)]
 #![forbid(unsafe_code)]
 
 mod calibration;
@@ -29,11 +30,10 @@ mod storage;
 mod wire;
 
 /// An attack: returns whether the input reached the code under attack.
-pub type Attack = fn(&[u8]) -> bool;
+type Attack = fn(&[u8]) -> bool;
 
-/// Every attack by the name of its target, which is also the name of its folder in
-/// `tests/fuzz/corpus`.
-pub const ATTACKS: [(&str, Attack); 11] = [
+/// Every attack by its name, which is also that of its folder in `tests/fuzz/corpus`.
+const ATTACKS: [(&str, Attack); 11] = [
     ("from_device", wire::from_device),
     ("from_host", wire::from_host),
     ("model", model::attack),
@@ -47,40 +47,34 @@ pub const ATTACKS: [(&str, Attack); 11] = [
     ("network", calibration::network),
 ];
 
-/// Returns the attack of that name.
+/// The attack that `HIVTAC_ATTACK` names.
 ///
 /// # Panics
-/// If there is no such attack: a target without its entry in [`ATTACKS`].
-pub fn attack(name: &str) -> Attack {
+/// If it names none.
+fn chosen() -> Attack {
+    let name = std::env::var("HIVTAC_ATTACK").unwrap_or_default();
     let found = ATTACKS.iter().find(|(known, _)| *known == name);
-    found.expect("every target is listed").1
+    found
+        .unwrap_or_else(|| {
+            let known = ATTACKS.map(|(known, _)| known).join(", ");
+            panic!("HIVTAC_ATTACK names no attack: {name:?}; there are {known}")
+        })
+        .1
 }
 
-/// Runs an attack on the files that the command line names. Without libFuzzer a target does nothing
-/// else.
-///
-/// # Panics
-/// If a file cannot be read, or the attack finds a fault.
-pub fn replay(name: &str) {
+#[cfg(fuzzing)]
+libfuzzer_sys::fuzz_target!(|input: &[u8]| {
+    static CHOSEN: std::sync::LazyLock<Attack> = std::sync::LazyLock::new(chosen);
+    CHOSEN(input);
+});
+
+/// Runs the attack on the files that the command line names.
+#[cfg(not(fuzzing))]
+fn main() {
+    let attack = chosen();
     for path in std::env::args_os().skip(1) {
         let input = std::fs::read(&path).expect("the file can be read");
-        let reached = attack(name)(&input);
+        let reached = attack(&input);
         println!("{}: withstood, reached {reached}", path.display());
     }
-}
-
-/// The complete code of a fuzz target.
-#[macro_export]
-macro_rules! target {
-    ($name:literal) => {
-        #[cfg(fuzzing)]
-        libfuzzer_sys::fuzz_target!(|input: &[u8]| {
-            $crate::attack($name)(input);
-        });
-
-        #[cfg(not(fuzzing))]
-        fn main() {
-            $crate::replay($name);
-        }
-    };
 }

@@ -1,0 +1,11 @@
+//! Tests of the package from outside: its library, and its program.
+
+mod collect;
+mod command_line;
+mod committed_model;
+mod evaluate;
+mod layouts;
+mod numerics;
+mod pytorch;
+mod quantization;
+mod training;

@@ -1,0 +1,4 @@
+//! Tests of the package from outside.
+
+mod opencv;
+mod scanner;

@@ -1,4 +1,0 @@
-#![cfg_attr(fuzzing, no_main)]
-#![allow(missing_docs)]
-
-hivtac_fuzz::target!("from_host");

@@ -1,0 +1,4 @@
+//! Tests of the committed tables against full solutions.
+
+mod reduced;
+mod whole;
