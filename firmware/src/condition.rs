@@ -1,5 +1,6 @@
 //! Shares the sensor's condition with LED and self-test.
 
+use crate::output;
 use core::sync::atomic::{AtomicU8, Ordering};
 
 /// A [`Condition`]. Written by the pipeline and the capture task; read by the LED task and the
@@ -18,9 +19,12 @@ pub enum Condition {
     Good = 2,
 }
 
-/// Sets the sensor's condition.
+/// Sets the sensor's condition. Without a camera nothing is known, and the output pin is low.
 pub fn set(condition: Condition) {
     CONDITION.store(condition as u8, Ordering::Relaxed);
+    if condition == Condition::NoCamera {
+        output::set(false);
+    }
 }
 
 /// Returns the sensor's condition.

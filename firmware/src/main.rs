@@ -40,6 +40,7 @@ mod next_model;
 mod next_threshold;
 mod orders;
 mod outbox;
+mod output;
 mod pipeline_task;
 mod priorities;
 mod seeded_bugs;

@@ -13,7 +13,7 @@ use crate::orders::{ORDERS, Order};
 use crate::session::Origin;
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
-use crate::{outbox, seeded_bugs, session, settings, stats, vsync};
+use crate::{outbox, output, seeded_bugs, session, settings, stats, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_portable::capture::{Action, Band, Delivery, Ending, Event, Follower};
@@ -308,6 +308,7 @@ impl PipelineTask {
         }
         self.newest = delivery.edge.number;
         let followed = self.sensor.follow(moment(delivery), &measurement);
+        output::set(followed.output);
         let sample = self.sample(delivery, &measurement, &followed);
         let (frame, time_us) = (sample.frame, sample.time_us);
         self.busy_us += stats::since(begun).as_micros() as u32;

@@ -10,7 +10,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::{Creep, Filter, Rezero, TemporalSettings};
+use hivtac_terms::temporal::{Creep, Filter, Output, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Px,
@@ -70,6 +70,9 @@ const OWN: TemporalSettings = TemporalSettings {
     }),
     creep: Creep {
         parts: [SmallPermille(31), SmallPermille(42)],
+    },
+    output: Output::Force {
+        limit: UnsignedMicroNewtons(200_000),
     },
     ..TemporalSettings::USUAL
 };

@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x23DB2D0167CB848B
+SCHEMA = 0xF82E5FC4E1FA3341
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -179,8 +179,10 @@ def creep(parts):
 
 
 ANY_FILM = creep([0, 0])
-USUAL = LIMITS + NO_FILTER + rezero(200) + ANY_FILM
-OWN = LIMITS + LOW_PASS + rezero(100) + creep([31, 42])
+NO_OUTPUT = [raw("output: Off", [0])]
+FORCE_LIMIT = [raw("output: Force", [3]), unsigned("limit_un", 200_000)]
+USUAL = LIMITS + NO_FILTER + rezero(200) + ANY_FILM + NO_OUTPUT
+OWN = LIMITS + LOW_PASS + rezero(100) + creep([31, 42]) + FORCE_LIMIT
 
 
 MODEL = [

@@ -14,7 +14,9 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::{MOST_MARKERS, Marker, MarkerList};
 use hivtac_terms::status::Status;
-use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
+use hivtac_terms::temporal::{
+    ContactLimits, Creep, Filter, Output, Rezero, SlipLimits, TemporalSettings,
+};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
@@ -220,6 +222,9 @@ pub fn longest_temporal() -> TemporalSettings {
         }),
         creep: Creep {
             parts: [SmallPermille(u8::MAX); 2],
+        },
+        output: Output::Force {
+            limit: UnsignedMicroNewtons(u32::MAX),
         },
     }
 }
@@ -774,26 +779,38 @@ pub fn any_temporal() -> impl Strategy<Value = TemporalSettings> {
     ];
     let rezero = proptest::option::of(any::<(u32, u16, u16)>());
     let creep = any::<[u8; 2]>();
-    (any::<[u32; 4]>(), any::<u16>(), filter, rezero, creep).prop_map(
-        |([begins, ends, distance, within], ratio, filter, rezero, creep)| TemporalSettings {
-            contact: ContactLimits {
-                begins: UnsignedMicroNewtons(begins),
-                ends: UnsignedMicroNewtons(ends),
-            },
-            slip: SlipLimits {
-                distance: Micrometres(distance),
-                within: Milliseconds(within),
-                ratio: Permille(ratio),
-            },
-            filter,
-            rezero: rezero.map(|(after, rate, total)| Rezero {
-                after: Milliseconds(after),
-                rate: MilliPx(rate),
-                total: MilliPx(total),
-            }),
-            creep: Creep {
-                parts: creep.map(SmallPermille),
-            },
+    let output = prop_oneof![
+        Just(Output::Off),
+        Just(Output::Contact),
+        Just(Output::Slip),
+        any::<u32>().prop_map(|un| Output::Force {
+            limit: UnsignedMicroNewtons(un)
+        }),
+    ];
+    let followed = (filter, rezero, creep, output);
+    (any::<[u32; 4]>(), any::<u16>(), followed).prop_map(
+        |([begins, ends, distance, within], ratio, (filter, rezero, creep, output))| {
+            TemporalSettings {
+                contact: ContactLimits {
+                    begins: UnsignedMicroNewtons(begins),
+                    ends: UnsignedMicroNewtons(ends),
+                },
+                slip: SlipLimits {
+                    distance: Micrometres(distance),
+                    within: Milliseconds(within),
+                    ratio: Permille(ratio),
+                },
+                filter,
+                rezero: rezero.map(|(after, rate, total)| Rezero {
+                    after: Milliseconds(after),
+                    rate: MilliPx(rate),
+                    total: MilliPx(total),
+                }),
+                creep: Creep {
+                    parts: creep.map(SmallPermille),
+                },
+                output,
+            }
         },
     )
 }

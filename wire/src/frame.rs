@@ -13,7 +13,7 @@ pub(crate) const CRC_BYTES: usize = 4;
 
 /// Longest body of a device in this protocol version: all its settings, each number with its
 /// longest encoding.
-pub const MAX_DEVICE_BODY: usize = 461;
+pub const MAX_DEVICE_BODY: usize = 467;
 
 /// Longest body of a sample in this protocol version: one with force, place and markers.
 pub const MAX_SAMPLE_BODY: usize = 324;

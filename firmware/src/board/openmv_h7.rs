@@ -10,6 +10,7 @@
 //! | camera reset | PA10, low = reset |
 //! | USB D−, D+ | PA11, PA12 |
 //! | LED (green) | PC1, low = on |
+//! | output | PD12, P7 of the header |
 //! | crystal | 12 MHz |
 
 use super::parts::{self, Board, StatusLed, UsbPort};
@@ -33,6 +34,8 @@ use embassy_stm32::{Peri, pac, peripherals};
 
 /// Name in the device's hello.
 pub const NAME: &str = "openmv-h7";
+/// The output pin.
+pub const OUTPUT: (pac::gpio::Gpio, usize) = (pac::GPIOD, 12);
 const CRYSTAL_HZ: u32 = 12_000_000;
 /// Frequency of TIM1's counter: twice the peripherals' clock.
 const TIMER_HZ: u32 = 240_000_000;
@@ -64,6 +67,7 @@ pub fn start() -> Board {
         p.PA4.into(),
         p.PA6.into(),
     ]);
+    parts::drive_low(p.PD12.into());
     let bus = I2c::new_blocking(p.I2C1, p.PB8, p.PB9, parts::bus_config());
     let lines = CameraLines {
         standby: Output::new(p.PD7, Level::High, Speed::Low),

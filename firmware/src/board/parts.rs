@@ -8,7 +8,7 @@ use crate::flash::SecondBank;
 use crate::seeded_bugs;
 use crate::snapshot_copy::SnapshotCopy;
 use crate::thermometer::Thermometer;
-use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull};
+use embassy_stm32::gpio::{AfType, AnyPin, Flex, Level, Output, Pull, Speed};
 use embassy_stm32::i2c;
 use embassy_stm32::rcc::*;
 use embassy_stm32::time::Hertz;
@@ -119,6 +119,12 @@ pub fn connect_camera(pins: [Peri<'static, AnyPin>; 11]) {
         // Dropping it would disconnect the pin.
         core::mem::forget(pin);
     }
+}
+
+/// Makes a pin an output permanently, low at first.
+pub fn drive_low(pin: Peri<'static, AnyPin>) {
+    // Dropping it would disconnect the pin.
+    core::mem::forget(Output::new(pin, Level::Low, Speed::Low));
 }
 
 /// The configuration of the camera's control bus.

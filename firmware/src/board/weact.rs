@@ -9,6 +9,7 @@
 //! | camera power-down | PA7, high = standby: the camera's supplies stay on, and its registers keep their values |
 //! | USB D−, D+ | PA11, PA12 |
 //! | LED | PE3, high = on |
+//! | output | PE7 |
 //! | crystal | 25 MHz |
 
 use super::parts::{self, Board, StatusLed, UsbPort};
@@ -29,6 +30,8 @@ use embassy_stm32::{Peri, pac, peripherals};
 
 /// Name in the device's hello.
 pub const NAME: &str = "weact-h743";
+/// The output pin: on the header, and used by no other part of the board.
+pub const OUTPUT: (pac::gpio::Gpio, usize) = (pac::GPIOE, 7);
 const CRYSTAL_HZ: u32 = 25_000_000;
 // The camera's clock is half of the crystal's.
 const _: () = assert!(camera::XCLK_HZ == CRYSTAL_HZ / 2);
@@ -56,6 +59,7 @@ pub fn start() -> Board {
         p.PA4.into(),
         p.PA6.into(),
     ]);
+    parts::drive_low(p.PE7.into());
     let bus = I2c::new_blocking(p.I2C1, p.PB8, p.PB9, parts::bus_config());
     let lines = CameraLines {
         standby: Output::new(p.PA7, Level::High, Speed::Low),

@@ -11,7 +11,7 @@ use clap::Subcommand;
 use hivtac_host::contact_shape;
 use hivtac_host::failure::Failure;
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_terms::temporal::{Creep, Filter};
+use hivtac_terms::temporal::{Creep, Filter, Output};
 use hivtac_terms::units::{
     Micrometres, Microseconds, MilliPx, Milliseconds, Permille, Sixteenths, SmallPermille,
     UnsignedMicroNewtons,
@@ -125,6 +125,12 @@ pub enum SetCommand {
     /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
     #[command(subcommand)]
     Rezero(RezeroCommand),
+    /// When the board's output pin is high, without a host
+    ///
+    /// It changes with the frame that shows it, some µs before the sample is sent. PE7 on the WeAct
+    /// board, P7 on the OpenMV Cam.
+    #[command(subcommand)]
+    Output(OutputCommand),
     /// Where gravity pulls on the film
     ///
     /// The film hangs by its own weight: turned over, it looks pressed by some mN. A sensor that is
@@ -271,6 +277,41 @@ pub enum RezeroCommand {
     },
 }
 
+#[derive(Subcommand)]
+pub enum OutputCommand {
+    /// The pin stays low
+    ///
+    /// Example: hivtac settings set output off
+    Off {
+        #[command(flatten)]
+        target: Target,
+    },
+    /// High while something touches the film
+    ///
+    /// Example: hivtac settings set output contact
+    Contact {
+        #[command(flatten)]
+        target: Target,
+    },
+    /// High while the contact slips
+    ///
+    /// Example: hivtac settings set output slip
+    Slip {
+        #[command(flatten)]
+        target: Target,
+    },
+    /// High from a force on, until a tenth below
+    ///
+    /// Example: hivtac settings set output force 200
+    Force {
+        #[command(flatten)]
+        target: Target,
+        /// |F|, mN, 0.001 to 1000
+        #[arg(value_name = "MN", value_parser = thousandths)]
+        limit: u32,
+    },
+}
+
 impl SettingsCommand {
     /// Runs the command.
     ///
@@ -350,6 +391,7 @@ impl SetCommand {
                 let parts = parts.map(SmallPermille);
                 (target, Change::Creep(Creep { parts }))
             }
+            SetCommand::Output(output) => output.change(),
         };
         Conversation::begin(&target)?.set_temporal(change)
     }
@@ -366,6 +408,21 @@ impl FilterCommand {
             FilterCommand::MedianOfThree { target } => (target, Filter::MedianOfThree),
         };
         (target, Change::Filter(filter))
+    }
+}
+
+impl OutputCommand {
+    fn change(self) -> (Target, Change) {
+        let (target, output) = match self {
+            OutputCommand::Off { target } => (target, Output::Off),
+            OutputCommand::Contact { target } => (target, Output::Contact),
+            OutputCommand::Slip { target } => (target, Output::Slip),
+            OutputCommand::Force { target, limit } => {
+                let limit = UnsignedMicroNewtons(limit);
+                (target, Output::Force { limit })
+            }
+        };
+        (target, Change::Output(output))
     }
 }
 

@@ -1,8 +1,10 @@
-//! Touch, slip, filter, re-zeroing and creep as JSON, as lines, and as changes by `settings set`.
+//! Touch, slip, filter, re-zeroing, creep and the output pin as JSON, as lines, and as changes by `settings set`.
 //! They decide how forces are followed from frame to frame.
 
 use hivtac_host::decimal::Decimal;
-use hivtac_terms::temporal::{ContactLimits, Creep, Filter, Rezero, SlipLimits, TemporalSettings};
+use hivtac_terms::temporal::{
+    ContactLimits, Creep, Filter, Output, Rezero, SlipLimits, TemporalSettings,
+};
 use hivtac_terms::units::{
     Micrometres, MilliPx, Milliseconds, Permille, SmallPermille, UnsignedMicroNewtons,
 };
@@ -17,6 +19,9 @@ pub struct TemporalJson {
     filter: FilterJson,
     rezero: Option<RezeroJson>,
     creep: CreepJson,
+    /// Files of earlier versions have none.
+    #[serde(default)]
+    output: OutputJson,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -63,6 +68,18 @@ struct CreepJson {
     parts_permille: [u8; 2],
 }
 
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "high", rename_all = "kebab-case", deny_unknown_fields)]
+enum OutputJson {
+    #[default]
+    Never,
+    Contact,
+    Slip,
+    Force {
+        limit_un: u32,
+    },
+}
+
 impl TemporalJson {
     /// From a device's settings.
     pub fn new(settings: &TemporalSettings) -> TemporalJson {
@@ -72,6 +89,7 @@ impl TemporalJson {
             filter,
             rezero,
             creep,
+            output,
         } = *settings;
         TemporalJson {
             contact: ContactJson {
@@ -91,6 +109,12 @@ impl TemporalJson {
             }),
             creep: CreepJson {
                 parts_permille: creep.parts.map(|part| part.0),
+            },
+            output: match output {
+                Output::Off => OutputJson::Never,
+                Output::Contact => OutputJson::Contact,
+                Output::Slip => OutputJson::Slip,
+                Output::Force { limit } => OutputJson::Force { limit_un: limit.0 },
             },
         }
     }
@@ -121,6 +145,14 @@ impl TemporalJson {
             }),
             creep: Creep {
                 parts: self.creep.parts_permille.map(SmallPermille),
+            },
+            output: match self.output {
+                OutputJson::Never => Output::Off,
+                OutputJson::Contact => Output::Contact,
+                OutputJson::Slip => Output::Slip,
+                OutputJson::Force { limit_un } => Output::Force {
+                    limit: UnsignedMicroNewtons(limit_un),
+                },
             },
         }
     }
@@ -153,13 +185,14 @@ impl FilterJson {
 }
 
 /// Name and text of each setting, for a person.
-pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
+pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 6] {
     let TemporalSettings {
         contact,
         slip,
         filter,
         rezero,
         creep,
+        output,
     } = settings;
     let rezero = match rezero {
         None => "off".to_owned(),
@@ -191,7 +224,20 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 5] {
         ("filter", FilterJson::new(*filter).text()),
         ("rezero", rezero),
         ("creep", creep_text(creep)),
+        ("output", output_text(*output)),
     ]
+}
+
+fn output_text(output: Output) -> String {
+    match output {
+        Output::Off => "off: its pin stays low".to_owned(),
+        Output::Contact => "high while something touches the film".to_owned(),
+        Output::Slip => "high while the contact slips".to_owned(),
+        Output::Force { limit } => format!(
+            "high from {} mN on, until a tenth below",
+            Decimal::thousandths(limit.0)
+        ),
+    }
 }
 
 fn creep_text(creep: &Creep) -> String {
@@ -228,6 +274,8 @@ pub enum Change {
     Rezero(Option<RezeroChange>),
     /// The new [`Creep`].
     Creep(Creep),
+    /// The new [`Output`].
+    Output(Output),
 }
 
 /// A change of [`Rezero`].
@@ -260,6 +308,7 @@ impl Change {
                 slip.ratio = ratio.unwrap_or(slip.ratio);
             }
             Change::Creep(creep) => settings.creep = creep,
+            Change::Output(output) => settings.output = output,
             Change::Filter(filter) => settings.filter = filter,
             Change::Rezero(change) => {
                 let before = settings.rezero.unwrap_or_default();
@@ -281,6 +330,7 @@ impl Change {
             Change::Filter(_) => "filter",
             Change::Rezero(_) => "rezero",
             Change::Creep(_) => "creep",
+            Change::Output(_) => "output",
         }
     }
 }
@@ -352,6 +402,9 @@ mod tests {
             Change::Creep(Creep {
                 parts: [SmallPermille(31), SmallPermille(42)],
             }),
+            Change::Output(Output::Force {
+                limit: UnsignedMicroNewtons(200_000),
+            }),
         ];
         let usual = TemporalSettings::default();
         changes
@@ -389,7 +442,7 @@ mod tests {
 
     #[test]
     fn a_person_reads_units() {
-        let [touch, slip, filter, rezero, creep] = texts(&unusual()).map(|(_, text)| text);
+        let [touch, slip, filter, rezero, creep, output] = texts(&unusual()).map(|(_, text)| text);
         assert_eq!(touch, "from 3.500 mN on, until below 1.000 mN");
         assert_eq!(
             slip,
@@ -403,6 +456,16 @@ mod tests {
         assert_eq!(rezero, expected);
         let expected = "0.031 of a force within 0.500 s, 0.042 within 20.000 s";
         assert_eq!(creep, expected);
+        assert_eq!(output, "high from 200.000 mN on, until a tenth below");
+    }
+
+    #[test]
+    fn files_of_earlier_versions_have_no_output() {
+        let usual = TemporalSettings::default();
+        let mut file = serde_json::to_value(TemporalJson::new(&usual)).unwrap();
+        file.as_object_mut().unwrap().remove("output");
+        let read: TemporalJson = serde_json::from_value(file).unwrap();
+        assert_eq!(read.settings(), usual);
     }
 
     #[test]

@@ -4,9 +4,10 @@ use crate::fake::*;
 use crate::run::*;
 use hivtac_terms::camera::{CameraSettings, Rate};
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_terms::temporal::{Creep, Filter, Rezero, TemporalSettings};
+use hivtac_terms::temporal::{Creep, Filter, Output, Rezero, TemporalSettings};
 use hivtac_terms::units::{
     Micrometres, Microseconds, MilliPx, Milliseconds, Px, Sixteenths, SmallPermille,
+    UnsignedMicroNewtons,
 };
 use hivtac_wire::message::*;
 use hivtac_wire::settings::*;
@@ -46,6 +47,7 @@ fn settings_for_a_person() {
          rezero     after 10.000 s without a contact, by 0.005 px a second, 0.200 px in all \
          (kept)\n\
          creep      not measured: uncertain as silicones differ (kept)\n\
+         output     off: its pin stays low (kept)\n\
          exposure   5.922 ms, as the light needs (kept)\n\
          gain       1.5, as the light needs (kept)\n\
          rate       156 frames a second (kept)\n\
@@ -293,6 +295,11 @@ fn limits_are_changed_one_by_one_and_kept() {
         parts: [SmallPermille(31), SmallPermille(42)],
     };
     assert_eq!(creep.creep, expected);
+    let (output, _) = changed(&["settings", "set", "output", "force", "200"]);
+    let limit = UnsignedMicroNewtons(200_000);
+    assert_eq!(output.output, Output::Force { limit });
+    let (output, _) = changed(&["settings", "set", "output", "slip"]);
+    assert_eq!(output.output, Output::Slip);
 }
 
 #[test]
@@ -302,6 +309,7 @@ fn a_limit_out_of_its_range_changes_nothing() {
         (["slip", "--within", "5"], "10 to 100 ms"),
         (["filter", "low-pass", "--ms=0"], "1 to 10000 ms"),
         (["creep", "0.1,0.2", "--json"], "0 to 15 %"),
+        (["output", "force", "1000.001"], "0.001 to 1000 mN"),
     ] {
         let device = device();
         let arguments = [&["settings", "set"], &arguments[..]].concat();

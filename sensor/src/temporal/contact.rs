@@ -4,13 +4,10 @@
 //! standard uncertainty, or the frame's own status reports a contact. That status ignores how
 //! uncertain a film's strength is. It ends below the lower limit, or below half of that certainty.
 
-use super::ContactLimits;
+use super::{ContactLimits, FORGOTTEN_US};
 use crate::force::CONTACT_SIGMAS;
 use crate::pipeline::Measurement;
 use hivtac_terms::status::Status;
-
-/// The state is discarded if no frame had a force for longer than this, µs.
-const FORGOTTEN_US: u64 = 100_000;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Contact {

@@ -1,5 +1,5 @@
-//! Follows forces from frame to frame: the film's memory of its loads, contact, slip, and the
-//! filter.
+//! Follows forces from frame to frame: the film's memory of its loads, contact, slip, the filter,
+//! and the output pin.
 //!
 //! Every decision uses the frames' own times, so it is the same at any frame rate and across lost
 //! frames. State and work are bounded. Contact and slip depend on each frame's own force, not on
@@ -8,6 +8,7 @@
 mod contact;
 mod creep;
 mod filter;
+mod output;
 mod slip;
 #[cfg(test)]
 pub(crate) mod tests;
@@ -19,7 +20,11 @@ use creep::Memory;
 use filter::ForceFilter;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{ContactLimits, Filter, SlipLimits, TemporalError, TemporalSettings};
+use output::Level;
 use slip::Slip;
+
+/// Contact and output are forgotten if no frame had a force for longer than this, µs.
+const FORGOTTEN_US: u64 = 100_000;
 
 /// A frame's number and exposure time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,6 +47,8 @@ pub struct Followed {
     /// True if a second of the untouched film has just shown where it rests. Set by
     /// [`Sensor::follow`](crate::pipeline::Sensor::follow) only.
     pub tells_rest: bool,
+    /// Whether the output pin is high.
+    pub output: bool,
 }
 
 /// The state that earlier frames left.
@@ -52,6 +59,7 @@ pub struct Temporal {
     slip: Slip,
     filter: ForceFilter,
     memory: Memory,
+    output: Level,
 }
 
 impl Temporal {
@@ -63,6 +71,7 @@ impl Temporal {
             slip: Slip::NONE,
             filter: ForceFilter::EMPTY,
             memory: Memory::NONE,
+            output: Level::LOW,
         }
     }
 
@@ -89,6 +98,7 @@ impl Temporal {
         self.slip = Slip::NONE;
         self.filter = ForceFilter::EMPTY;
         self.memory = Memory::NONE;
+        self.output = Level::LOW;
     }
 
     /// Takes the next frame.
@@ -98,6 +108,7 @@ impl Temporal {
             slip,
             filter,
             creep,
+            output,
             ..
         } = self.settings;
         let undone = (self.memory).follow(&creep, at.time_us, measurement.force.as_ref());
@@ -125,6 +136,7 @@ impl Temporal {
             status,
             force: self.filter.follow(filter, at, own, touched == Some(true)),
             tells_rest: false,
+            output: self.output.follow(output, at.time_us, own, status),
         }
     }
 }

@@ -23,6 +23,8 @@ pub struct TemporalSettings {
     pub rezero: Option<Rezero>,
     /// The film's memory of its loads.
     pub creep: Creep,
+    /// When the output pin is high.
+    pub output: Output,
 }
 
 /// The film is touched from |F| ≥ `begins` on, until |F| < `ends`.
@@ -73,6 +75,28 @@ pub enum Filter {
     MedianOfThree,
 }
 
+/// When the output pin is high: from the frame on that shows it, without a host. A frame without a
+/// force changes nothing for 100 ms; after that, and without a camera, the pin is low.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub enum Output {
+    /// Never.
+    #[default]
+    Off,
+    /// While something touches the film.
+    Contact,
+    /// While the contact slips.
+    Slip,
+    /// From |F| ≥ `limit` until |F| < 9/10 of it.
+    Force {
+        /// The limit, 1 µN to 1 N.
+        limit: UnsignedMicroNewtons,
+    },
+}
+
 /// How the rest position follows drift while the film is untouched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(
@@ -104,7 +128,7 @@ pub struct Creep {
 impl TemporalSettings {
     /// A contact begins at 2 mN and ends below 1 mN. A slip is 60 µm within 50 ms, with a
     /// tangential force of at least a tenth of the normal one. No filter; re-zeroing as
-    /// [`Rezero::USUAL`]; a film as [`Creep::USUAL`].
+    /// [`Rezero::USUAL`]; a film as [`Creep::USUAL`]; no output.
     pub const USUAL: TemporalSettings = TemporalSettings {
         contact: ContactLimits {
             begins: UnsignedMicroNewtons(2_000),
@@ -118,6 +142,7 @@ impl TemporalSettings {
         filter: Filter::None,
         rezero: Some(Rezero::USUAL),
         creep: Creep::USUAL,
+        output: Output::Off,
     };
 }
 
@@ -209,6 +234,8 @@ pub enum TemporalError {
     RezeroTotal,
     /// [`Creep::parts`].
     CreepParts,
+    /// The limit of [`Output::Force`].
+    OutputLimit,
 }
 
 impl fmt::Display for TemporalError {
@@ -224,6 +251,7 @@ impl fmt::Display for TemporalError {
             TemporalError::RezeroRate => "the rate of re-zeroing is 0.001 to 0.1 px a second",
             TemporalError::RezeroTotal => "re-zeroing moves by 0.001 to 0.25 px in all",
             TemporalError::CreepParts => "a part of creep is 0 to 15 %",
+            TemporalError::OutputLimit => "the output's limit is 0.001 to 1000 mN",
         })
     }
 }
@@ -240,6 +268,7 @@ impl TemporalSettings {
             filter,
             rezero,
             creep,
+            output,
         } = self;
         let within = |is_within: bool, error| is_within.then_some(()).ok_or(error);
         let begins_within = (1..=1_000_000).contains(&begins.0);
@@ -257,6 +286,10 @@ impl TemporalSettings {
         }
         let parts_within = creep.parts.iter().all(|part| part.0 <= 150);
         within(parts_within, TemporalError::CreepParts)?;
+        if let Output::Force { limit } = output {
+            let limit_within = (1..=1_000_000).contains(&limit.0);
+            within(limit_within, TemporalError::OutputLimit)?;
+        }
         let Some(Rezero { after, rate, total }) = rezero else {
             return Ok(());
         };
@@ -304,7 +337,15 @@ mod tests {
             };
             assert_eq!(settings.check().is_ok(), is_good, "{constant}");
         }
-        let bad: [(Edit, TemporalError); 9] = [
+        let bad: [(Edit, TemporalError); 10] = [
+            (
+                |s| {
+                    s.output = Output::Force {
+                        limit: UnsignedMicroNewtons(0),
+                    }
+                },
+                TemporalError::OutputLimit,
+            ),
             (
                 |s| s.creep.parts[1] = SmallPermille(151),
                 TemporalError::CreepParts,

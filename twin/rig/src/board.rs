@@ -10,6 +10,7 @@
 //! | camera's reset (low) | – | PA10 |
 //! | D5 | PD3 | PB6 |
 //! | LED | PE3, high is on | PC1, low is on |
+//! | output | PE7 | PD12 |
 //! | crystal | 25 MHz | 12 MHz |
 
 use rigless::device::{Level, RegisterFile};
@@ -121,6 +122,14 @@ impl Kind {
             Kind::OpenmvH7 => ((C, 1), Level::Low),
         }
     }
+
+    /// Returns the output pin.
+    fn output(self) -> At {
+        match self {
+            Kind::Weact => (E, 7),
+            Kind::OpenmvH7 => (D, 12),
+        }
+    }
 }
 
 /// Returns the pin of VSYNC, PB7.
@@ -143,6 +152,8 @@ pub struct Wiring {
     pub usb_hz: u64,
     /// The LED is on.
     pub led: bool,
+    /// The output pin is high.
+    pub output: bool,
 }
 
 /// Slots of the registers that decide the wiring.
@@ -217,6 +228,7 @@ impl Slots {
             usb: carries(A, 11, AF_USB) && carries(A, 12, AF_USB) && self.usb_supplied(part),
             usb_hz: self.usb_hz(part),
             led: self.driven(part, led) == Some(on),
+            output: self.driven(part, self.board.output()) == Some(Level::High),
         }
     }
 

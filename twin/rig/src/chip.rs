@@ -95,7 +95,8 @@ pub struct Chip {
     rules: Rules,
     board: board::Kind,
     revision: Revision,
-    led_edges_ns: Vec<u64>,
+    led: Switches,
+    output: Switches,
     camera: SharedCamera,
     otg: Blocks,
     core: SharedCore,
@@ -112,6 +113,19 @@ pub struct Chip {
     /// The longest time from one of its changes to the handler, ns.
     latest_stamp_ns: u64,
     wiring: Wiring,
+}
+
+/// Times at which a pin was switched on and off in turn, ns; it begins off.
+#[derive(Debug, Default)]
+struct Switches(Vec<u64>);
+
+impl Switches {
+    fn drive(&mut self, is_on: bool, at: VirtualNanos) {
+        let was_on = !self.0.len().is_multiple_of(2);
+        if is_on != was_on {
+            self.0.push(at.0);
+        }
+    }
 }
 
 impl Chip {
@@ -179,7 +193,8 @@ impl Chip {
             rules,
             board,
             revision,
-            led_edges_ns: Vec::new(),
+            led: Switches::default(),
+            output: Switches::default(),
             late: LateLine::default(),
             late_flags,
             late_enable: LateEnable::new(seed),
@@ -232,15 +247,12 @@ impl Chip {
 
     /// Returns the times of the LED's switches, on and off in turn, ns.
     pub fn led_edges_ns(&self) -> &[u64] {
-        &self.led_edges_ns
+        &self.led.0
     }
 
-    /// Switches the LED on or off; it begins off.
-    fn drive_led(&mut self, is_on: bool, at: VirtualNanos) {
-        let was_on = !self.led_edges_ns.len().is_multiple_of(2);
-        if is_on != was_on {
-            self.led_edges_ns.push(at.0);
-        }
+    /// Returns the times of the output pin's edges, high and low in turn, ns.
+    pub fn output_edges_ns(&self) -> &[u64] {
+        &self.output.0
     }
 
     /// Returns the count of words that the firmware wrote into full USB FIFOs.
@@ -256,7 +268,8 @@ impl Chip {
     /// Reads the pins and clocks again, and passes on the changes.
     pub fn rewire(&mut self, at: VirtualNanos) {
         let wiring = self.slots.wiring(&self.part);
-        self.drive_led(wiring.led, at);
+        self.led.drive(wiring.led, at);
+        self.output.drive(wiring.output, at);
         if wiring != self.wiring {
             if wiring.hclk_hz > self.revision.fastest_bus_hz() {
                 let (hclk, revision) = (wiring.hclk_hz, self.revision);

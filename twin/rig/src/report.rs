@@ -22,6 +22,8 @@ pub struct Report {
     pub wall: Duration,
     /// Times of the LED's switches, on and off in turn, ns.
     pub led_edges_ns: Vec<u64>,
+    /// Times of the output pin's edges, high and low in turn, ns.
+    pub output_edges_ns: Vec<u64>,
     /// The longest time from an edge of VSYNC to its handler, ns.
     pub latest_stamp_ns: u64,
     /// Resets of the microcontroller.
@@ -85,6 +87,7 @@ impl Report {
             wall,
             resets: session.resets().len(),
             led_edges_ns: chip.led_edges_ns().to_vec(),
+            output_edges_ns: chip.output_edges_ns().to_vec(),
             latest_stamp_ns: chip.latest_stamp_ns(),
             exposures: camera.exposures(),
             sccb_writes: camera.sccb_writes(),

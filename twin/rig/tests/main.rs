@@ -18,6 +18,7 @@ mod led;
 mod looks;
 mod models;
 mod openmv;
+mod output;
 mod rules;
 mod seeded_bugs;
 mod settings;
