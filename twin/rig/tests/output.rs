@@ -33,10 +33,11 @@ fn drag(output: Output) -> Run {
     run
 }
 
-/// Returns when the samples had arrived at which `is_high` changes, ns.
+/// Returns when the samples with a force had arrived at which `is_high` changes, ns.
 fn changes(run: &Run, mut is_high: impl FnMut(&Sample) -> bool) -> Vec<u64> {
     let mut was_high = false;
     let samples = run.samples().into_iter();
+    let samples = samples.filter(|sample| sample.force.is_some());
     let changed = samples.filter(|sample| {
         let change = is_high(sample) != was_high;
         was_high ^= change;
@@ -82,10 +83,9 @@ fn it_is_high_from_a_force_on_until_a_tenth_below() {
     let run = drag(Output::Force { limit });
     let mut is_high = false;
     let changes = changes(&run, |sample| {
-        if let Some(force) = sample.force {
-            let least = if is_high { 54_000 } else { 60_000 };
-            is_high = force.magnitude.0.unsigned_abs() >= least;
-        }
+        let least = if is_high { 54_000 } else { 60_000 };
+        let magnitude = sample.force.expect("only those with one").magnitude;
+        is_high = magnitude.0.unsigned_abs() >= least;
         is_high
     });
     assert!(
