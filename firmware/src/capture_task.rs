@@ -194,7 +194,7 @@ impl CaptureTask {
     }
 
     async fn set(&mut self, settings: CameraSettings) -> Outcome {
-        match camera::LIMITS.check(&settings) {
+        match camera::limits().check(&settings) {
             Ok(()) => {
                 self.set_up(settings).await;
                 Outcome::Done
@@ -301,10 +301,24 @@ impl CaptureTask {
             self.numbering = true;
             vsync::restart_count();
         }
-        let settings = camera::report().settings;
+        let settings = settings();
         let format = self.capture.format();
         self.camera.configure(format, settings).await
     }
+}
+
+/// Returns the settings to apply to the camera that answered. They may have been checked for
+/// another one.
+fn settings() -> CameraSettings {
+    let wanted = camera::report().settings;
+    if camera::limits().check(&wanted).is_ok() {
+        return wanted;
+    }
+    let name = camera::fitted().name;
+    let text = format_args!("camera: an {name} cannot have the kept settings; its usual ones");
+    log::say(LogLevel::Warning, text);
+    camera::tell(CameraSettings::default());
+    CameraSettings::default()
 }
 
 fn inspection(setting: Setting, frame_time: Duration) -> Inspection {

@@ -10,7 +10,7 @@ pub fn hello() -> DeviceHello {
     let identity = Identity {
         device_id: embassy_stm32::uid::uid(),
         board: board::NAME,
-        camera: camera::NAME,
+        camera: camera::fitted().name,
         program: format_args!("hivtac {}", env!("CARGO_PKG_VERSION")),
         preset: camera::PRESET,
         geometry: camera::GEOMETRY,

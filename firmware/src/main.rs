@@ -169,7 +169,7 @@ fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
     if sensor.configure(settings, model).is_err() {
         panic!("the built-in settings are out of range");
     }
-    sensor.set_motion(camera::MOTION);
+    sensor.set_motion(camera::fitted().motion);
     settings::set_down(kept.down);
     sensor.set_down(settings::down());
     if settings::set_contact_shape(kept.contact_shape).is_err() {
@@ -189,7 +189,7 @@ fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
 
 /// Sets the camera's initial settings to the kept ones.
 fn set_camera(kept: CameraSettings) {
-    match camera::LIMITS.check(&kept) {
+    match camera::limits().check(&kept) {
         Ok(()) => camera::tell(kept),
         Err(_) => defmt::warn!("the kept exposure or gain is out of the camera's range"),
     }

@@ -151,7 +151,8 @@ impl PipelineTask {
         stats::DROPPED_SIZE.add(tally.size);
         stats::DROPPED_SETUP.add(tally.passed);
         if tally.passed > 0 {
-            // Frames of a set-up are exposed otherwise.
+            // Frames of a set-up are exposed otherwise, and may be those of another camera.
+            self.sensor.set_motion(camera::fitted().motion);
             self.sensor.forget_frame();
         }
         if tally.overrun + tally.size > 0 {

@@ -96,7 +96,7 @@ fn a_good_board_is_right_up_to_the_press() {
 
 #[test]
 fn without_a_camera_it_says_so() {
-    let words = ["no OV7725 on I2C1", "ribbon"];
+    let words = ["no OV7725 or OV5640 on I2C1", "ribbon"];
     ends_wrong(bring_up(&["--fault", "camera-absent"]), "camera", &words);
 }
 

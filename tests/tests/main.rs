@@ -13,6 +13,7 @@ mod hard_cases_anywhere;
 mod looks;
 mod markers;
 mod moving;
+mod ov5640;
 mod panics;
 mod placement;
 mod places;

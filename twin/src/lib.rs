@@ -81,7 +81,7 @@ pub use hivtac_terms::geometry::Preset;
 pub use lens::{Discs, Lens, Mounting, Projection, Shutter};
 pub use mechanics::{Mechanics, Stiffness};
 pub use motion::{Catch, Drag, Grasp, Motion, Press, Vibration};
-pub use options::{Options, Salt};
+pub use options::{OV5640_NOISE, Options, Salt};
 pub use patch::{Paint, Patch, Specks};
 pub use scene::Scene;
 pub use surface::Surface;

@@ -99,6 +99,11 @@ impl Default for Options {
     }
 }
 
+/// Noise of an OV5640's picture where an OV7725's is 2.5, in the light that exposes that one for 4
+/// ms. A pixel of the picture collects light on 26.5 µm² of its chip, instead of 144, for 8.3 ms:
+/// 0.38 times the electrons.
+pub const OV5640_NOISE: f64 = 4.0;
+
 impl Options {
     /// Returns the options of the nominal sensor of a preset.
     pub fn of(preset: Preset) -> Options {

@@ -212,3 +212,16 @@ fn formats_by_name() {
     let quality = 85;
     assert_eq!(format("format = \"jpeg\""), Format::Jpeg { quality });
 }
+
+/// The picture of an OV5640 is that of an OV7725 but for its noise, which a file may set.
+#[test]
+fn an_ov5640_is_an_ov7725_with_more_noise() {
+    let scene = |text: &str| Scene::from_toml(text).unwrap();
+    let [usual, other] = ["ov7725", "ov5640"].map(|name| {
+        let scene = scene(&format!("[camera]\npreset = \"{name}\"\n"));
+        (scene.camera().focal_px(), scene.options().noise)
+    });
+    assert_eq!([usual, other], [(175.0, 2.5), (175.0, 4.0)]);
+    let set = scene("[camera]\npreset = \"ov5640\"\n[noise]\nnoise = 1.0\n");
+    assert_eq!(set.options().noise, 1.0);
+}

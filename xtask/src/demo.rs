@@ -20,13 +20,25 @@ pub struct Demo {
     /// End after this many frames.
     #[arg(long, default_value_t = 150, value_parser = clap::value_parser!(u64).range(1..))]
     frames: u64,
-    /// The board and its camera: an OV7725 on the first, an MT9V034 on the second.
+    /// The board: the first has an OV7725 unless --camera says otherwise, the second an MT9V034.
     #[arg(long, value_enum, default_value_t)]
     board: Board,
+    /// The camera in the first board's socket: the firmware takes either.
+    #[arg(long, value_enum)]
+    camera: Option<Camera>,
     /// Dots on the film: four, which the built-in model is for, or eight, whose model is sent
     /// first.
     #[arg(long, default_value_t = FOUR, value_parser = dots)]
     dots: u8,
+}
+
+/// The cameras for the first board's socket.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Camera {
+    /// 156 frames a second.
+    Ov7725,
+    /// 119 frames a second.
+    Ov5640,
 }
 
 /// The built-in model's number of dots.
@@ -50,6 +62,10 @@ impl Demo {
         ensure!(
             self.dots == FOUR || self.board == Board::default(),
             "eight dots are for the first board: leave --board out"
+        );
+        ensure!(
+            self.camera.is_none() || self.board == Board::default(),
+            "an OV7725 or OV5640 is for the first board: leave --board out"
         );
         let start = Instant::now();
         let programs = self.build()?;
@@ -110,6 +126,9 @@ impl Demo {
         }
         command.args("--scene demo --pty --board".split(' '));
         command.arg(board.get_name()).arg("--truth").arg(truth);
+        if let Some(camera) = self.camera.and_then(|camera| camera.to_possible_value()) {
+            command.arg("--camera").arg(camera.get_name());
+        }
         let rig = Rig::start(command.arg("--arrivals").arg(arrivals).arg(firmware), log)?;
         // The emulated board boots slower than a real one.
         let at = ["--port", &rig.port, "--timeout", "120"];

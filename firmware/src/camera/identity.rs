@@ -1,6 +1,6 @@
-//! Identifies the camera: the one that this firmware supports, or a different one, which is named.
+//! Identifies the camera: one that this firmware supports, or a different one, which is named.
 
-use super::{Bus, IDENTITY};
+use super::{Bus, Device, FITTING};
 use core::fmt;
 use embassy_stm32::i2c;
 
@@ -9,8 +9,8 @@ use embassy_stm32::i2c;
 pub struct Identity {
     /// Its name.
     pub name: &'static str,
-    /// Its address on the bus, 7 bits.
-    pub address: u8,
+    /// Its address on the bus.
+    pub device: Device,
     /// Its identification number.
     pub number: u16,
     /// The registers of that number.
@@ -23,17 +23,32 @@ pub struct Identity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Told {
     /// Two registers of a byte, the high one first.
-    InBytes([u8; 2]),
+    InBytes([u16; 2]),
     /// One register of two bytes.
-    InWord(u8),
+    InWord(u16),
 }
 
 /// OmniVision OV7725: product number and version.
 pub const OV7725: Identity = Identity {
     name: "OV7725",
-    address: 0x21,
+    device: Device {
+        address: 0x21,
+        is_wide: false,
+    },
     number: hivtac_portable::device::camera::ov7725::ID,
     told: Told::InBytes([0x0A, 0x0B]),
+    feature: "board-weact",
+};
+
+/// OmniVision OV5640: chip number. Variants with a focus motor have the same.
+pub const OV5640: Identity = Identity {
+    name: "OV5640",
+    device: Device {
+        address: 0x3C,
+        is_wide: true,
+    },
+    number: hivtac_portable::device::camera::ov5640::ID,
+    told: Told::InBytes([0x300A, 0x300B]),
     feature: "board-weact",
 };
 
@@ -41,14 +56,17 @@ pub const OV7725: Identity = Identity {
 /// OpenMV's module.
 pub const MT9V034: Identity = Identity {
     name: "MT9V034",
-    address: 0x5C,
+    device: Device {
+        address: 0x5C,
+        is_wide: false,
+    },
     number: hivtac_portable::device::camera::mt9v034::ID,
     told: Told::InWord(0x00),
     feature: "board-openmv-h7",
 };
 
 /// Every camera that a firmware supports.
-const KNOWN: [Identity; 2] = [OV7725, MT9V034];
+const KNOWN: [Identity; 3] = [OV7725, OV5640, MT9V034];
 
 /// Why a camera cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,11 +79,13 @@ pub enum Error {
     WrongId {
         /// Its number.
         found: u16,
+        /// The camera whose address it has.
+        at: Identity,
     },
     /// A register does not hold the written value.
     Register {
         /// Its address.
-        address: u8,
+        address: u16,
         /// Its value.
         found: u16,
     },
@@ -79,16 +99,22 @@ impl From<i2c::Error> for Error {
 
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let name = IDENTITY.name;
         match self {
-            Error::Bus(error) => write!(f, "no {name} on I2C1 ({error}); check its cable"),
-            Error::Other(other) => write!(
-                f,
-                "this is an {}, this firmware is for an {name}; flash that of {}",
-                other.name, other.feature
-            ),
-            Error::WrongId { found } => {
-                let [[a, b], [c, d]] = [*found, IDENTITY.number].map(u16::to_be_bytes);
+            Error::Bus(error) => {
+                let these = Names(" or ");
+                write!(f, "no {these} on I2C1 ({error}); check its cable")
+            }
+            Error::Other(other) => {
+                let (name, feature) = (other.name, other.feature);
+                let these = Names(", ");
+                write!(
+                    f,
+                    "this is an {name}; flash {feature}, as this is for: {these}"
+                )
+            }
+            Error::WrongId { found, at } => {
+                let [[a, b], [c, d]] = [*found, at.number].map(u16::to_be_bytes);
+                let name = at.name;
                 write!(
                     f,
                     "ID {a:02X} {b:02X}, an {name} has {c:02X} {d:02X}; fit that camera"
@@ -101,41 +127,59 @@ impl fmt::Display for Error {
     }
 }
 
-/// Checks whether the camera is the one that this firmware supports.
+/// The names of the cameras that this firmware supports, with this text between them.
+struct Names(&'static str);
+
+impl fmt::Display for Names {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        for (i, identity) in FITTING.iter().enumerate() {
+            let between = if i == 0 { "" } else { self.0 };
+            write!(f, "{between}{}", identity.name)?;
+        }
+        Ok(())
+    }
+}
+
+/// Finds out which of the cameras that this firmware supports is there: its index in [`FITTING`].
 ///
 /// # Errors
 /// The camera or the fault that was found instead.
-pub fn check(bus: &mut Bus) -> Result<(), Error> {
-    let found = id(bus);
-    if found == Ok(IDENTITY.number) {
-        return Ok(());
+pub fn find(bus: &mut Bus) -> Result<usize, Error> {
+    let mut wrong = Error::Bus(i2c::Error::Nack);
+    for (index, identity) in FITTING.iter().enumerate() {
+        match identity.ask(bus) {
+            Ok(found) if found == identity.number => return Ok(index),
+            Ok(found) => {
+                let at = *identity;
+                wrong = Error::WrongId { found, at };
+            }
+            // Nothing has this address.
+            Err(i2c::Error::Nack) => {}
+            // The bus does not work at all; other cameras are not tried.
+            Err(error) => return Err(Error::Bus(error)),
+        }
     }
-    let mut others = KNOWN.into_iter().filter(|other| *other != IDENTITY);
-    // If the bus does not work at all, other cameras are not tried.
-    let works = !matches!(found, Err(error) if error != i2c::Error::Nack);
-    if works && let Some(other) = others.find(|other| other.ask(bus) == Ok(other.number)) {
-        return Err(Error::Other(other));
+    let mut others = KNOWN
+        .into_iter()
+        .filter(|other| !FITTING.iter().any(|fitting| fitting == other));
+    match others.find(|other| other.ask(bus) == Ok(other.number)) {
+        Some(other) => Err(Error::Other(other)),
+        None => Err(wrong),
     }
-    Err(match found {
-        Ok(found) => Error::WrongId { found },
-        Err(error) => Error::Bus(error),
-    })
-}
-
-/// Reads the identification number of the camera in use.
-pub fn id(bus: &mut Bus) -> Result<u16, i2c::Error> {
-    IDENTITY.ask(bus)
 }
 
 impl Identity {
     /// Reads the number at this camera's address.
-    fn ask(&self, bus: &mut Bus) -> Result<u16, i2c::Error> {
+    ///
+    /// # Errors
+    /// Nothing has that address, or the bus does not work.
+    pub fn ask(&self, bus: &mut Bus) -> Result<u16, i2c::Error> {
         match self.told {
             Told::InBytes([high, low]) => Ok(u16::from_be_bytes([
-                bus.read_byte(self.address, high)?,
-                bus.read_byte(self.address, low)?,
+                bus.read_byte(self.device, high)?,
+                bus.read_byte(self.device, low)?,
             ])),
-            Told::InWord(register) => bus.read_word(self.address, register),
+            Told::InWord(register) => bus.read_word(self.device, register),
         }
     }
 }

@@ -1,12 +1,12 @@
-//! Selects the camera in use: that of the board. Each camera is one file, and one with its
-//! registers, with the same names.
+//! Selects the cameras that may be in use: those of the board. The driver of each board's cameras
+//! has the same names.
 
 mod bus;
 mod free_bus;
 mod identity;
 mod lines;
 mod registers;
-pub use bus::{BUS_CLOCK, Bus};
+pub use bus::{BUS_CLOCK, Bus, Device};
 pub use identity::Error;
 pub use lines::CameraLines;
 pub use registers::{Comparison, Demand};
@@ -19,11 +19,17 @@ mod mt9v034_registers;
 pub use {mt9v034::*, mt9v034_registers::Format};
 
 #[cfg(feature = "board-weact")]
+mod omnivision;
+#[cfg(feature = "board-weact")]
+mod ov5640;
+#[cfg(feature = "board-weact")]
+mod ov5640_registers;
+#[cfg(feature = "board-weact")]
 mod ov7725;
 #[cfg(feature = "board-weact")]
 mod ov7725_registers;
 #[cfg(feature = "board-weact")]
-pub use {ov7725::*, ov7725_registers::Format};
+pub use omnivision::*;
 
 use crate::{stats, vsync};
 use core::cell::Cell;
@@ -31,7 +37,7 @@ use core::sync::atomic::{AtomicI32, Ordering};
 use embassy_sync::blocking_mutex::CriticalSectionMutex;
 use embassy_time::{Duration, Instant};
 use hivtac_portable::capture::Edge;
-use hivtac_terms::camera::{CameraSettings, Rate};
+use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate};
 use hivtac_terms::geometry::Geometry;
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::health::Problem;
@@ -53,7 +59,7 @@ static CAMERA: CriticalSectionMutex<Cell<CameraReport>> =
         },
         exposure: Microseconds(0),
         gain: Sixteenths(0),
-        limits: LIMITS,
+        limits: FACTS.limits,
     }));
 
 /// Lens, frame and markers of the sensor with this camera.
@@ -63,9 +69,14 @@ pub const GEOMETRY: Geometry = Geometry::preset(PRESET, WIDTH, HEIGHT);
 /// sixteenth every fourth frame needs a second of it for a picture 13 times too dark.
 const PATIENCE: Duration = Duration::from_millis(1_500);
 
+/// Returns the limits of the settings of the camera that answered last.
+pub fn limits() -> CameraLimits {
+    fitted().limits
+}
+
 /// Time from frame to frame.
 pub fn frame_time(rate: Rate) -> Duration {
-    Duration::from_micros(frame_us(rate).into())
+    Duration::from_micros((fitted().frame_us)(rate).into())
 }
 
 /// The frame time by the device's own clock, from the last two frames that were looked at.
@@ -178,7 +189,7 @@ pub fn tell(settings: CameraSettings) {
 /// Reports the camera's settings, and the time of the exposure's middle in a frame with them.
 fn store(middle_us: i32, settings: CameraSettings, exposure: Microseconds, gain: Sixteenths) {
     EXPOSURE_MIDDLE_US.store(middle_us, Ordering::Relaxed);
-    let limits = LIMITS;
+    let limits = limits();
     let report = CameraReport {
         settings,
         exposure,

@@ -10,16 +10,17 @@ use super::registers::{Demand, Registers};
 use super::{Bus, CameraLines, Error, Pace, Search, Setting, frame_time, problems, store};
 use crate::log;
 use embassy_time::{Duration, Timer};
-pub use hivtac_portable::device::camera::mt9v034::{
-    HEIGHT, LIMITS, MOTION, NAME, PIXELS, PRESET, WIDTH, XCLK_HZ, frame_us,
-};
+use hivtac_portable::device::camera::Facts;
+pub use hivtac_portable::device::camera::mt9v034::{FACTS, HEIGHT, PIXELS, PRESET, WIDTH, XCLK_HZ};
 use hivtac_portable::device::camera::mt9v034::{longest_exposure, middle_us, rows_in, rows_us};
 use hivtac_terms::camera::{CameraSettings, LEAST_GAIN};
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::message::LogLevel;
 
 /// Its identification.
-pub const IDENTITY: Identity = identity::MT9V034;
+const IDENTITY: Identity = identity::MT9V034;
+/// The cameras that this firmware supports.
+pub const FITTING: &[Identity] = &[IDENTITY];
 /// Its pixel format.
 pub const USUAL_FORMAT: Format = Format::Mono;
 /// PIXCLK edge on which data is stable. While columns are binned, data change with PIXCLK's rising
@@ -35,6 +36,12 @@ const SETTLE: Duration = Duration::from_millis(20);
 /// Number of successive frames with equal exposure and gain that count as steady. The camera's
 /// control updates at every third frame.
 const STEADY_FRAMES: u32 = 9;
+
+/// The facts of the camera that is there.
+pub fn fitted() -> &'static Facts {
+    &FACTS
+}
+
 /// The camera's control side.
 pub struct Camera {
     registers: Registers,
@@ -43,7 +50,7 @@ pub struct Camera {
     /// The frame time during the newest search for exposure and gain.
     pub pace: Pace,
     /// The registers that keep gain and exposure.
-    locked: [(u8, u16); 3],
+    locked: [(u16, u16); 3],
     /// The newest search ended with exposure and gain that stay.
     well_exposed: bool,
 }
@@ -52,7 +59,7 @@ impl Camera {
     /// The bus must run at 100 kHz to 400 kHz, and XCLK must already run.
     pub fn new(bus: Bus, lines: CameraLines) -> Self {
         Self {
-            registers: Registers::new(bus, NEEDED),
+            registers: Registers::new(bus, &IDENTITY),
             lines,
             settings: CameraSettings::default(),
             pace: Pace::default(),
@@ -68,15 +75,15 @@ impl Camera {
     /// Wakes the camera, checks that it is the right one, and resets its registers. Until the next
     /// reset, registers must hold what was written as far as `demand` says.
     pub async fn reset(&mut self, demand: Demand) -> Result<(), Error> {
-        self.registers.begin(demand);
+        self.registers.begin(&IDENTITY, NEEDED, demand);
         self.lines.wake().await;
         Timer::after(SETTLE).await;
-        identity::check(&mut self.registers.bus)?;
+        identity::find(&mut self.registers.bus)?;
         self.registers.write(RESET, 1_u16)
     }
 
     /// Writes the register table after a reset, and applies `settings`, which must be within
-    /// [`LIMITS`](super::LIMITS). Returns when the camera sends well exposed frames.
+    /// [`limits`](super::limits). Returns when the camera sends well exposed frames.
     pub async fn configure(
         &mut self,
         _format: Format,
@@ -87,7 +94,7 @@ impl Camera {
         self.set(settings).await
     }
 
-    /// Applies `settings`, which must be within [`LIMITS`](super::LIMITS). Returns when the camera
+    /// Applies `settings`, which must be within [`limits`](super::limits). Returns when the camera
     /// sends well exposed frames.
     pub async fn set(&mut self, settings: CameraSettings) -> Result<(), Error> {
         self.settings = settings;
@@ -170,7 +177,7 @@ impl Camera {
         let tables = [table(), rows_for(self.settings.rate), &self.locked];
         let longest = longest_exposure(self.settings.rate);
         Ok(Setting {
-            id: identity::id(&mut self.registers.bus)?,
+            id: IDENTITY.ask(&mut self.registers.bus)?,
             comparison: self.registers.compare(&tables).await?,
             exposure: self.exposed(),
             longest_exposure: Microseconds(rows_us(longest)),

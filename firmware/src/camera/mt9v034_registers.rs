@@ -11,10 +11,10 @@ use hivtac_terms::camera::Rate;
 use hivtac_terms::threshold::PixelFormat;
 
 /// Bit 0 resets every register to its power-up value.
-pub const RESET: u8 = 0x0C;
+pub const RESET: u16 = 0x0C;
 /// Enables automatic exposure (bit 0) and gain (bit 1) for one of the sensor's contexts, and eight
 /// bits higher for the other one.
-pub const AEC_AGC_ENABLE: u8 = 0xAF;
+pub const AEC_AGC_ENABLE: u16 = 0xAF;
 /// [`AEC_AGC_ENABLE`]: exposure.
 pub const AUTOMATIC_EXPOSURE: u16 = 0x0101;
 /// [`AEC_AGC_ENABLE`]: gain.
@@ -22,11 +22,11 @@ pub const AUTOMATIC_GAIN: u16 = 0x0202;
 /// [`AEC_AGC_ENABLE`]: neither.
 pub const LOCKED: u16 = 0x0000;
 /// Exposure in rows, if it is not automatic.
-pub const SHUTTER_WIDTH: u8 = 0x0B;
+pub const SHUTTER_WIDTH: u16 = 0x0B;
 /// Analog gain in sixteenths, 16 to 64, if it is not automatic. Bit 15, an attenuation, is clear.
-pub const ANALOG_GAIN: u8 = 0x35;
+pub const ANALOG_GAIN: u16 = 0x35;
 /// The values of the automatic control: gain, as in [`ANALOG_GAIN`]; exposure in rows.
-pub const FOUND: [u8; 2] = [0xBA, 0xBB];
+pub const FOUND: [u16; 2] = [0xBA, 0xBB];
 /// Columns and rows of the array that are binned to one pixel.
 const BINNING: u16 = 2;
 /// Size of the array, and the number of its first column and row.
@@ -39,7 +39,7 @@ const LEAST_BLANKING: u16 = 71;
 
 /// Registers, and their bits, without which no frame can be read: size, blanking, mode, binning and
 /// signals.
-pub const NEEDED: &[(u8, u16)] = &[
+pub const NEEDED: &[(u16, u16)] = &[
     (0x03, 0xFFFF),
     (0x04, 0xFFFF),
     (0x05, 0xFFFF),
@@ -50,7 +50,7 @@ pub const NEEDED: &[(u8, u16)] = &[
 ];
 
 /// Registers for the frame rate and the longest exposure, in addition to [`table`].
-pub const fn rows_for(rate: Rate) -> &'static [(u8, u16)] {
+pub const fn rows_for(rate: Rate) -> &'static [(u16, u16)] {
     match rate {
         Rate::Full => const { &rows_registers(Rate::Full) },
         Rate::Half => const { &rows_registers(Rate::Half) },
@@ -58,7 +58,7 @@ pub const fn rows_for(rate: Rate) -> &'static [(u8, u16)] {
     }
 }
 
-const fn rows_registers(rate: Rate) -> [(u8, u16); 3] {
+const fn rows_registers(rate: Rate) -> [(u16, u16); 3] {
     let longest = longest_exposure(rate);
     // A longer exposure would lengthen the frame.
     assert!(longest + 2 <= HEIGHT + blank_rows(rate));
@@ -100,7 +100,7 @@ impl Format {
 const READ_MODE: u16 = 0x0305;
 
 /// Register, value: written in this order after a reset, and read back.
-pub fn table() -> &'static [(u8, u16)] {
+pub fn table() -> &'static [(u16, u16)] {
     if seeded_bugs::camera_register() {
         const { &with_read_mode(0x0300) }
     } else {
@@ -108,7 +108,7 @@ pub fn table() -> &'static [(u8, u16)] {
     }
 }
 
-const fn with_read_mode(read_mode: u16) -> [(u8, u16); 20] {
+const fn with_read_mode(read_mode: u16) -> [(u16, u16); 20] {
     [
         // Reserved registers, with the values that the data sheet recommends (Rev. G, table 8).
         (0x13, 0x2D2E),

@@ -3,13 +3,14 @@
 //!
 //! Numbers and names: OV7725 data sheet 1.31, table 17. Application note: OV7725 1.04.
 
+use super::omnivision::{Format, RESTS, Values};
+use super::registers::few;
 use crate::seeded_bugs;
-use core::ops::RangeInclusive;
 use hivtac_terms::camera::{Rate, White};
-use hivtac_terms::threshold::PixelFormat;
+use hivtac_terms::units::Sixteenths;
 
 /// Output format, size and register reset.
-pub const COM7: u8 = 0x12;
+pub const COM7: u16 = 0x12;
 /// [`COM7`]: resets every register to its power-up value.
 pub const COM7_RESET: u8 = 0x80;
 
@@ -18,55 +19,24 @@ const COM7_QVGA_RGB565: u8 = 0x46;
 /// [`COM7`]: QVGA, YUV.
 const COM7_QVGA_YUV: u8 = 0x40;
 /// Byte order; mirror, flip and colour bars, which stay off.
-const COM3: u8 = 0x0C;
+const COM3: u16 = 0x0C;
 /// [`COM3`]: luma before chroma in YUV, as after a reset. Without this bit chroma comes first.
 const COM3_LUMA_FIRST: u8 = 0x10;
 
-/// The pixel formats that the sensing supports and this camera sends. Mono is not among them: its
-/// luma would have to be extracted from YUV422, and in white light red markers are hardly darker
-/// than the film.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// RGB565.
-    Rgb565,
-    /// YUV422, in the order Y0 Cb Y1 Cr.
-    Yuv422,
-}
-
-impl Format {
-    /// Returns the format with these pixels; `None` if the camera does not send them.
-    pub const fn of(pixels: PixelFormat) -> Option<Format> {
-        match pixels {
-            PixelFormat::Rgb565 => Some(Format::Rgb565),
-            PixelFormat::Yuv422 => Some(Format::Yuv422),
-            PixelFormat::Mono => None,
-        }
-    }
-
-    /// The format's pixels.
-    pub const fn pixels(self) -> PixelFormat {
-        match self {
-            Format::Rgb565 => PixelFormat::Rgb565,
-            Format::Yuv422 => PixelFormat::Yuv422,
-        }
-    }
-
-    /// Registers and values that select this format. All other registers are the same for all
-    /// formats.
-    pub fn registers(self) -> &'static [(u8, u8)] {
-        match self {
-            _ if seeded_bugs::camera_register() => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
-            // The high byte of each pixel comes first. The pipeline's threshold table swaps the
-            // bytes back.
-            Format::Rgb565 => &[(COM7, COM7_QVGA_RGB565), (COM3, 0)],
-            // Cb before Cr, as DSP_CTRL3 (0x66) is set.
-            Format::Yuv422 => &[(COM7, COM7_QVGA_YUV), (COM3, COM3_LUMA_FIRST)],
-        }
+/// Registers and values that select a format. All other registers are the same for all formats.
+pub fn format(format: Format) -> &'static [(u16, u8)] {
+    match format {
+        _ if seeded_bugs::camera_register() => &[(COM7, COM7_QVGA_YUV), (COM3, 0)],
+        // The high byte of each pixel comes first. The pipeline's threshold table swaps the bytes
+        // back.
+        Format::Rgb565 => &[(COM7, COM7_QVGA_RGB565), (COM3, 0)],
+        // Cb before Cr, as DSP_CTRL3 (0x66) is set.
+        Format::Yuv422 => &[(COM7, COM7_QVGA_YUV), (COM3, COM3_LUMA_FIRST)],
     }
 }
 
 /// Automatic control: [`LOCKED`] plus the bits of the automatic values.
-pub const COM8: u8 = 0x13;
+pub const COM8: u16 = 0x13;
 /// [`COM8`]: no automatic control, so exposure and gain stay. With automatic bits added, it is fast
 /// and resolves parts of a line. White balance is off: it would shift the threshold's hue with the
 /// scene. The banding filter is off: the light is DC.
@@ -76,23 +46,20 @@ pub const AUTOMATIC_EXPOSURE: u8 = 0x01;
 /// [`COM8`]: gain.
 pub const AUTOMATIC_GAIN: u8 = 0x04;
 /// Gain, and exposure in lines, low and high byte: the values of the automatic control.
-pub const EXPOSURE: [u8; 3] = [0x00, 0x10, 0x08];
+pub const EXPOSURE: [u16; 3] = [0x00, 0x10, 0x08];
 
 /// Registers for the gains with which white is white: blue, red.
-pub const fn white(White { red, blue }: White) -> [(u8, u8); 2] {
-    [(0x01, blue), (0x02, red)]
+pub fn white(White { red, blue }: White) -> Values {
+    few([(0x01, blue), (0x02, red)])
 }
 
 /// Mean level of the newest frame, as the automatic control sees it.
-pub const LEVEL: u8 = 0x2F;
-/// The levels between which the automatic control rests, as in OpenMV's table: a white film is
-/// bright but not saturated.
-pub const RESTS: RangeInclusive<u8> = 0x64..=0x96;
-/// The largest automatic gain.
-pub const MOST_AUTOMATIC_GAIN: u8 = 0x1F;
+pub const LEVEL: u16 = 0x2F;
+/// The largest automatic gain, register value 0x1F.
+pub const MOST_AUTOMATIC_GAIN: Sixteenths = Sixteenths(62);
 
 /// Registers for the frame rate, in addition to [`TABLE`].
-pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
+pub const fn clock(rate: Rate) -> &'static [(u16, u8)] {
     match rate {
         // No prescaler: PCLK = XCLK · 4 = 50 MHz.
         Rate::Full => &[(CLKRC, 0xC0)],
@@ -102,11 +69,11 @@ pub const fn clock(rate: Rate) -> &'static [(u8, u8)] {
         Rate::Quarter => &[(CLKRC, 0x81)],
     }
 }
-const CLKRC: u8 = 0x11;
+const CLKRC: u16 = 0x11;
 
 /// Registers, and their bits, without which no frame can be read: format, byte order, clocks,
 /// signals and size.
-pub const NEEDED: &[(u8, u16)] = &[
+pub const NEEDED: &[(u16, u16)] = &[
     (COM7, 0xFF),
     (COM3, 0xFF),
     (0x0D, 0xC0),
@@ -121,7 +88,7 @@ pub const NEEDED: &[(u8, u16)] = &[
 /// Registers and values, written in this order after a reset and a [`Format`]'s registers, and read
 /// back. It has every register that affects the picture and whose value after a reset differs
 /// between OmniVision's data sheets and the drivers of Linux and OpenMV.
-pub const TABLE: &[(u8, u8)] = &[
+pub const TABLE: &[(u16, u8)] = &[
     // COM4: PLL × 4; exposure is judged on the whole frame.
     (0x0D, 0x41),
     // COM5: no automatic frame rate, because dim light must not change the time between frames.

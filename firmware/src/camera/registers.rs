@@ -1,6 +1,7 @@
 //! Writes, reads back and compares tables of a camera's registers.
 
-use super::{Bus, Error, IDENTITY};
+use super::identity::Identity;
+use super::{Bus, Device, Error};
 use crate::log;
 use embassy_stm32::i2c;
 use embassy_time::{Duration, Timer};
@@ -16,33 +17,44 @@ const PAUSE_WHILE_CAPTURING: Duration = Duration::from_millis(5);
 /// A register's value, and how it is transferred.
 pub trait Value: Copy + PartialEq + Into<u16> {
     /// Writes it to a device's register.
-    fn write(self, bus: &mut Bus, device: u8, register: u8) -> Result<(), i2c::Error>;
+    fn write(self, bus: &mut Bus, device: Device, register: u16) -> Result<(), i2c::Error>;
     /// Reads a device's register.
-    fn read(bus: &mut Bus, device: u8, register: u8) -> Result<Self, i2c::Error>;
+    fn read(bus: &mut Bus, device: Device, register: u16) -> Result<Self, i2c::Error>;
 }
 
 impl Value for u8 {
-    fn write(self, bus: &mut Bus, device: u8, register: u8) -> Result<(), i2c::Error> {
+    fn write(self, bus: &mut Bus, device: Device, register: u16) -> Result<(), i2c::Error> {
         bus.write_byte(device, register, self)
     }
 
-    fn read(bus: &mut Bus, device: u8, register: u8) -> Result<Self, i2c::Error> {
+    fn read(bus: &mut Bus, device: Device, register: u16) -> Result<Self, i2c::Error> {
         bus.read_byte(device, register)
     }
 }
 
 impl Value for u16 {
-    fn write(self, bus: &mut Bus, device: u8, register: u8) -> Result<(), i2c::Error> {
+    fn write(self, bus: &mut Bus, device: Device, register: u16) -> Result<(), i2c::Error> {
         bus.write_word(device, register, self)
     }
 
-    fn read(bus: &mut Bus, device: u8, register: u8) -> Result<Self, i2c::Error> {
+    fn read(bus: &mut Bus, device: Device, register: u16) -> Result<Self, i2c::Error> {
         bus.read_word(device, register)
     }
 }
 
 /// Registers and the values that are written to them, in this order.
-pub type Table<V> = [(u8, V)];
+pub type Table<V> = [(u16, V)];
+
+/// Collects values; those for which there is no room are left out.
+pub fn few<T, const N: usize>(values: impl IntoIterator<Item = T>) -> Vec<T, N> {
+    let mut few = Vec::new();
+    for value in values {
+        if few.push(value).is_err() {
+            break;
+        }
+    }
+    few
+}
 
 /// Which registers must hold what was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -58,26 +70,29 @@ pub enum Demand {
 pub struct Registers {
     /// The bus to the camera.
     pub bus: Bus,
+    device: Device,
     /// Registers, and their bits without which no frame can be read.
-    needed: &'static [(u8, u16)],
+    needed: &'static Table<u16>,
     demand: Demand,
     differ: bool,
 }
 
 impl Registers {
-    /// Demands all registers. `needed` has those, with their bits, without which no frame can be
-    /// read.
-    pub fn new(bus: Bus, needed: &'static [(u8, u16)]) -> Self {
+    /// Demands all registers.
+    pub fn new(bus: Bus, of: &Identity) -> Self {
         Self {
             bus,
-            needed,
+            device: of.device,
+            needed: &[],
             demand: Demand::All,
             differ: false,
         }
     }
 
-    /// Begins a set-up of the camera.
-    pub fn begin(&mut self, demand: Demand) {
+    /// Begins a set-up of this camera. `needed` has the registers, with their bits, without which
+    /// no frame can be read.
+    pub fn begin(&mut self, of: &Identity, needed: &'static Table<u16>, demand: Demand) {
+        (self.device, self.needed) = (of.device, needed);
         (self.demand, self.differ) = (demand, false);
     }
 
@@ -87,13 +102,13 @@ impl Registers {
     }
 
     /// Writes one register.
-    pub fn write(&mut self, register: u8, value: impl Value) -> Result<(), Error> {
-        Ok(value.write(&mut self.bus, IDENTITY.address, register)?)
+    pub fn write(&mut self, register: u16, value: impl Value) -> Result<(), Error> {
+        Ok(value.write(&mut self.bus, self.device, register)?)
     }
 
     /// Reads one register.
-    pub fn read<V: Value>(&mut self, register: u8) -> Result<V, Error> {
-        Ok(V::read(&mut self.bus, IDENTITY.address, register)?)
+    pub fn read<V: Value>(&mut self, register: u16) -> Result<V, Error> {
+        Ok(V::read(&mut self.bus, self.device, register)?)
     }
 
     /// Writes a table.
@@ -122,7 +137,7 @@ impl Registers {
     }
 
     /// Judges a register that reads back otherwise than written.
-    fn judge(&mut self, address: u8, written: u16, found: u16) -> Result<(), Error> {
+    fn judge(&mut self, address: u16, written: u16, found: u16) -> Result<(), Error> {
         let mut needed = self.needed.iter();
         let needed = needed.find_map(|(register, bits)| (*register == address).then_some(*bits));
         let is_needed = (written ^ found) & needed.unwrap_or(0) != 0;
@@ -153,7 +168,7 @@ impl Registers {
     }
 }
 
-fn has<V>(table: &Table<V>, address: u8) -> bool {
+fn has<V>(table: &Table<V>, address: u16) -> bool {
     table.iter().any(|(register, _)| *register == address)
 }
 
@@ -167,15 +182,18 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    fn count<V: Value>(&mut self, address: u8, written: V, found: V) {
+    fn count<V: Value>(&mut self, address: u16, written: V, found: V) {
         self.registers = self.registers.saturating_add(1);
         if found != written {
+            let [high, address] = address.to_be_bytes();
+            // Registers with addresses of two bytes have values of one.
+            let told = |value: V| value.into() | u16::from(high) << 8;
             // Registers beyond the vector's capacity are not reported: the camera has then lost all
             // of them.
             let _ = self.different.push(DifferentRegister {
                 address,
-                written: written.into(),
-                found: found.into(),
+                written: told(written),
+                found: told(found),
             });
         }
     }

@@ -54,6 +54,24 @@ fn a_register_that_lost_its_value_is_named() {
 }
 
 #[test]
+fn a_register_of_an_ov5640_has_an_address_of_two_bytes() {
+    let mut lost = Inspection {
+        camera_id: 0x5640,
+        ..inspection()
+    };
+    let matrix = DifferentRegister {
+        address: 0x84,
+        written: 0x530A,
+        found: 0x5300,
+    };
+    lost.different.push(matrix).unwrap();
+    says(
+        &camera::judge(&lost, false),
+        &["register 5384 holds 00, 0a was written"],
+    );
+}
+
+#[test]
 fn light_that_asks_for_everything_the_camera_has_is_too_little() {
     let dim = Inspection {
         exposure_us: 6_382,

@@ -17,8 +17,8 @@ pub struct CameraSettings {
     pub gain: Option<Sixteenths>,
     /// Frame rate.
     pub rate: Rate,
-    /// Gains with which white is white; `None` for [`White::default`]. A camera without colours has
-    /// no use for them.
+    /// Gains with which white is white; `None` for the camera's usual ones, as
+    /// [`White::USUAL`]. A camera without colours has no use for them.
     pub white: Option<White>,
 }
 
@@ -35,14 +35,18 @@ pub struct White {
     pub blue: u8,
 }
 
+impl White {
+    /// Gains in the middle between OmniVision's presets of the OV7725 for sunlight (0x5C, 0x5A) and
+    /// for an office (0x4C, 0x84).
+    pub const USUAL: White = White {
+        red: 0x54,
+        blue: 0x6D,
+    };
+}
+
 impl Default for White {
-    /// Returns gains in the middle between OmniVision's presets for sunlight (0x5C, 0x5A) and for
-    /// an office (0x4C, 0x84).
     fn default() -> White {
-        White {
-            red: 0x54,
-            blue: 0x6D,
-        }
+        White::USUAL
     }
 }
 

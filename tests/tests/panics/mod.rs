@@ -64,7 +64,7 @@ const REASONS: [(&str, usize, &str); 19] = [
     ),
     (
         "hivtac_firmware6camera",
-        4,
+        5,
         "the camera's set-up and what it is set to: what has ended is not polled again; its bus's \
          pins are constants",
     ),

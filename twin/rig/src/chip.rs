@@ -14,7 +14,7 @@ use rigless::soc::{Bus, Error};
 use rigless::time::VirtualNanos;
 
 use crate::board::{self, Wiring};
-use crate::camera::{Sccb, SharedCamera, TwoWire, part};
+use crate::camera::{Sccb, SharedCamera, TwoWire, part, sccb};
 use crate::control_bus::{ControlBus, HeldBus};
 use crate::dma_requests;
 use crate::faults::{Faults, Kind};
@@ -158,7 +158,8 @@ impl Chip {
         let types = mpu.as_ref().map(|mpu| mpu.types().clone());
         let kind = camera.lock().kind();
         match kind {
-            part::Kind::Ov7725 => part.i2c[0].attach(Sccb::new(camera.clone())),
+            part::Kind::Ov7725 => part.i2c[0].attach(Sccb::new(camera.clone(), sccb::OV7725)),
+            part::Kind::Ov5640 => part.i2c[0].attach(Sccb::new(camera.clone(), sccb::OV5640)),
             part::Kind::Mt9v034 => part.i2c[0].attach(TwoWire::new(camera.clone())),
         };
         let core = SharedCore::new(faults.clone(), seed);

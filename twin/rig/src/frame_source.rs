@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::camera::part::Kind;
 use crate::truth::Exposed;
 use anyhow::{Context, bail};
-use hivtac_twin::{Format, Layout, Options, Preset, PresetCamera, Scene, Shutter};
+use hivtac_twin::{Format, Layout, OV5640_NOISE, Options, Preset, PresetCamera, Scene, Shutter};
 use serde_json::{Value, json};
 
 /// The coding of a picture's pixels.
@@ -97,7 +97,7 @@ struct Array {
 impl Array {
     fn of(camera: Kind) -> Self {
         match camera {
-            Kind::Ov7725 => Self {
+            Kind::Ov7725 | Kind::Ov5640 => Self {
                 preset: Preset::Ov7725,
                 size: (320, 240),
                 window: [0.0; 2],
@@ -161,8 +161,15 @@ impl SceneSource {
             None => array.preset,
         };
         let (width, height) = array.size;
-        let scene = Scene::preset(name, preset, width, height, seed);
-        Self::of(scene.context("--scene")?, array.window)
+        let mut scene = Scene::preset(name, preset, width, height, seed).context("--scene")?;
+        if camera == Kind::Ov5640 {
+            let options = Options {
+                noise: OV5640_NOISE,
+                ..scene.options().clone()
+            };
+            scene = scene.with_options(options).context("--scene")?;
+        }
+        Self::of(scene, array.window)
     }
 
     /// The same with other dots on the film.

@@ -19,6 +19,7 @@ mod looks;
 mod models;
 mod openmv;
 mod output;
+mod ov5640;
 mod rules;
 mod seeded_bugs;
 mod settings;

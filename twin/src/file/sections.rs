@@ -5,8 +5,9 @@ use serde::{Deserialize, Deserializer};
 
 use crate::film::{Dots, Layout};
 use crate::{
-    Catch, Drag, Format, Grasp, JPEG_QUALITY, Lens, Load, Mechanics, Motion, Mounting, Options,
-    Paint, Patch, Preset, PresetCamera, Press, Salt, Scene, SceneError, Shutter, Specks, Vibration,
+    Catch, Drag, Format, Grasp, JPEG_QUALITY, Lens, Load, Mechanics, Motion, Mounting,
+    OV5640_NOISE, Options, Paint, Patch, Preset, PresetCamera, Press, Salt, Scene, SceneError,
+    Shutter, Specks, Vibration,
 };
 
 /// A whole file.
@@ -30,21 +31,45 @@ pub(super) struct SceneFile {
 #[serde(default, deny_unknown_fields)]
 struct CameraSection {
     #[serde(deserialize_with = "preset")]
-    preset: Preset,
+    preset: Named,
     width: Option<u32>,
     height: Option<u32>,
     format: Option<FormatName>,
     jpeg_quality: Option<u8>,
 }
 
+/// A camera by its name: its geometry, and the noise of its picture.
+#[derive(Clone, Copy, Debug)]
+struct Named {
+    preset: Preset,
+    noise: f64,
+}
+
+/// The camera with the OV7725's geometry, and noise of its own.
+const OV5640: &str = "ov5640";
+
+impl From<Preset> for Named {
+    fn from(preset: Preset) -> Named {
+        let noise = Options::of(preset).noise;
+        Named { preset, noise }
+    }
+}
+
 /// Reads a preset by its name.
-fn preset<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Preset, D::Error> {
+fn preset<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Named, D::Error> {
     const NAMES: &[&str] = &{
         let [first, second, third] = Preset::ALL;
-        [first.name(), second.name(), third.name()]
+        [first.name(), second.name(), third.name(), OV5640]
     };
     let name = String::deserialize(deserializer)?;
-    Preset::from_name(&name).ok_or_else(|| D::Error::unknown_variant(&name, NAMES))
+    if name == OV5640 {
+        return Ok(Named {
+            preset: Preset::Ov7725,
+            noise: OV5640_NOISE,
+        });
+    }
+    let preset = Preset::from_name(&name);
+    (preset.map(Named::from)).ok_or_else(|| D::Error::unknown_variant(&name, NAMES))
 }
 
 #[derive(Clone, Copy, Debug, Deserialize)]
@@ -70,7 +95,7 @@ struct LightSection {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 struct NoiseSection {
-    noise: f64,
+    noise: Option<f64>,
     texture: f64,
     salt: f64,
     salt_paint: Paint,
@@ -127,7 +152,7 @@ struct ConstantSection {
 impl SceneFile {
     pub(super) fn scene(&self) -> Result<Scene, SceneError> {
         let [width, height] = self.camera.size();
-        Scene::preset("rest", self.camera.preset, width, height, self.seed)?
+        Scene::preset("rest", self.camera.preset.preset, width, height, self.seed)?
             .with_options(self.options()?)?
             .with_motion(self.load.motion(self.seed)?)
     }
@@ -149,9 +174,9 @@ impl SceneFile {
             haze,
             white_balance,
             mono,
-            markers: (self.marks.paint).unwrap_or(self.camera.preset.usual_markers()),
+            markers: (self.marks.paint).unwrap_or(self.camera.preset.preset.usual_markers()),
             texture: self.noise.texture,
-            noise: self.noise.noise,
+            noise: self.noise.noise.unwrap_or(self.camera.preset.noise),
             salt: Salt {
                 fraction: self.noise.salt,
                 paint: self.noise.salt_paint,
@@ -176,13 +201,13 @@ impl SceneFile {
 impl CameraSection {
     /// Returns columns and rows.
     fn size(&self) -> [u32; 2] {
-        let [width, height] = self.preset.usual_size();
+        let [width, height] = self.preset.preset.usual_size();
         [self.width.unwrap_or(width), self.height.unwrap_or(height)]
     }
 
     fn format(&self) -> Result<Format, SceneError> {
         let format = match self.format {
-            None => self.preset.usual_format(),
+            None => self.preset.preset.usual_format(),
             Some(FormatName::Rgb565) => Format::Rgb565,
             Some(FormatName::Yuv422) => Format::Yuv422,
             Some(FormatName::Mono) => Format::Mono,
@@ -273,7 +298,7 @@ impl ConstantSection {
 impl Default for CameraSection {
     fn default() -> CameraSection {
         CameraSection {
-            preset: Preset::Ov7725,
+            preset: Preset::Ov7725.into(),
             width: None,
             height: None,
             format: None,
@@ -300,7 +325,7 @@ impl Default for NoiseSection {
     fn default() -> NoiseSection {
         let usual = Options::default();
         NoiseSection {
-            noise: usual.noise,
+            noise: None,
             texture: usual.texture,
             salt: usual.salt.fraction,
             salt_paint: usual.salt.paint,

@@ -1,4 +1,4 @@
-//! The effect of the OV7725's registers on brightness and colours.
+//! The effect of an OV7725's registers on brightness and colours, and of an OV5640's.
 //!
 //! The scene's pixels are those of the sensor with gains that make its light white, the colour
 //! matrix of OmniVision's application note, levels in proportion to light, well exposed. Other
@@ -74,6 +74,34 @@ impl Colour {
             linear: product(&inverse(&BT601), &scaled),
             brightness,
             curve: (control & GAMMA != 0).then(|| curve(registers)),
+        }
+    }
+
+    /// Returns the map of an OV5640 with `matrix`, whose rows give luma, Cb and Cr in any unit, for
+    /// scenes that are meant for `reference`. `gains` are those of red, green and blue over the
+    /// ones that make white light white and well exposed; `gamma` is the exponent of a curve.
+    pub fn between(
+        reference: &[f64; 9],
+        matrix: &[f64; 9],
+        gains: [f64; 3],
+        gamma: Option<f64>,
+    ) -> Self {
+        let rows =
+            |all: &[f64; 9]| std::array::from_fn(|i| std::array::from_fn(|j| all[3 * i + j]));
+        let reference: Matrix = rows(reference);
+        let mut raw = product(&inverse(&reference), &BT601);
+        for (row, gain) in raw.iter_mut().zip(gains) {
+            *row = row.map(|term| term * gain);
+        }
+        let seen = product(&rows(matrix), &raw);
+        let curved = |gamma: f64| {
+            let level = |level: u8| byte(255.0 * (f64::from(level) / 255.0).powf(gamma));
+            (0..=255).map(level).collect()
+        };
+        Self {
+            linear: product(&inverse(&BT601), &seen),
+            brightness: 0.0,
+            curve: gamma.map(curved),
         }
     }
 

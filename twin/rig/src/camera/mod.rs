@@ -1,4 +1,4 @@
-//! The camera, an OV7725 or an MT9V034: registers on its control bus, a clock from the
+//! The camera, an OV7725, an OV5640 or an MT9V034: registers on its control bus, a clock from the
 //! microcontroller, and pixels that its registers describe.
 //!
 //! The sensor runs by itself. It never waits for the firmware, and its registers, power-up values
@@ -10,7 +10,7 @@
 //! reset value differs between sources gets another value for each seed. It breaks a rule to
 //! capture a frame that depends on such a register before it was written. Not simulated: the zoom
 //! registers (the window is scaled to the output size by taking the nearest pixel), automatic frame
-//! rate, automatic white balance. MT9V034: `mt9v034`.
+//! rate, automatic white balance. MT9V034: `mt9v034`; OV5640: `ov5640`.
 
 pub mod colour;
 pub mod encode;
@@ -18,10 +18,12 @@ mod exposure;
 pub mod mt9v034;
 pub mod mt9v034_registers;
 pub mod output;
+mod ov5640;
+pub mod ov5640_registers;
 mod ov7725;
 pub mod part;
 pub mod registers;
-mod sccb;
+pub mod sccb;
 mod two_wire;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -32,6 +34,7 @@ use crate::rules::Rules;
 use crate::truth::{Exposed, TruthLog};
 use mt9v034::Mt9v034;
 use output::Output;
+use ov5640::Ov5640;
 use ov7725::Ov7725;
 use part::Part;
 pub use sccb::Sccb;
@@ -108,6 +111,7 @@ impl Camera {
             part: match kind {
                 part::Kind::Ov7725 => Box::new(Ov7725::new(seed, used, hesitant)),
                 part::Kind::Mt9v034 => Box::new(Mt9v034::new(used, hesitant)),
+                part::Kind::Ov5640 => Box::new(Ov5640::new(seed, used, hesitant)),
             },
             rules,
             supply: Supply::default(),
@@ -271,19 +275,22 @@ impl Camera {
             && !self.faults.on(Kind::CameraAbsent, now_ns)
     }
 
-    fn read_register(&self, address: u8, now_ns: u64) -> u16 {
+    fn read_register(&self, address: u16, now_ns: u64) -> u16 {
         match self.faults.on(Kind::CameraWrongId, now_ns) {
             true => self.part.read_as_another(address),
             false => self.part.read(address),
         }
     }
 
-    fn write_register(&mut self, address: u8, value: u16) {
+    fn write_register(&mut self, address: u16, value: u16) {
         self.sccb_writes += 1;
+        let sent = self.part.output(self.supply.clock_hz).is_some();
         if self.part.write(address, value) {
             self.restarted = true;
             self.count_begins |= !self.counting;
         }
+        // A sensor that begins to send begins with a frame.
+        self.restarted |= !sent && self.part.output(self.supply.clock_hz).is_some();
     }
 }
 
@@ -316,17 +323,17 @@ mod tests {
         let mut camera = camera(&[]);
         camera.supply(SUPPLY);
         assert_eq!(camera.count_edge(1).frame, 0);
-        camera.write_register(registers::COM7, 0x80);
+        camera.write_register(registers::COM7.into(), 0x80);
         assert!(camera.restarts());
         camera.restart();
         assert!(!camera.restarts());
         assert_eq!(camera.count_edge(2).frame, 1);
-        camera.write_register(registers::COM7, 0x80);
+        camera.write_register(registers::COM7.into(), 0x80);
         camera.restart();
         let exposed = camera.count_edge(3);
         assert_eq!((exposed.frame, exposed.exposure), (2, 3));
         camera.host_reset();
-        camera.write_register(registers::COM7, 0x80);
+        camera.write_register(registers::COM7.into(), 0x80);
         camera.restart();
         assert_eq!(camera.count_edge(4).frame, 1);
     }
@@ -336,14 +343,14 @@ mod tests {
         let mut camera = camera(&[]);
         assert_eq!(camera.output(0), None);
         camera.supply(SUPPLY);
-        camera.write_register(registers::COM7, 0x46);
+        camera.write_register(registers::COM7.into(), 0x46);
         camera.supply(Supply {
             powered: false,
             ..SUPPLY
         });
         assert!(camera.output(0).is_none() && !camera.answers(0));
         camera.supply(SUPPLY);
-        assert_eq!(camera.read_register(registers::COM7, 0), 0x46);
+        assert_eq!(camera.read_register(registers::COM7.into(), 0), 0x46);
     }
 
     #[test]
@@ -366,7 +373,7 @@ mod tests {
         let mut camera = camera(&["camera-wrong-id@5"]);
         camera.supply(SUPPLY);
         let at = |ms: u64| ms * 1_000_000;
-        let ids = [0, 5].map(|ms| camera.read_register(registers::PID, at(ms)));
+        let ids = [0, 5].map(|ms| camera.read_register(registers::PID.into(), at(ms)));
         assert_eq!(ids, [0x77, 0x76]);
     }
 }

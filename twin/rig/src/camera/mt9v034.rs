@@ -237,6 +237,7 @@ impl Part for Mt9v034 {
         Some(Output {
             pixel_clock_hz: clock_hz / u64::from(columns),
             line_clocks: self.row_clocks() / columns,
+            row_lines: [1, 1],
             lines: (rows + blank_rows).max(exposure),
             vsync_lines: blank_rows,
             first_row: blank_rows,
@@ -297,19 +298,19 @@ impl Part for Mt9v034 {
         picture
     }
 
-    fn read(&self, address: u8) -> u16 {
-        self.registers.get(address)
+    fn read(&self, address: u16) -> u16 {
+        self.registers.get(address as u8)
     }
 
-    fn read_as_another(&self, address: u8) -> u16 {
-        match address {
+    fn read_as_another(&self, address: u16) -> u16 {
+        match address as u8 {
             reg::CHIP_VERSION => 0x1313,
-            address => self.read(address),
+            _ => self.read(address),
         }
     }
 
-    fn write(&mut self, address: u8, value: u16) -> bool {
-        let reset = self.registers.write(address, value);
+    fn write(&mut self, address: u16, value: u16) -> bool {
+        let reset = self.registers.write(address as u8, value);
         if reset {
             self.waited = 0;
         }
@@ -349,7 +350,7 @@ mod tests {
             (reg::MAX_GAIN, 64),
             (reg::AEC_AGC_ENABLE, 0x0303),
         ] {
-            assert!(!part.write(address, value));
+            assert!(!part.write(address.into(), value));
         }
         part
     }
@@ -366,8 +367,8 @@ mod tests {
     #[test]
     fn binned_and_cut_it_sends_more_than_230_frames_a_second() {
         let mut part = binned();
-        part.write(reg::AEC_AGC_ENABLE, 0);
-        part.write(reg::SHUTTER_WIDTH, 96);
+        part.write(reg::AEC_AGC_ENABLE.into(), 0);
+        part.write(reg::SHUTTER_WIDTH.into(), 96);
         let output = part.output(CLOCK_HZ).unwrap();
         assert_eq!((output.row_bytes, output.rows), (160, 152));
         assert_eq!(output.window.start, [108, 44]);
@@ -387,16 +388,16 @@ mod tests {
             (reg::ROW_START, 0, "window"),
         ] {
             let mut part = binned();
-            part.write(address, value);
+            part.write(address.into(), value);
             let output = part.output(CLOCK_HZ).unwrap();
             let fault = output.fault.unwrap_or_default();
             assert_eq!(output.rows, 0, "{address:02X}");
             assert!(fault.contains(word), "{address:02X}: {fault}");
         }
         let mut part = binned();
-        part.write(reg::WINDOW_WIDTH, 660);
-        part.write(reg::HORIZONTAL_BLANKING, 70);
-        part.write(reg::COLUMN_START, 1);
+        part.write(reg::WINDOW_WIDTH.into(), 660);
+        part.write(reg::HORIZONTAL_BLANKING.into(), 70);
+        part.write(reg::COLUMN_START.into(), 1);
         let fault = part.output(CLOCK_HZ).unwrap().fault.unwrap();
         assert!(fault.contains("71"), "{fault}");
     }
@@ -405,7 +406,7 @@ mod tests {
     fn too_few_blank_rows_darken_the_first_ones_and_too_few_clocks_tear_them() {
         let seen = |address: u8, value: u16| {
             let mut part = binned();
-            part.write(address, value);
+            part.write(address.into(), value);
             let mut picture = Picture {
                 width: 376,
                 height: 240,
@@ -431,7 +432,7 @@ mod tests {
         }
         for control in [0x0180, 0x0108] {
             let mut part = binned();
-            part.write(reg::CHIP_CONTROL, control);
+            part.write(reg::CHIP_CONTROL.into(), control);
             assert_eq!(part.output(CLOCK_HZ), None, "{control:04X}");
         }
     }
@@ -439,8 +440,8 @@ mod tests {
     #[test]
     fn a_long_exposure_lengthens_the_frame() {
         let mut part = binned();
-        part.write(reg::AEC_AGC_ENABLE, 0);
-        part.write(reg::SHUTTER_WIDTH, 300);
+        part.write(reg::AEC_AGC_ENABLE.into(), 0);
+        part.write(reg::SHUTTER_WIDTH.into(), 300);
         assert_eq!(part.output(CLOCK_HZ).unwrap().lines, 302);
     }
 
@@ -453,10 +454,10 @@ mod tests {
         }
         assert_eq!(part.output(CLOCK_HZ).unwrap().lines, 162);
         assert_eq!(part.light, 1.0);
-        let found = [reg::AEC_EXPOSURE, reg::AGC_GAIN].map(|address| part.read(address));
+        let found = [reg::AEC_EXPOSURE, reg::AGC_GAIN].map(|address| part.read(address.into()));
         assert!((70..=96).contains(&found[0]) && found[1] == 16, "{found:?}");
-        part.write(reg::AEC_AGC_ENABLE, 0);
-        part.write(reg::SHUTTER_WIDTH, 20);
+        part.write(reg::AEC_AGC_ENABLE.into(), 0);
+        part.write(reg::SHUTTER_WIDTH.into(), 20);
         let timing = part.expose(&output);
         assert!(part.light < 0.3, "{}", part.light);
         assert_eq!((timing.readout_ns, timing.ends_ns), (0, 0));

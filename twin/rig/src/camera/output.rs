@@ -62,6 +62,8 @@ pub struct Output {
     pub first_row: u32,
     /// Rows sent; 0 if the registers ask for something that the sensor cannot do.
     pub rows: u32,
+    /// Lines from row to row, as a fraction: a camera that scales sends fewer rows than it reads.
+    pub row_lines: [u32; 2],
     /// Bytes per row.
     pub row_bytes: u32,
     /// Format.
@@ -121,6 +123,7 @@ impl Output {
             vsync_lines: VSYNC_LINES,
             first_row: VSYNC_LINES + blank_before,
             rows: window.output[1],
+            row_lines: [1, 1],
             row_bytes: window.output[0] * clocks,
             format,
             window,
@@ -163,6 +166,14 @@ impl Output {
         }
         (registers.get(reg::COM10) & 0x40 != 0)
             .then(|| "HSYNC instead of HREF (COM10 bit 6) is not simulated".into())
+    }
+
+    /// Returns the row that is sent in a line of the frame; `None` in a blank line.
+    pub fn row_of(&self, line: u32) -> Option<u32> {
+        let [lines, rows] = self.row_lines;
+        let after = line.checked_sub(self.first_row)?;
+        let row = (after * rows).div_ceil(lines);
+        (row < self.rows && row * lines / rows == after).then_some(row)
     }
 
     /// Returns the pixel clocks of one frame.
@@ -276,6 +287,21 @@ mod tests {
         let output = Output::new(&registers, 24_000_000).unwrap();
         assert_eq!(output.rows, 0);
         assert!(output.fault.unwrap().contains("HSIZE"));
+    }
+
+    #[test]
+    fn rows_of_a_scaled_picture_come_in_some_of_the_lines() {
+        let output = Output {
+            first_row: 10,
+            rows: 4,
+            row_lines: [7, 4],
+            ..Output::new(&qvga_rgb565(), 24_000_000).unwrap()
+        };
+        let sent: Vec<_> = (0..20)
+            .filter(|&line| output.row_of(line).is_some())
+            .collect();
+        assert_eq!(sent, [10, 11, 13, 15]);
+        assert_eq!(output.row_of(15), Some(3));
     }
 
     #[test]

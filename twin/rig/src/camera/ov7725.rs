@@ -75,19 +75,19 @@ impl Part for Ov7725 {
         Colour::of(&self.registers, response, self.light).apply(picture)
     }
 
-    fn read(&self, address: u8) -> u16 {
-        self.registers.get(address).into()
+    fn read(&self, address: u16) -> u16 {
+        self.registers.get(address as u8).into()
     }
 
-    fn read_as_another(&self, address: u8) -> u16 {
-        match address {
+    fn read_as_another(&self, address: u16) -> u16 {
+        match address as u8 {
             registers::PID => 0x76,
-            address => self.read(address),
+            _ => self.read(address),
         }
     }
 
-    fn write(&mut self, address: u8, value: u16) -> bool {
-        let reset = self.registers.write(address, value as u8);
+    fn write(&mut self, address: u16, value: u16) -> bool {
+        let reset = self.registers.write(address as u8, value as u8);
         if reset {
             self.exposing = Exposure::of(&self.registers, self.hesitant);
         }

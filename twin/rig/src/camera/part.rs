@@ -20,13 +20,13 @@ pub trait Part: Debug + Send {
     fn picture(&self, source: &dyn FrameSource, exposed: Exposed, rules: &Rules) -> Picture;
 
     /// Returns the value of a register.
-    fn read(&self, address: u8) -> u16;
+    fn read(&self, address: u16) -> u16;
 
     /// Returns the answer of a different part from the same maker to a read of a register.
-    fn read_as_another(&self, address: u8) -> u16;
+    fn read_as_another(&self, address: u16) -> u16;
 
     /// Writes a register. Returns whether the write was a reset of all registers.
-    fn write(&mut self, address: u8, value: u16) -> bool;
+    fn write(&mut self, address: u16, value: u16) -> bool;
 
     /// Sets one register back to its value after a reset. It affects colours or levels, but no
     /// timing.
@@ -56,6 +56,8 @@ pub enum Kind {
     Ov7725,
     /// onsemi MT9V034, mono.
     Mt9v034,
+    /// OmniVision OV5640.
+    Ov5640,
 }
 
 impl Kind {
@@ -64,6 +66,7 @@ impl Kind {
         match self {
             Kind::Ov7725 => "ov7725",
             Kind::Mt9v034 => "mt9v034",
+            Kind::Ov5640 => "ov5640",
         }
     }
 }

@@ -314,7 +314,7 @@ pub(super) fn response(seed: u64) -> [f64; 3] {
 }
 
 /// Returns a value that depends only on the seed and the register's address.
-fn random(seed: u64, address: u8) -> u8 {
+pub(super) fn random(seed: u64, address: u8) -> u8 {
     let mut z = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ u64::from(address) << 32;
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);

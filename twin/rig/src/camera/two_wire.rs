@@ -60,7 +60,7 @@ impl Peer for TwoWire {
             Expects::High => Expects::Low(byte),
             Expects::Low(high) => {
                 let value = u16::from_be_bytes([high, byte]);
-                self.camera.lock().write_register(self.register, value);
+                (self.camera.lock()).write_register(self.register.into(), value);
                 self.register = self.register.wrapping_add(1);
                 Expects::High
             }
@@ -69,7 +69,7 @@ impl Peer for TwoWire {
     }
 
     fn read(&mut self, _last: bool, context: &mut Timeline<'_, '_>) -> u8 {
-        let value = (self.camera.lock()).read_register(self.register, context.now().0);
+        let value = (self.camera.lock()).read_register(self.register.into(), context.now().0);
         let [high, low] = value.to_be_bytes();
         if self.expects == Expects::High {
             self.expects = Expects::Low(high);

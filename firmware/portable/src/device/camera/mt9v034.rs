@@ -1,5 +1,6 @@
 //! onsemi (Aptina) MT9V034, mono, with a global shutter: 160 × 152 pixels, each 2 × 2 binned.
 
+use super::Facts;
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, Rate};
 use hivtac_terms::geometry::Preset;
@@ -62,6 +63,14 @@ pub const fn longest_exposure(rate: Rate) -> u16 {
         Rate::Quarter => 420,
     }
 }
+
+/// Its facts.
+pub const FACTS: Facts = Facts {
+    name: NAME,
+    limits: LIMITS,
+    motion: MOTION,
+    frame_us,
+};
 
 /// Time from frame to frame, µs: rows with data and blank ones.
 pub const fn frame_us(rate: Rate) -> u32 {

@@ -1,5 +1,6 @@
 //! OmniVision OV7725: 320 × 240, RGB565 or YUV422, rows exposed one after the other.
 
+use super::Facts;
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, Rate};
 use hivtac_terms::geometry::Preset;
@@ -50,6 +51,14 @@ pub const LIMITS: CameraLimits = super::limits(
     ],
 );
 
+/// Its facts.
+pub const FACTS: Facts = Facts {
+    name: NAME,
+    limits: LIMITS,
+    motion: MOTION,
+    frame_us,
+};
+
 /// Time from frame to frame, µs.
 pub const fn frame_us(rate: Rate) -> u32 {
     (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
@@ -65,9 +74,7 @@ const fn exposures(rate: Rate) -> [Microseconds; 2] {
 
 /// The number of lines nearest to a time, at least 1 and at most [`LONGEST_EXPOSURE`].
 pub fn lines(exposure: Microseconds, rate: Rate) -> u16 {
-    let frame_us = frame_us(rate);
-    let lines = (exposure.0.min(frame_us) * u32::from(LINES) + frame_us / 2) / frame_us.max(1);
-    (lines as u16).clamp(1, LONGEST_EXPOSURE)
+    super::lines_in(exposure, frame_us(rate), LINES).clamp(1, LONGEST_EXPOSURE)
 }
 
 /// The exposure of a row, of a number of lines.
@@ -78,6 +85,5 @@ pub const fn exposed(lines: u32, rate: Rate) -> Microseconds {
 /// Time from the VSYNC edge that begins a frame to the middle of its middle row's exposure of at
 /// most [`LINES`] lines, µs.
 pub const fn middle_us(lines: u32, rate: Rate) -> i32 {
-    let half_lines = 2 * LINES_TO_MIDDLE_ROW - lines;
-    (half_lines * frame_us(rate) / (2 * LINES as u32)) as i32
+    super::middle_us(LINES_TO_MIDDLE_ROW, lines, frame_us(rate), LINES)
 }

@@ -101,8 +101,7 @@ impl Frame {
     }
 
     fn row_of(&self, line: u32) -> Option<u32> {
-        line.checked_sub(self.output.first_row)
-            .filter(|&row| row < self.output.rows)
+        self.output.row_of(line)
     }
 
     /// Returns the bytes `from..to` of a run. The picture is made when the first row is needed.
