@@ -254,7 +254,7 @@ fn longest_camera_report() -> CameraReport {
 
 fn longest_inspection() -> Inspection {
     let register = DifferentRegister {
-        address: u8::MAX,
+        address: u16::MAX,
         written: u16::MAX,
         found: u16::MAX,
     };
@@ -580,7 +580,7 @@ fn any_model_part() -> impl Strategy<Value = ModelPart> {
 
 fn any_inspection() -> impl Strategy<Value = Inspection> {
     let register =
-        any::<(u8, u16, u16)>().prop_map(|(address, written, found)| DifferentRegister {
+        any::<(u16, u16, u16)>().prop_map(|(address, written, found)| DifferentRegister {
             address,
             written,
             found,

@@ -274,7 +274,7 @@ pub struct Inspection {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct DifferentRegister {
     /// Its address.
-    pub address: u8,
+    pub address: u16,
     /// The written value.
     pub written: u16,
     /// The value that was read.

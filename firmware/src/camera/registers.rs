@@ -185,15 +185,12 @@ impl Comparison {
     fn count<V: Value>(&mut self, address: u16, written: V, found: V) {
         self.registers = self.registers.saturating_add(1);
         if found != written {
-            let [high, address] = address.to_be_bytes();
-            // Registers with addresses of two bytes have values of one.
-            let told = |value: V| value.into() | u16::from(high) << 8;
             // Registers beyond the vector's capacity are not reported: the camera has then lost all
             // of them.
             let _ = self.different.push(DifferentRegister {
                 address,
-                written: told(written),
-                found: told(found),
+                written: written.into(),
+                found: found.into(),
             });
         }
     }

@@ -58,15 +58,10 @@ fn silent(refused: Option<String>, complaint: Option<String>) -> Step {
     Step::new("camera", found, wrong, Value::Null)
 }
 
-/// Number of the camera whose registers have addresses of two bytes. The upper one is that of both
-/// values.
-const OV5640: u16 = 0x5640;
-
 /// Judges an inspection. Registers that have differed from what was written since the camera's
 /// set-up are told, but not wrong.
 pub fn judge(it: &Inspection, since_set_up: bool) -> Step {
-    let named = |register| different(it.camera_id, register);
-    let different: Vec<_> = it.different.iter().map(named).collect();
+    let different: Vec<_> = it.different.iter().map(different).collect();
     let (own, mut wrong) = match since_set_up {
         true => (different, Vec::new()),
         false => (Vec::new(), different),
@@ -102,13 +97,9 @@ pub fn judge(it: &Inspection, since_set_up: bool) -> Step {
     Step::new("camera", found, wrong, json!(it))
 }
 
-fn different(camera_id: u16, register: &hivtac_wire::message::DifferentRegister) -> String {
+fn different(register: &hivtac_wire::message::DifferentRegister) -> String {
     let (address, found, written) = (register.address, register.found, register.written);
-    if camera_id != OV5640 {
-        return format!("register {address:02x} holds {found:02x}, {written:02x} was written");
-    }
-    let [[high, written], [_, found]] = [written, found].map(u16::to_be_bytes);
-    format!("register {high:02x}{address:02x} holds {found:02x}, {written:02x} was written")
+    format!("register {address:02x} holds {found:02x}, {written:02x} was written")
 }
 
 /// The letter of an STM32H743 revision.

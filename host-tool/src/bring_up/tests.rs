@@ -60,9 +60,9 @@ fn a_register_of_an_ov5640_has_an_address_of_two_bytes() {
         ..inspection()
     };
     let matrix = DifferentRegister {
-        address: 0x84,
-        written: 0x530A,
-        found: 0x5300,
+        address: 0x5384,
+        written: 0x0A,
+        found: 0,
     };
     lost.different.push(matrix).unwrap();
     says(
