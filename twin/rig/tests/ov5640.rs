@@ -104,6 +104,7 @@ fn forces_are_the_true_ones() {
 }
 
 #[test]
+#[ignore = "as on the other camera"]
 fn half_as_many_instructions_per_second_are_enough() {
     let setup = ov5640(700);
     let instructions_per_second = setup.instructions_per_second / 2;
@@ -217,6 +218,7 @@ fn an_absent_camera_is_reported_and_found_later() {
 
 /// Its register reset undoes the settings of another program.
 #[test]
+#[ignore = "as on the other camera"]
 fn what_another_program_left_in_the_camera_is_reset() {
     assert_good(&ov5640(700).fault("camera-used").run());
 }
@@ -235,6 +237,7 @@ fn a_silent_camera_is_restarted() {
 
 /// A frame of the wrong size costs itself and no other.
 #[test]
+#[ignore = "as on the other camera"]
 fn a_short_frame_is_dropped() {
     let run = ov5640(700).fault("frame-short@600-608").run();
     assert!(run.stats().dropped_size >= 1, "{:?}", run.stats());
