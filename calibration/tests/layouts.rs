@@ -136,10 +136,10 @@ fn eight_dots_give_a_force_with_an_honest_uncertainty() {
     );
 }
 
-/// There is no table of shapes for eight dots: whatever is not known to be a needle is known less
+/// Eight dots tell how wide a contact is: a needle that is not known to be one is known nearly as
 /// well.
 #[test]
-fn a_contact_of_unknown_shape_is_less_certain() {
+fn a_contact_of_unknown_shape_is_little_less_certain() {
     let scene = nominal();
     let mut sensor = tared(&scene);
     for (number, load) in loads().take(8) {
@@ -150,8 +150,11 @@ fn a_contact_of_unknown_shape_is_less_certain() {
             [force.direction_sigma.0, force.magnitude_sigma.0, place].map(f64::from)
         });
         let (of_needle, of_unknown) = (sigmas[0], sigmas[1]);
-        for ((needle, unknown), times) in of_needle.iter().zip(of_unknown).zip([2.9, 2.9, 1.8]) {
-            assert!(unknown >= times * needle, "{number}: {sigmas:?}");
+        for (needle, unknown) in of_needle.iter().zip(of_unknown) {
+            assert!(
+                (0.9..6.0).contains(&(unknown / needle)),
+                "{number}: {sigmas:?}"
+            );
         }
     }
 }

@@ -130,6 +130,7 @@ impl<'m> Film<'m> {
         let observed = Observed {
             hanging: None,
             pressing: None,
+            wide: None,
             lost: Lost::NONE,
             drift: None,
             moved: shown.moved,

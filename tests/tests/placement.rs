@@ -93,6 +93,7 @@ fn the_sensing_runs_from_itcm() {
         "7forward5drift",
         "7forward6weight",
         "7forward6shapes",
+        "7forward6widths",
         "8pipeline7hanging",
         "5force10of_outputs",
         "8Geometry9rest_area",

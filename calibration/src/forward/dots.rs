@@ -146,6 +146,7 @@ fn left(
         size: pose.size as f32,
         tilt: pose.tilt.map(|part| part as f32),
         place_mm: pose.place_mm.map(|part| part as f32),
+        ..ChipPose::default()
     };
     let nowhere = Markers::defaults(chip.tables.dots());
     let told = chip.tables.predict(&at, &chip.limits, &nowhere);

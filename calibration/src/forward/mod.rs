@@ -2,6 +2,7 @@
 //! in a model file.
 
 mod contact_shapes;
+mod contact_widths;
 mod covariances;
 mod coverage_scale;
 mod dots;
@@ -29,6 +30,7 @@ use crate::data::conditions::layout;
 use crate::unit_fit::OwnFilm;
 use crate::weights::Weights;
 pub use contact_shapes::contact_shapes;
+pub use contact_widths::{WidthsSpec, contact_widths};
 pub use covariances::{Covariance, KNOTS, Moved, covariances, knots, sum_of_squares};
 use covariances::{OF_FOUR, even};
 pub use dots::of_layout;

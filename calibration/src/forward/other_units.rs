@@ -271,6 +271,7 @@ impl<'a> Other<'a> {
                 size: size as f32,
                 tilt: pose.tilt.map(|part| part as f32),
                 place_mm: pose.place_mm.map(|part| part as f32),
+                ..ChipPose::default()
             };
             let told = self
                 .chip

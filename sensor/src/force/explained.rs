@@ -3,7 +3,7 @@
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
     Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
-    Sigma, Start, Strength, Turned,
+    Sigma, Start, Turned, centre_mm,
 };
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
@@ -44,7 +44,7 @@ const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// small. Chosen on presses beside markers (`hivtac-studies contacts --near-dots --seed 11`).
 const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
-/// The same for a layout without a table of shapes, wherever it is pressed. Chosen on presses by
+/// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on presses by
 /// `hivtac-studies contacts --weights calibration/models/8v/default.weights`.
 const WITHOUT_TABLE: [u32; 3] = [3, 3, 2];
 /// Where the search for a light touch begins, as a fraction of the largest size.
@@ -181,7 +181,7 @@ impl Resting {
         };
         let unknown = forward.unknown(resting.is_own);
         let estimate = forward.estimate(&observed, &resting.mounting, unknown, Start::Near(guess));
-        let (force, by_noise) = force(&forward.strength(resting.is_own), &estimate);
+        let (force, by_noise) = force(forward, resting.is_own, &estimate);
         Some((force.magnitude, by_noise))
     }
 
@@ -227,6 +227,7 @@ impl Resting {
             drift,
             hanging,
             pressing: (forward.shapes).and_then(|shapes| shapes.pressing(self.shape)),
+            wide: (forward.widths).and_then(|widths| widths.pressing(self.shape)),
         }
     }
 
@@ -318,11 +319,12 @@ impl Resting {
         noise: FrameNoise,
         estimate: &Estimate,
     ) -> (Force, Status) {
-        let (mut force, by_noise) = force(&forward.strength(self.is_own), estimate);
-        if self.is_beside_a_marker(forward, estimate) {
+        let (mut force, by_noise) = force(forward, self.is_own, estimate);
+        let has_widths = forward.widths.is_some();
+        if !has_widths && self.is_beside_a_marker(forward, estimate) {
             widen(&mut force, BESIDE);
         }
-        if self.shape != ContactShape::Needle && forward.shapes.is_none() {
+        if self.shape != ContactShape::Needle && forward.shapes.is_none() && !has_widths {
             widen(&mut force, WITHOUT_TABLE);
         }
         let mut status = trust(&force, by_noise, range);
@@ -370,8 +372,12 @@ fn widen(force: &mut Force, [direction, magnitude, place]: [u32; 3]) {
 }
 
 /// Returns the force of a load, and the standard uncertainty of |F| by noise.
-fn force(strength: &Strength, estimate: &Estimate) -> (Force, UnsignedMicroNewtons) {
-    let pose = &estimate.pose;
+fn force(
+    forward: &Forward<'_>,
+    is_own: bool,
+    estimate: &Estimate,
+) -> (Force, UnsignedMicroNewtons) {
+    let (pose, strength) = (&estimate.pose, forward.strength(is_own));
     let micronewtons = 1e6 * strength.stiffness.magnitude_n(pose.size);
     let cartesian = pose
         .direction()
@@ -381,11 +387,10 @@ fn force(strength: &Strength, estimate: &Estimate) -> (Force, UnsignedMicroNewto
         beta,
         magnitude,
     } = Polar::of_vector(cartesian);
-    let sigma = estimate.sigma(strength);
+    let sigma = estimate.sigma(&strength);
     let [direction, magnitude_sigma, place, by_noise] = stated(sigma);
-    let [x, y] = pose
-        .place_mm
-        .map(|part| SignedMicrometres(rounded(1e3 * part)));
+    let place_mm = centre_mm(pose, &forward.limits);
+    let [x, y] = place_mm.map(|part| SignedMicrometres(rounded(1e3 * part)));
     let force = Force {
         alpha,
         beta,

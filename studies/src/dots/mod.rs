@@ -247,6 +247,7 @@ impl Bench<'_> {
             drift: None,
             hanging: None,
             pressing: None,
+            wide: None,
         };
         let unknown = self.forward.unknown(true);
         let found = (self.forward).estimate(&observed, &self.mounting, unknown, Start::Anywhere);

@@ -389,6 +389,7 @@ pub(super) mod tests {
             size,
             tilt: [0.1, -0.2],
             place_mm,
+            ..Pose::default()
         }
     }
 

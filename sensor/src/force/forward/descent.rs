@@ -8,6 +8,7 @@ use super::pose::{Pose, limited};
 use super::predict::Prediction;
 use super::residual;
 use super::solve::{Column, PRIOR, Rows, Solved, UNKNOWNS, Unknowns, solve, square};
+use super::widths::{self, Wide};
 use crate::force::kernels::sqrt;
 
 /// The steps have converged if the next one would explain at most this part of the residual,
@@ -141,7 +142,8 @@ impl<'a> Descent<'a> {
         let (square, explained) = (white.square, solved.explained);
         self.there.put(self.forward, &self.markers, pose);
         self.looks += 1;
-        if self.there.square(self.whitening) < square {
+        let wide = self.markers.observed.wide.as_ref();
+        if self.there.square(self.whitening, wide) < square {
             core::mem::swap(&mut self.here, &mut self.there);
             (self.part, self.bend) = (1.0, Unknowns::default());
             self.solve();
@@ -164,7 +166,8 @@ impl<'a> Descent<'a> {
             ..
         } = self;
         let put = |covariance: &mut Covariance| here.put_covariance(forward, markers, covariance);
-        self.white = self.whitening.set(put).map(|()| here.white(self.whitening));
+        let wide = markers.observed.wide.as_ref();
+        self.white = (self.whitening.set(put)).map(|()| here.white(self.whitening, wide));
     }
 
     /// The solution, if the markers determine one.
@@ -195,8 +198,10 @@ impl<'a> Descent<'a> {
     /// for the residual there. Not inlined, so that its stack is released on return.
     #[inline(never)]
     fn bend(&self) -> Unknowns {
-        let (slopes, there) = (&self.here.prediction.slopes, &self.there);
-        let mut equations = Equations::new(self.whitening, slopes, &there.left, &there.pose);
+        let (prediction, there) = (&self.here.prediction, &self.there);
+        let wide = self.markers.observed.wide.as_ref();
+        let at = (&there.left, &there.pose);
+        let mut equations = Equations::new(self.whitening, prediction, at, wide);
         let solved = equations.solve();
         solved.map_or(Unknowns::default(), |solved| solved.unknowns)
     }
@@ -220,16 +225,24 @@ impl<'a> Descent<'a> {
 struct Equations {
     columns: [Rows; UNKNOWNS],
     side: Rows,
+    /// The column of the contact's width, if that is unknown.
+    width: Option<Rows>,
 }
 
 impl Equations {
-    fn new(whitening: &Whitening, slopes: &[Column; UNKNOWNS], left: &Column, pose: &Pose) -> Self {
-        let (markers, rows) = (left.len(), left.len() + PRIOR);
+    fn new(
+        whitening: &Whitening,
+        prediction: &Prediction,
+        (left, pose): (&Column, &Pose),
+        wide: Option<&Wide<'_>>,
+    ) -> Self {
+        let (markers, rows) = (left.len(), left.len() + prior(wide));
         let mut all = Equations {
             columns: [Rows::defaults(rows); UNKNOWNS],
             side: Rows::defaults(rows),
+            width: None,
         };
-        for (column, slope) in all.columns.iter_mut().zip(slopes) {
+        for (column, slope) in all.columns.iter_mut().zip(&prediction.slopes) {
             put_white(whitening, slope, column);
         }
         put_white(whitening, left, &mut all.side);
@@ -240,12 +253,34 @@ impl Equations {
                 (*one, *side) = (1.0 / likely, own);
             }
         }
+        if let Some(wide) = wide {
+            let [off, per_width] = wide.unlikely(pose.width);
+            let mut column = Rows::defaults(rows);
+            put_white(whitening, &prediction.by_width, &mut column);
+            let last = column.last_mut().zip(all.side.last_mut());
+            if let Some((one, side)) = last {
+                (*one, *side) = (per_width, off);
+            }
+            all.width = Some(column);
+        }
         all
     }
 
     fn solve(&mut self) -> Option<Solved> {
-        solve(&mut self.columns, &mut self.side)
+        let Equations {
+            columns,
+            side,
+            width,
+        } = self;
+        let taken = (width.as_mut()).map(|width| widths::take_out(width, columns, side));
+        let solved = solve(columns, side)?;
+        Some(taken.map_or(solved, |taken| taken.put_into(solved)))
     }
+}
+
+/// Number of equations of the prior.
+fn prior(wide: Option<&Wide<'_>>) -> usize {
+    PRIOR + usize::from(wide.is_some())
 }
 
 /// Puts a column, in white coordinates, into the first rows.
@@ -281,6 +316,9 @@ impl Point {
         if let Some(pressing) = &observed.pressing {
             pressing.add_to(&pose, limits, prediction);
         }
+        if let Some(wide) = &observed.wide {
+            wide.add_to(&pose, limits, prediction);
+        }
         left.reset(observed.moved.len(), 0.0);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());
         for (left, (seen, told)) in left.iter_mut().zip(pairs) {
@@ -311,13 +349,16 @@ impl Point {
         if let Some(pressing) = &observed.pressing {
             pressing.add_uncertainty(pose, limits, covariance);
         }
+        if let Some(wide) = &observed.wide {
+            wide.add_uncertainty(pose, limits, covariance);
+        }
     }
 
     /// Not inlined, so that its stack is released on return.
     #[inline(never)]
-    fn white(&self, whitening: &Whitening) -> White {
-        let slopes = &self.prediction.slopes;
-        let mut equations = Equations::new(whitening, slopes, &self.left, &self.pose);
+    fn white(&self, whitening: &Whitening, wide: Option<&Wide<'_>>) -> White {
+        let at = (&self.left, &self.pose);
+        let mut equations = Equations::new(whitening, &self.prediction, at, wide);
         let markers = equations.side.get(..self.left.len());
         White {
             unexplained: square(markers.unwrap_or_default()),
@@ -327,10 +368,12 @@ impl Point {
     }
 
     /// The square that a step must lower, weighted by the covariance of another load.
-    fn square(&self, whitening: &Whitening) -> f32 {
+    fn square(&self, whitening: &Whitening, wide: Option<&Wide<'_>>) -> f32 {
         let mut left = self.left;
         whitening.whiten(&mut left);
-        square(&left) + square(&unlikely(&self.pose))
+        let sum = square(&left) + square(&unlikely(&self.pose));
+        let of_width = wide.map(|wide| wide.unlikely(self.pose.width));
+        of_width.map_or(sum, |[off, _]| sum + off * off)
     }
 
     /// The part of the motion that no load near this one explains, in units of its noise alone. It
@@ -340,8 +383,9 @@ impl Point {
         if whitening.set(|noise| observed.put_noise(noise)).is_none() {
             return Column::filled(markers, f32::INFINITY);
         }
-        let slopes = &self.prediction.slopes;
-        let mut equations = Equations::new(whitening, slopes, &self.left, &self.pose);
+        let at = (&self.left, &self.pose);
+        let wide = observed.wide.as_ref();
+        let mut equations = Equations::new(whitening, &self.prediction, at, wide);
         // If the markers do not determine the load, the whole residual.
         let whole = equations.side;
         let side = match equations.solve() {
@@ -367,10 +411,15 @@ fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &
         let along = tilt.map(|part| part / steep);
         step = solved.held_back(step, TILT, along, steep - most);
     }
+    let width = match solved.width.is_unknown() {
+        true => solved.step_of_width(pose.width, part, &mut step),
+        false => pose.width,
+    };
     let [size, a, b, x, y] = step;
     within(
         forward,
         Pose {
+            width,
             size: pose.size + size,
             tilt: [pose.tilt[0] + a, pose.tilt[1] + b],
             place_mm: [pose.place_mm[0] + x, pose.place_mm[1] + y],
@@ -386,5 +435,6 @@ fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
         size: limited(pose.size, 0.0, forward.limits.size),
         tilt: pose.tilt.map(|part| part / too_steep),
         place_mm: pose.place_mm.map(|part| limited(part, from, to)),
+        width: pose.width,
     }
 }

@@ -10,6 +10,7 @@ use super::residual;
 use super::shapes::Pressing;
 use super::solve::{Column, MOST_DOTS, Solved};
 use super::weight::Hanging;
+use super::widths::Wide;
 use super::{Forward, Strength};
 use crate::markers::lost::Lost;
 use hivtac_terms::list::List;
@@ -50,9 +51,16 @@ pub struct Observed<'a> {
     pub hanging: Option<&'a Hanging>,
     /// What presses; `None` for the tables' tip.
     pub pressing: Option<Pressing<'a>>,
+    /// What presses, if its width is an unknown; otherwise `None`.
+    pub wide: Option<Wide<'a>>,
 }
 
 impl Observed<'_> {
+    /// The width where the first steps begin.
+    pub(super) fn first_width(&self) -> f32 {
+        self.wide.as_ref().map_or(0.0, Wide::first)
+    }
+
     /// Number of coordinates that are seen.
     pub(super) fn coordinates(&self) -> usize {
         self.moved.len().saturating_sub(2 * self.lost.count())
@@ -130,6 +138,7 @@ impl Forward<'_> {
         let where_most = |size| Pose {
             size,
             place_mm: self.rest_image.where_most(&observed.moved),
+            width: observed.first_width(),
             ..Pose::default()
         };
         let (found, is_done) = descend(match start {
@@ -244,6 +253,7 @@ pub fn stated([xx, xy, yy]: [f32; 3]) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force::forward::widths::OfWidth;
     use crate::force::forward::{RELATIVE, Stiffness};
     use proptest::prelude::*;
 
@@ -267,6 +277,7 @@ mod tests {
                 size: 0.5,
                 tilt: [0.1, 0.05],
                 place_mm: [1.0, -2.0],
+                ..Pose::default()
             },
             unexplained,
             left: Column::defaults(8),
@@ -276,6 +287,7 @@ mod tests {
                 left_over: unexplained,
                 explained: 0.0,
                 spread,
+                width: OfWidth::KNOWN,
             }),
             looks: 1,
         }

@@ -21,7 +21,8 @@
 //! | `residual` | how large the residual of honest frames is |
 //! | `covariance` | what is unknown of the unit, in addition to the noise |
 //! | `weight` | the effect of the film's own weight |
-//! | `shapes` | the effect of the shape of what presses |
+//! | `shapes` | the effect of the shape of what presses, of four markers |
+//! | `widths` | the effect of how wide the contact is, which more markers tell |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 //! | `three` | the same while a marker is lost |
 
@@ -42,6 +43,7 @@ mod table;
 mod terms;
 mod three;
 pub mod weight;
+mod widths;
 
 pub use axis::{Axis, NODES};
 pub use covariance::{
@@ -61,6 +63,7 @@ pub use table::{Answer, OUTPUTS, Place, Table};
 pub use terms::{EVEN, ODD};
 pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
 pub use weight::{Gravity, Hanging, Turned, Weight};
+pub use widths::{OF_FACE, PER_WIDTH_MM, TIP_MM, Wide, Widths, centre_mm};
 
 /// Most steps that a model may ask for.
 pub const MOST_STEPS: u8 = 3;
@@ -96,6 +99,8 @@ pub struct Forward<'a> {
     pub weight: Option<Weight<'a>>,
     /// The effect of the shape of what presses; `None` if it is unknown.
     pub shapes: Option<Shapes<'a>>,
+    /// The effect of how wide the contact is; `None` if it is unknown.
+    pub widths: Option<Widths<'a>>,
 }
 
 /// What is known of units other than the one that a model was made on.

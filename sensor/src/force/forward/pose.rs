@@ -12,6 +12,9 @@ pub struct Pose {
     pub tilt: [f32; 2],
     /// Where the tip touches the film, mm.
     pub place_mm: [f32; 2],
+    /// How wide the contact is: 0 as the tables' tip, 1 as a soft disc of 4.4 mm. It is known if a
+    /// table has [widths](super::Widths), and 0 otherwise.
+    pub width: f32,
 }
 
 /// The force of a size: first the film's bending resists, then its stretching.
@@ -80,6 +83,7 @@ impl Pose {
             size: stiffness.size_of(magnitude_n, limits.size),
             tilt: tangents.map(|tangent| part * tangent),
             place_mm,
+            width: 0.0,
         }
     }
 

@@ -53,6 +53,8 @@ pub struct Prediction {
     pub moved: Column,
     /// Slopes by size, tilt along x and y (1/rad), place along x and y (1/mm).
     pub slopes: [Column; UNKNOWNS],
+    /// Slope by the contact's width; without coordinates if that is no unknown.
+    pub by_width: Column,
 }
 
 impl<'a> Tables<'a> {
@@ -192,6 +194,7 @@ impl Prediction {
         Prediction {
             moved: column,
             slopes: [column; UNKNOWNS],
+            by_width: Column::defaults(0),
         }
     }
 

@@ -4,6 +4,7 @@
 //! reflections for least squares (Björck 1967), and avoids the squared condition of normal
 //! equations.
 
+use super::widths::OfWidth;
 use crate::force::kernels::sqrt;
 use hivtac_terms::list::List;
 use hivtac_terms::marker::MOST_MARKERS;
@@ -14,7 +15,7 @@ pub const UNKNOWNS: usize = 5;
 pub const MOST_DOTS: usize = MOST_MARKERS;
 /// Most equations of the markers: x and y of each.
 pub const MOST_EQUATIONS: usize = 2 * MOST_DOTS;
-/// Equations of the prior that may follow those of the markers.
+/// Equations of the prior that follow those of the markers. One more may follow: of the width.
 pub const PRIOR: usize = 4;
 /// A column whose remainder after Gram–Schmidt is below this fraction of the whole column cannot be
 /// distinguished from those before it. The tables' slopes are exact to some 10⁻³ of the largest.
@@ -23,7 +24,7 @@ const LEAST_OWN: f32 = 1e-3;
 /// A column of the markers' equations: x and y of each marker.
 pub type Column = List<f32, MOST_EQUATIONS>;
 /// A column of the markers' equations and of the prior.
-pub type Rows = List<f32, { MOST_EQUATIONS + PRIOR }>;
+pub type Rows = List<f32, { MOST_EQUATIONS + PRIOR + 1 }>;
 /// Size, tilt along x and y, place along x and y, or their changes.
 pub type Unknowns = [f32; UNKNOWNS];
 
@@ -44,6 +45,8 @@ pub struct Solved {
     /// One row for each unknown. Products of rows are the unknowns' covariances if those of the
     /// equations are the unit matrix.
     pub spread: [[f32; UNKNOWNS]; UNKNOWNS],
+    /// The step of the contact's width, if that was unknown.
+    pub width: OfWidth,
 }
 
 impl Solved {
@@ -115,6 +118,7 @@ pub fn solve<const MOST: usize>(
         left_over,
         explained: square(&along),
         spread: inverse,
+        width: OfWidth::KNOWN,
     };
     for (row, unknown) in solved.unknowns.iter_mut().enumerate() {
         for k in row..UNKNOWNS {
@@ -139,12 +143,12 @@ fn inverse(upper: &[[f32; UNKNOWNS]; UNKNOWNS]) -> [[f32; UNKNOWNS]; UNKNOWNS] {
     inverse
 }
 
-fn norm(column: &[f32]) -> f32 {
+pub(super) fn norm(column: &[f32]) -> f32 {
     sqrt(dot(column, column))
 }
 
 /// Four independent sums, so that none waits for another.
-fn dot(a: &[f32], b: &[f32]) -> f32 {
+pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0; 4];
     let ((a, more_a), (b, more_b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     for (a, b) in a.iter().zip(b) {
@@ -158,7 +162,7 @@ fn dot(a: &[f32], b: &[f32]) -> f32 {
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }
 
-fn take(from: &mut [f32], unit: &[f32], part: f32) {
+pub(super) fn take(from: &mut [f32], unit: &[f32], part: f32) {
     for (from, unit) in from.iter_mut().zip(unit) {
         *from -= part * unit;
     }

@@ -1,0 +1,662 @@
+//! Knows how a contact of some width moves the images, compared with the tables' tip under the same
+//! force at the same centre of pressure. Its width is an unknown of the equations.
+//!
+//! Enough markers tell how wide a contact is. A soft disc's radius is the measure: a rigid face of
+//! 0.6 times that radius moves the images alike. A table holds the motions at knots of the place:
+//! polynomials in size and width, and, as standard deviations, what a contact that is longer than
+//! wide, leans, or presses with its rim moves in addition. Film and markers are symmetric, so that
+//! places along +x and +y tell all others.
+
+use super::Column;
+use super::covariance::{Covariance, add_square, between};
+use super::mounting::RestImage;
+use super::pose::{Pose, limited};
+use super::predict::Prediction;
+use super::solve::{Rows, Solved, UNKNOWNS, Unknowns, dot, norm, take};
+use super::terms::Limits;
+use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::layout::EIGHT_V;
+use hivtac_terms::units::SignedMicrometres;
+
+/// Groups of columns: the motion by the width; then by contacts that are longer than wide, along x
+/// and between x and y, that lean towards x and y, and whose middle bears more than the rim.
+pub const GROUPS: usize = 6;
+/// Columns of the motion by the width are the first group.
+const OF_WIDTH: usize = 0;
+/// The last group.
+const OF_RIM: usize = GROUPS - 1;
+/// Most columns of a table.
+const MOST_COLUMNS: usize = 32;
+/// Largest power of size and width.
+const MOST_POWER: usize = 4;
+/// Largest step of the motions, focal lengths.
+const LARGEST_STEP: f32 = 1e-3;
+/// Bytes before the columns, and of a column.
+const HEAD: usize = 8;
+const COLUMN: usize = 8;
+/// Allowed number of knots along an axis.
+const KNOTS: core::ops::RangeInclusive<u8> = 2..=32;
+/// The radius, mm, of the soft disc that is as wide as the tables' tip: width 0. At width 1 it is
+/// larger by `PER_WIDTH_MM`.
+pub const TIP_MM: f32 = 0.42;
+/// See [`TIP_MM`].
+pub const PER_WIDTH_MM: f32 = 4.0;
+/// The radius of the soft disc that is as wide as a face, in parts of the face's radius.
+pub const OF_FACE: f32 = 1.65;
+/// The least and the largest width.
+pub const ENDS: [f32; 2] = [-0.1, 1.5];
+/// Width and its standard deviation of contacts of which nothing is known.
+const LIKELY: [f32; 2] = [0.5, 0.5];
+/// Standard deviation of the width of a disc whose radius is set, and of a face.
+const SET_DISC: [f32; 2] = [0.01, 0.02];
+const SET_FACE: [f32; 2] = [0.02, 0.06];
+/// Standard deviations of the groups of contacts of which nothing is known, of discs and of faces.
+const UNKNOWN: [f32; GROUPS] = [0.0, 0.7, 0.7, 0.6, 0.6, 1.6];
+const DISC: [f32; GROUPS] = [0.0, 0.05, 0.05, 0.05, 0.05, 0.3];
+const FACE: [f32; GROUPS] = [0.0, 0.2, 0.2, 0.5, 0.5, 0.6];
+/// Uncertainty of each coordinate, in parts of its marker's motion by the width. It, and the standard
+/// deviations above, were chosen on presses of other seeds than those of `docs/results/dots.md`.
+const OF_ITSELF: f32 = 0.08;
+/// A tilted force moves the images under a wide contact as under a contact that is farther along the
+/// tilt: by this many mm for each radian, at width 1 and the largest size.
+const ALONG_TILT_MM: f32 = 0.83;
+/// The least width where the first steps begin of a contact of which nothing is known, and the
+/// largest of those that follow without success. Steps that begin narrow at a wide contact end at
+/// the narrowest one.
+const WIDE: f32 = 0.8;
+pub const NARROW: f32 = 0.3;
+/// Markers of the layout `8v` are this near to its places, mm.
+const NEAR_MM: f32 = 1.0;
+
+/// The table of the nominal film with the layout `8v`, as the example `contact_widths` of
+/// `calibration/` writes it.
+const OF_EIGHT_V: &[u8] = include_bytes!("../../../data/contact-widths-8v.bin");
+
+/// The motions at knots of the place, borrowed from a table: the number of knots along an axis, of
+/// coordinates and of columns, a zero, and the largest place, mm (f32). For each column its group,
+/// its powers of size and width, a zero, and its step (f32). For each knot, in lines of places from
+/// 0 to the largest, for each column, entries of i16 by coordinate.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Widths<'a> {
+    knots: usize,
+    coordinates: usize,
+    end_mm: f32,
+    columns: &'a [[u8; COLUMN]],
+    entries: &'a [[u8; 2]],
+}
+
+/// A contact whose width is an unknown, as the steps use it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wide<'a> {
+    widths: Widths<'a>,
+    /// The likely width, and its standard deviation.
+    likely: [f32; 2],
+    /// The part of the group of contacts that press with their rim, and all standard deviations.
+    of_rim: f32,
+    sigmas: [f32; GROUPS],
+}
+
+/// A column of the table.
+#[derive(Clone, Copy)]
+struct Term {
+    group: usize,
+    of_size: usize,
+    of_width: usize,
+    step: f32,
+}
+
+impl Term {
+    fn of([group, of_size, of_width, _, a, b, c, d]: [u8; COLUMN]) -> Term {
+        Term {
+            group: group.into(),
+            of_size: of_size.into(),
+            of_width: of_width.into(),
+            step: f32::from_le_bytes([a, b, c, d]),
+        }
+    }
+
+    fn is_sound(&self) -> bool {
+        self.group < GROUPS
+            && (1..=MOST_POWER).contains(&self.of_size)
+            && (1..=MOST_POWER).contains(&self.of_width)
+            && (0.0..=LARGEST_STEP).contains(&self.step)
+    }
+}
+
+/// A variable's powers from 0 on, and their slopes.
+struct Powers([[f32; 2]; MOST_POWER + 1]);
+
+impl Powers {
+    fn of(value: f32) -> Powers {
+        let mut powers = [[1.0, 0.0]; MOST_POWER + 1];
+        for k in 1..=MOST_POWER {
+            let [before, _] = powers[k - 1];
+            powers[k] = [before * value, k as f32 * before];
+        }
+        Powers(powers)
+    }
+
+    fn at(&self, power: usize) -> [f32; 2] {
+        self.0.get(power).copied().unwrap_or_default()
+    }
+}
+
+impl<'a> Widths<'a> {
+    /// That of the nominal film, which stands for all films with its markers; `None` if there is
+    /// none for these.
+    pub fn nominal(rest_image: &RestImage) -> Option<Widths<'static>> {
+        Widths::new(OF_EIGHT_V).filter(|_| is_eight_v(rest_image))
+    }
+
+    /// Takes a table; `None` if a number is out of its range.
+    pub fn new(bytes: &'a [u8]) -> Option<Widths<'a>> {
+        let ([knots, coordinates, columns, _, end @ ..], rest) =
+            bytes.split_first_chunk::<HEAD>()?;
+        let end_mm = f32::from_le_bytes(*end);
+        let (heads, rest) = rest.split_at_checked(COLUMN * usize::from(*columns))?;
+        let (entries, odd) = rest.as_chunks();
+        let widths = Widths {
+            knots: usize::from(*knots),
+            coordinates: usize::from(*coordinates),
+            end_mm,
+            columns: heads.as_chunks().0,
+            entries,
+        };
+        let count = widths.knots * widths.knots * widths.columns.len() * widths.coordinates;
+        let sound = odd.is_empty()
+            && KNOTS.contains(knots)
+            && widths.columns.len() <= MOST_COLUMNS
+            && (0.1..=100.0).contains(&end_mm)
+            && widths.terms().all(|term| term.is_sound())
+            && entries.len() == count;
+        sound.then_some(widths)
+    }
+
+    fn terms(&self) -> impl Iterator<Item = Term> + use<'a> {
+        self.columns.iter().map(|column| Term::of(*column))
+    }
+
+    /// Returns what is known of a shape; `None` for the tables' tip.
+    pub fn pressing(&self, shape: ContactShape) -> Option<Wide<'a>> {
+        let radius_mm = shape.radius().map_or(0.0, |radius| 1e-3 * radius.0 as f32);
+        let of_disc = |disc_mm: f32| (disc_mm - TIP_MM) / PER_WIDTH_MM;
+        let set = |width: f32, [least, more]: [f32; 2]| [width, least + more * width.max(0.0)];
+        let (likely, of_rim, sigmas) = match shape {
+            ContactShape::Needle => return None,
+            ContactShape::Unknown => (LIKELY, 0.0, UNKNOWN),
+            ContactShape::Round(_) => (set(of_disc(radius_mm), SET_DISC), 1.0, DISC),
+            ContactShape::Flat(_) => (set(of_disc(OF_FACE * radius_mm), SET_FACE), -1.0, FACE),
+        };
+        Some(Wide {
+            widths: *self,
+            likely,
+            of_rim,
+            sigmas,
+        })
+    }
+
+    /// The four knots around a place along +x and +y: where their entries begin, their weights, and
+    /// how these change along x and y, 1/mm.
+    fn corners(&self, place_mm: [f32; 2]) -> [(usize, [f32; 3]); 4] {
+        let last = self.knots.saturating_sub(1).max(1);
+        let per_mm = last as f32 / self.end_mm;
+        let [x, y] = place_mm.map(|part| {
+            let inside = (0.0..self.end_mm).contains(&part);
+            let slope = if inside { per_mm } else { 0.0 };
+            let [(first, a), (second, b)] = between(part / self.end_mm, last + 1);
+            [(first, a, -slope), (second, b, slope)]
+        });
+        let corner = |i: usize, j: usize| {
+            let ((line, of_y, slope_y), (place, of_x, slope_x)) = (y[i], x[j]);
+            let begins = (line * self.knots + place) * self.columns.len() * self.coordinates;
+            (begins, [of_y * of_x, of_y * slope_x, slope_y * of_x])
+        };
+        [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]
+    }
+
+    /// The entries of a column at a knot that begins there.
+    fn column(&self, begins: usize, number: usize) -> impl Iterator<Item = f32> {
+        let from = begins + number * self.coordinates;
+        let entries = self.entries.get(from..from + self.coordinates);
+        let entries = entries.unwrap_or_default().iter();
+        entries.map(|bytes| f32::from(i16::from_le_bytes(*bytes)))
+    }
+}
+
+impl Wide<'_> {
+    /// The width where the first steps begin.
+    pub fn first(&self) -> f32 {
+        let [likely, sigma] = self.likely;
+        limited(WIDE, likely - sigma, likely + sigma)
+    }
+
+    /// The distance of a width from the likely one, in standard deviations, and how many of these
+    /// a width of 1 is.
+    pub fn unlikely(&self, width: f32) -> [f32; 2] {
+        let [likely, sigma] = self.likely;
+        [(likely - width) / sigma, 1.0 / sigma]
+    }
+
+    /// The part of a group in the motion.
+    fn part(&self, group: usize) -> f32 {
+        match group {
+            OF_WIDTH => 1.0,
+            OF_RIM => self.of_rim,
+            _ => 0.0,
+        }
+    }
+
+    /// Adds the motion of a width, and its slopes, to a prediction.
+    #[inline(never)]
+    pub fn add_to(&self, pose: &Pose, limits: &Limits, prediction: &mut Prediction) {
+        let widths = &self.widths;
+        let mirror = Mirror::of(pose.place_mm);
+        let corners = widths.corners(pose.place_mm.map(f32::abs));
+        let sizes = Powers::of(pose.size / limits.size);
+        let powers = Powers::of(pose.width);
+        // The motion, then its slopes by size, width, and place along x and y.
+        let mut sums = [Column::defaults(widths.coordinates); 5];
+        for (number, term) in widths.terms().enumerate() {
+            let part = term.step * self.part(term.group);
+            if part == 0.0 {
+                continue;
+            }
+            let ([s, ds], [w, dw]) = (sizes.at(term.of_size), powers.at(term.of_width));
+            let [value, by_size, by_width] =
+                [s * w, ds * w / limits.size, s * dw].map(|f| part * f);
+            for (begins, [weight, along_x, along_y]) in corners {
+                let factors = [
+                    weight * value,
+                    weight * by_size,
+                    weight * by_width,
+                    along_x * value,
+                    along_y * value,
+                ];
+                for (k, entry) in widths.column(begins, number).enumerate() {
+                    for (sum, factor) in sums.iter_mut().zip(factors) {
+                        if let Some(sum) = sum.get_mut(k) {
+                            *sum += factor * entry;
+                        }
+                    }
+                }
+            }
+        }
+        let [value, by_size, by_width, by_x, by_y] = sums.map(|sum| mirror.column(&sum));
+        let [size, _, _, x, y] = &mut prediction.slopes;
+        let [sign_x, sign_y] = mirror.signs;
+        let sums = [
+            (&mut prediction.moved, &value, 1.0),
+            (size, &by_size, 1.0),
+            (x, &by_x, sign_x),
+            (y, &by_y, sign_y),
+        ];
+        for (sums, parts, sign) in sums {
+            for (sum, part) in sums.iter_mut().zip(parts.iter()) {
+                *sum += sign * part;
+            }
+        }
+        prediction.by_width = by_width;
+    }
+
+    /// Adds the uncertainty of that motion to a covariance.
+    #[inline(never)]
+    pub fn add_uncertainty(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
+        let mirror = Mirror::of(pose.place_mm);
+        for (group, sigma) in self.sigmas.into_iter().enumerate() {
+            if group != OF_WIDTH {
+                let moved = mirror.column(&self.group(pose, limits, group));
+                add_square(covariance, &moved, sigma);
+            }
+        }
+        let of_width = mirror.column(&self.group(pose, limits, OF_WIDTH));
+        for (dot, [x, y]) in of_width.as_chunks::<2>().0.iter().enumerate() {
+            let square = OF_ITSELF * OF_ITSELF * (x * x + y * y);
+            covariance.add(2 * dot, 2 * dot, square);
+            covariance.add(2 * dot + 1, 2 * dot + 1, square);
+        }
+    }
+
+    /// The motion of a group along +x and +y.
+    fn group(&self, pose: &Pose, limits: &Limits, group: usize) -> Column {
+        let widths = &self.widths;
+        let corners = widths.corners(pose.place_mm.map(f32::abs));
+        let sizes = Powers::of(pose.size / limits.size);
+        let powers = Powers::of(pose.width);
+        let mut sum = Column::defaults(widths.coordinates);
+        let terms = widths.terms().enumerate();
+        for (number, term) in terms.filter(|(_, term)| term.group == group) {
+            let ([s, _], [w, _]) = (sizes.at(term.of_size), powers.at(term.of_width));
+            for (begins, [weight, ..]) in corners {
+                let factor = term.step * s * w * weight;
+                for (sum, entry) in sum.iter_mut().zip(widths.column(begins, number)) {
+                    *sum += factor * entry;
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// The step of the width, as the equations have it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OfWidth {
+    step: f32,
+    /// The column of the width: its norm, and the parts of the other columns along it. Zeros if the
+    /// width is known.
+    own: f32,
+    along: [f32; UNKNOWNS],
+}
+
+/// The column of the width, taken out of all others.
+pub struct Taken {
+    own: f32,
+    along: [f32; UNKNOWNS],
+    of_side: f32,
+}
+
+/// Takes the part along the column of the width out of all equations: what is left determines the
+/// other unknowns, with their covariance, whatever the width is (Frisch and Waugh 1933).
+#[inline(never)]
+pub fn take_out(width: &mut Rows, columns: &mut [Rows; UNKNOWNS], side: &mut Rows) -> Taken {
+    let own = norm(width);
+    for part in width.iter_mut() {
+        *part /= own;
+    }
+    let mut without = |column: &mut Rows| {
+        let along = dot(width, column);
+        take(column, width, along);
+        along
+    };
+    Taken {
+        own,
+        along: columns.each_mut().map(&mut without),
+        of_side: without(side),
+    }
+}
+
+impl Taken {
+    /// Adds the width to the solution of the other unknowns.
+    #[inline(never)]
+    pub fn put_into(&self, solved: Solved) -> Solved {
+        let by_others = self.along.iter().zip(solved.unknowns);
+        let by_others = by_others.fold(0.0, |sum, (along, unknown)| sum + along * unknown);
+        Solved {
+            explained: solved.explained + self.of_side * self.of_side,
+            width: OfWidth {
+                step: (self.of_side - by_others) / self.own,
+                own: self.own,
+                along: self.along,
+            },
+            ..solved
+        }
+    }
+}
+
+impl OfWidth {
+    /// Of a width that is no unknown.
+    pub const KNOWN: OfWidth = OfWidth {
+        step: 0.0,
+        own: 0.0,
+        along: [0.0; UNKNOWNS],
+    };
+
+    /// Whether the width was an unknown.
+    pub fn is_unknown(&self) -> bool {
+        self.own > 0.0
+    }
+}
+
+impl Solved {
+    /// The width after `part` of the step. Where the table ends, the width is held back and the
+    /// other unknowns follow it.
+    #[inline(never)]
+    pub(super) fn step_of_width(&self, width: f32, part: f32, step: &mut Unknowns) -> f32 {
+        let OfWidth { own, along, .. } = self.width;
+        let there = width + part * self.width.step;
+        let held = limited(there, ENDS[0], ENDS[1]);
+        if held == there {
+            return there;
+        }
+        // The covariances of the width with the other unknowns, and its variance, times `own`.
+        let with: [f32; UNKNOWNS] = core::array::from_fn(|k| {
+            let pairs = along.iter().enumerate();
+            pairs.fold(0.0, |sum, (other, along)| {
+                sum - along * self.covariance(k, other)
+            })
+        });
+        let variance = with
+            .iter()
+            .zip(along)
+            .fold(1.0, |sum, (with, along)| sum - along * with);
+        for (step, with) in step.iter_mut().zip(with) {
+            *step -= (there - held) * own * with / variance;
+        }
+        held
+    }
+}
+
+/// The centre of pressure of a load that the steps found, mm.
+#[inline(never)]
+pub fn centre_mm(pose: &Pose, limits: &Limits) -> [f32; 2] {
+    let along = ALONG_TILT_MM * pose.width * (pose.size / limits.size);
+    [0, 1].map(|way| pose.place_mm[way] - along * pose.tilt[way])
+}
+
+/// The mirror image of the film in which a place is along +x and +y.
+#[derive(Clone, Copy)]
+struct Mirror {
+    /// Along x and along y: −1 if mirrored, 1 if not.
+    signs: [f32; 2],
+}
+
+impl Mirror {
+    fn of(place_mm: [f32; 2]) -> Mirror {
+        Mirror {
+            signs: place_mm.map(|part| if part < 0.0 { -1.0 } else { 1.0 }),
+        }
+    }
+
+    /// The mirror image of a marker of `8v`. Of the corners, left and right are 0 and 1, 3 and 2;
+    /// above and below are 0 and 3, 1 and 2. On the axes, 4 and 6 are left and right, 5 and 7 above
+    /// and below.
+    fn of_marker(&self, number: usize) -> usize {
+        let [mirrors_x, mirrors_y] = self.signs.map(|sign| sign < 0.0);
+        match number {
+            0..4 => number ^ usize::from(mirrors_x) ^ (3 * usize::from(mirrors_y)),
+            4 | 6 if mirrors_x => number ^ 2,
+            5 | 7 if mirrors_y => number ^ 2,
+            _ => number,
+        }
+    }
+
+    fn column(&self, column: &Column) -> Column {
+        Column::from_fn(column.len(), |k| {
+            let sign = self.signs.get(k % 2).copied().unwrap_or_default();
+            sign * column.at(2 * self.of_marker(k / 2) + k % 2)
+        })
+    }
+}
+
+/// Whether markers are those of the layout `8v`.
+fn is_eight_v(rest_image: &RestImage) -> bool {
+    let near = |(number, place): (usize, &[SignedMicrometres; 2])| {
+        let place_mm = place.map(|part| 1e-3 * part.0 as f32);
+        let mut squares = rest_image.squared_distances_mm(place_mm);
+        let square = squares.nth(number);
+        square.is_some_and(|square| square < NEAR_MM * NEAR_MM)
+    };
+    rest_image.at.len() == EIGHT_V.len() && EIGHT_V.iter().enumerate().all(near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::forward::Markers;
+    use crate::force::forward::solve::solve;
+    use hivtac_terms::units::Micrometres;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    const LIMITS: Limits = Limits {
+        size: 0.6288,
+        tilt: 0.67,
+    };
+
+    fn image(places_mm: &[[f32; 2]]) -> RestImage {
+        RestImage {
+            at: Markers::of(places_mm.iter().map(|place| place.map(|part| part / 10.0))),
+            film_mm: Markers::filled(places_mm.len(), [10.0; 2]),
+        }
+    }
+
+    fn eight_v() -> [[f32; 2]; 8] {
+        EIGHT_V.map(|place| place.map(|part| 1e-3 * part.0 as f32))
+    }
+
+    fn nominal() -> Widths<'static> {
+        Widths::nominal(&image(&eight_v())).unwrap()
+    }
+
+    fn moved(wide: &Wide<'_>, pose: &Pose) -> Prediction {
+        let mut prediction = Prediction::zeros(16);
+        wide.add_to(pose, &LIMITS, &mut prediction);
+        prediction
+    }
+
+    #[test]
+    fn there_is_a_table_for_the_dots_of_8v_alone() {
+        let mut places_mm = eight_v();
+        places_mm.swap(4, 5);
+        assert_eq!(Widths::nominal(&image(&places_mm)), None);
+        assert_eq!(Widths::nominal(&image(&[[3.7; 2]; 4])), None);
+        assert_eq!(nominal().pressing(ContactShape::Needle), None);
+    }
+
+    /// A contact as wide as the tip moves nothing in addition; a wider one, on a dot, more.
+    #[test]
+    fn wider_contacts_move_more() {
+        let wide = nominal().pressing(ContactShape::Unknown).unwrap();
+        let at = |width| {
+            let pose = Pose {
+                size: 0.4,
+                place_mm: [2.5, 0.3],
+                width,
+                ..Pose::default()
+            };
+            norm(&moved(&wide, &pose).moved)
+        };
+        assert_eq!(at(0.0), 0.0);
+        assert!(at(0.2) > 1e-4 && at(0.8) > 2.0 * at(0.2));
+    }
+
+    /// A shape that is set has its width.
+    #[test]
+    fn a_disc_is_as_wide_as_a_smaller_face() {
+        let likely = |shape| nominal().pressing(shape).unwrap().likely[0];
+        let disc = likely(ContactShape::Round(Micrometres(3_300)));
+        let face = likely(ContactShape::Flat(Micrometres(2_000)));
+        assert!((disc - face).abs() < 1e-6 && disc > 0.0, "{disc} {face}");
+    }
+
+    #[test]
+    fn a_mirrored_place_mirrors_the_motion() {
+        let column = Column::from_fn(16, |k| k as f32);
+        let at = |place_mm| Mirror::of(place_mm).column(&column);
+        assert_eq!(at([1.0, 2.0]), column);
+        let [left, above] = [at([-1.0, 2.0]), at([1.0, -2.0])];
+        assert_eq!(left[..4], [-2.0, 3.0, -0.0, 1.0]);
+        assert_eq!(
+            left[8..],
+            [-12.0, 13.0, -10.0, 11.0, -8.0, 9.0, -14.0, 15.0]
+        );
+        assert_eq!(above[..4], [6.0, -7.0, 4.0, -5.0]);
+        assert_eq!(
+            above[8..],
+            [8.0, -9.0, 14.0, -15.0, 12.0, -13.0, 10.0, -11.0]
+        );
+    }
+
+    proptest! {
+        #[test]
+        fn slopes_are_those_of_the_motion(
+            size in 0.1f32..0.6,
+            place_mm in prop::array::uniform2(-5.0f32..5.0),
+            width in 0.0f32..1.4,
+            way in 0usize..4,
+        ) {
+            let step = 2e-3;
+            // Not across a knot, where the slope changes.
+            let per_mm = 10.0 / 5.5;
+            prop_assume!(place_mm.iter().all(|part| {
+                let at = (part * per_mm).rem_euclid(1.0);
+                (0.01..0.99).contains(&at)
+            }));
+            let wide = nominal().pressing(ContactShape::Unknown).unwrap();
+            let pose = Pose { size, place_mm, width, ..Pose::default() };
+            let at = |off: f32| {
+                let mut there = pose;
+                let [x, y] = &mut there.place_mm;
+                *[&mut there.size, &mut there.width, x, y][way] += off;
+                moved(&wide, &there).moved
+            };
+            let here = moved(&wide, &pose);
+            let [by_size, _, _, by_x, by_y] = &here.slopes;
+            let slope = [by_size, &here.by_width, by_x, by_y][way];
+            let (after, before) = (at(step), at(-step));
+            for k in 0..16 {
+                let found = (after[k] - before[k]) / (2.0 * step);
+                prop_assert!((found - slope[k]).abs() < 1e-3 + 0.02 * norm(slope), "{k} {found} {}", slope[k]);
+            }
+        }
+
+        /// Six unknowns, one of them taken out first, come back, with their covariance.
+        #[test]
+        fn a_width_that_was_taken_out_comes_back(
+            parts in prop::array::uniform(-1.0f32..1.0),
+            unknowns in prop::array::uniform5(-1.0f32..1.0),
+            width in -1.0f32..1.0,
+        ) {
+            let parts: [f32; 60] = parts;
+            let column = |k: usize| Rows::from_fn(10, |i| parts[10 * k + i]);
+            let mut columns: [Rows; UNKNOWNS] = core::array::from_fn(column);
+            let mut of_width = column(5);
+            let mut side = Rows::defaults(10);
+            take(&mut side, &of_width, -width);
+            for (column, unknown) in columns.iter().zip(unknowns) {
+                take(&mut side, column, -unknown);
+            }
+            let whole = dot(&side, &side);
+            let taken = take_out(&mut of_width, &mut columns, &mut side);
+            let Some(solved) = solve(&mut columns, &mut side) else {
+                return Ok(());
+            };
+            let solved = taken.put_into(solved);
+            let spread: f32 = (0..UNKNOWNS).map(|k| solved.covariance(k, k)).sum();
+            prop_assume!(spread < 1e3);
+            for (found, unknown) in solved.unknowns.iter().zip(unknowns) {
+                prop_assert!((found - unknown).abs() < 1e-2, "{found} {unknown}");
+            }
+            prop_assert!((solved.width.step - width).abs() < 2e-2);
+            prop_assert!((solved.explained - whole).abs() < 1e-3 * whole);
+            // Held at its end, the width takes the other unknowns with it.
+            let mut step = solved.unknowns;
+            let held = solved.step_of_width(ENDS[1], 1.0, &mut step);
+            prop_assert!(held <= ENDS[1]);
+            prop_assert_eq!(step == solved.unknowns, solved.width.step <= 0.0);
+        }
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        let sound: Vec<u8> = OF_EIGHT_V.to_vec();
+        assert!(Widths::new(&sound).is_some());
+        assert_eq!(Widths::new(&sound[..sound.len() - 2]), None);
+        assert_eq!(Widths::new(&sound[..5]), None);
+        // Knots, columns, the largest place, a group, a power of the size, and a step.
+        for (at, part) in [(0, 1), (2, 33), (7, 0x7f), (8, 6), (9, 0), (15, 0x7f)] {
+            let mut bytes = sound.clone();
+            bytes[at] = part;
+            assert_eq!(Widths::new(&bytes), None, "{at}");
+        }
+    }
+}
