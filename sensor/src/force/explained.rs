@@ -44,8 +44,8 @@ const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// small. Chosen on presses beside markers (`hivtac-studies contacts --near-dots --seed 11`).
 const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
-/// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on presses by
-/// `hivtac-studies contacts --weights calibration/models/8v/default.weights`.
+/// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on
+/// presses of the layout `8v` before it had one.
 const WITHOUT_TABLE: [u32; 3] = [3, 3, 2];
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;

@@ -41,8 +41,8 @@ pub struct Descent<'a> {
     white: Option<White>,
     /// The fraction of the next step that is tried.
     part: f32,
-    /// How the path bends: added to the unknowns, times the square of that fraction.
-    bend: Unknowns,
+    /// How the path bends: added to the unknowns and the width, times the square of that fraction.
+    bend: Bend,
     /// True if the last step changed no more than rounding.
     has_ended: bool,
     /// How often the film was run forwards.
@@ -69,6 +69,13 @@ struct Point {
     prediction: Prediction,
     /// The part of the markers' motion that the load does not explain, focal lengths.
     left: Column,
+}
+
+/// How a path bends.
+#[derive(Clone, Copy, Default)]
+struct Bend {
+    unknowns: Unknowns,
+    width: f32,
 }
 
 /// The solution of white equations.
@@ -122,7 +129,7 @@ impl<'a> Descent<'a> {
             whitening,
             white: None,
             part: 1.0,
-            bend: Unknowns::default(),
+            bend: Bend::default(),
             has_ended: false,
             looks: 1,
         };
@@ -145,7 +152,7 @@ impl<'a> Descent<'a> {
         let wide = self.markers.observed.wide.as_ref();
         if self.there.square(self.whitening, wide) < square {
             core::mem::swap(&mut self.here, &mut self.there);
-            (self.part, self.bend) = (1.0, Unknowns::default());
+            (self.part, self.bend) = (1.0, Bend::default());
             self.solve();
         } else {
             self.has_ended = explained <= ROUNDING;
@@ -197,13 +204,16 @@ impl<'a> Descent<'a> {
     /// Returns how the path bends if the whole first step leads to `there`: the slopes here, solved
     /// for the residual there. Not inlined, so that its stack is released on return.
     #[inline(never)]
-    fn bend(&self) -> Unknowns {
+    fn bend(&self) -> Bend {
         let (prediction, there) = (&self.here.prediction, &self.there);
         let wide = self.markers.observed.wide.as_ref();
         let at = (&there.left, &there.pose);
         let mut equations = Equations::new(self.whitening, prediction, at, wide);
         let solved = equations.solve();
-        solved.map_or(Unknowns::default(), |solved| solved.unknowns)
+        solved.map_or(Bend::default(), |solved| Bend {
+            unknowns: solved.unknowns,
+            width: solved.width.step,
+        })
     }
 
     /// The load that it has reached.
@@ -399,10 +409,10 @@ impl Point {
 /// The load after `part` of a step and `part`² of a bend. If its tilt exceeds the tables, the tilt
 /// is held back and the other unknowns follow it. Otherwise steps along the tables' border would
 /// not lower the residual.
-fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &Unknowns) -> Pose {
+fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &Bend) -> Pose {
     let most = forward.limits.tilt;
     let mut step = solved.unknowns;
-    for (step, bend) in step.iter_mut().zip(bend) {
+    for (step, bend) in step.iter_mut().zip(bend.unknowns) {
         *step = part * (*step + part * bend);
     }
     let tilt = [pose.tilt[0] + step[TILT], pose.tilt[1] + step[TILT + 1]];
@@ -412,7 +422,10 @@ fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &
         step = solved.held_back(step, TILT, along, steep - most);
     }
     let width = match solved.width.is_unknown() {
-        true => solved.step_of_width(pose.width, part, &mut step),
+        true => {
+            let wanted = part * (solved.width.step + part * bend.width);
+            solved.step_of_width(pose.width, wanted, &mut step)
+        }
         false => pose.width,
     };
     let [size, a, b, x, y] = step;

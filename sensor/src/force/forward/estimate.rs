@@ -149,7 +149,16 @@ impl Forward<'_> {
             _ if is_done => return found,
             Start::At(_) => return found,
             Start::Near(guess) => where_most(guess.size),
-            Start::Anywhere => self.nearest_press(observed, &mounting.beside_mm),
+            Start::Anywhere => {
+                let wide = observed.wide.as_ref();
+                match wide.and_then(|wide| wide.second(found.pose.width)) {
+                    Some(width) => Pose {
+                        width,
+                        ..found.pose
+                    },
+                    None => self.nearest_press(observed, &mounting.beside_mm),
+                }
+            }
         });
         let looks = found.looks + other.looks;
         let nearer = if other.unexplained < found.unexplained {

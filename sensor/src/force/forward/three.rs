@@ -9,7 +9,6 @@ use super::mounting::Mounting;
 use super::pose::Pose;
 use super::predict::Markers;
 use super::solve::{Column, square};
-use super::widths;
 use super::{Forward, Unknown};
 use crate::markers::lost::Lost;
 
@@ -73,7 +72,7 @@ impl Forward<'_> {
             let press = Pose {
                 size,
                 place_mm: place.map(|part| part * end),
-                width: observed.first_width().min(widths::NARROW),
+                width: observed.first_width(),
                 ..Pose::default()
             };
             let mut pressed = self.moved(&press, beside_mm);

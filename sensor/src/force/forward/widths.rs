@@ -54,17 +54,18 @@ const SET_FACE: [f32; 2] = [0.02, 0.06];
 const UNKNOWN: [f32; GROUPS] = [0.0, 0.7, 0.7, 0.6, 0.6, 1.6];
 const DISC: [f32; GROUPS] = [0.0, 0.05, 0.05, 0.05, 0.05, 0.3];
 const FACE: [f32; GROUPS] = [0.0, 0.2, 0.2, 0.5, 0.5, 0.6];
-/// Uncertainty of each coordinate, in parts of its marker's motion by the width. It, and the standard
-/// deviations above, were chosen on presses of other seeds than those of `docs/results/dots.md`.
+/// Uncertainty of each coordinate, in parts of its marker's motion by the width. It, and the
+/// standard deviations above, were chosen on presses of other seeds than those of
+/// `docs/results/dots.md`.
 const OF_ITSELF: f32 = 0.08;
-/// A tilted force moves the images under a wide contact as under a contact that is farther along the
-/// tilt: by this many mm for each radian, at width 1 and the largest size.
+/// A tilted force moves the images under a wide contact as under a contact that is farther along
+/// the tilt: by this many mm for each radian, at width 1 and the largest size.
 const ALONG_TILT_MM: f32 = 0.83;
-/// The least width where the first steps begin of a contact of which nothing is known, and the
-/// largest of those that follow without success. Steps that begin narrow at a wide contact end at
-/// the narrowest one.
+/// The widths where the first steps begin of a contact of which nothing is known, and where those
+/// begin that follow if these end narrow without success. Steps from a narrow contact to a wide one
+/// often do, near the place and the force of the wide one.
+const NARROW: f32 = 0.1;
 const WIDE: f32 = 0.8;
-pub const NARROW: f32 = 0.3;
 /// Markers of the layout `8v` are this near to its places, mm.
 const NEAR_MM: f32 = 1.0;
 
@@ -226,8 +227,19 @@ impl<'a> Widths<'a> {
 impl Wide<'_> {
     /// The width where the first steps begin.
     pub fn first(&self) -> f32 {
+        self.near(NARROW)
+    }
+
+    /// The width where steps begin after others ended at `width` without success; `None` if they
+    /// did not end narrow.
+    pub fn second(&self, width: f32) -> Option<f32> {
+        (width < NARROW).then(|| self.near(WIDE))
+    }
+
+    /// The nearest width within a standard deviation from the likely one.
+    fn near(&self, width: f32) -> f32 {
         let [likely, sigma] = self.likely;
-        limited(WIDE, likely - sigma, likely + sigma)
+        limited(width, likely - sigma, likely + sigma)
     }
 
     /// The distance of a width from the likely one, in standard deviations, and how many of these
@@ -340,7 +352,7 @@ impl Wide<'_> {
 /// The step of the width, as the equations have it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OfWidth {
-    step: f32,
+    pub(super) step: f32,
     /// The column of the width: its norm, and the parts of the other columns along it. Zeros if the
     /// width is known.
     own: f32,
@@ -407,12 +419,12 @@ impl OfWidth {
 }
 
 impl Solved {
-    /// The width after `part` of the step. Where the table ends, the width is held back and the
-    /// other unknowns follow it.
+    /// The width after a step as far as the table reaches. Where it ends, the width is held back
+    /// and the other unknowns follow it.
     #[inline(never)]
-    pub(super) fn step_of_width(&self, width: f32, part: f32, step: &mut Unknowns) -> f32 {
+    pub(super) fn step_of_width(&self, width: f32, wanted: f32, step: &mut Unknowns) -> f32 {
         let OfWidth { own, along, .. } = self.width;
-        let there = width + part * self.width.step;
+        let there = width + wanted;
         let held = limited(there, ENDS[0], ENDS[1]);
         if held == there {
             return there;
@@ -605,7 +617,8 @@ mod tests {
             let (after, before) = (at(step), at(-step));
             for k in 0..16 {
                 let found = (after[k] - before[k]) / (2.0 * step);
-                prop_assert!((found - slope[k]).abs() < 1e-3 + 0.02 * norm(slope), "{k} {found} {}", slope[k]);
+                let off = (found - slope[k]).abs();
+                prop_assert!(off < 1e-3 + 0.02 * norm(slope), "{k} {found} {}", slope[k]);
             }
         }
 
@@ -640,7 +653,7 @@ mod tests {
             prop_assert!((solved.explained - whole).abs() < 1e-3 * whole);
             // Held at its end, the width takes the other unknowns with it.
             let mut step = solved.unknowns;
-            let held = solved.step_of_width(ENDS[1], 1.0, &mut step);
+            let held = solved.step_of_width(ENDS[1], solved.width.step, &mut step);
             prop_assert!(held <= ENDS[1]);
             prop_assert_eq!(step == solved.unknowns, solved.width.step <= 0.0);
         }
