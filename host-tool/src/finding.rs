@@ -4,10 +4,12 @@ use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
 use hivtac_host::marker_fields::MarkerJson;
 use hivtac_host::shown::to_json;
+use hivtac_sensor::force::TwoContacts;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::rules::{Finder, Unlike};
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
+use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
@@ -29,6 +31,8 @@ pub struct Finding<'a> {
     features: Option<Vec<f64>>,
     force: Option<ForceJson>,
     contact: Option<bool>,
+    /// Two contacts that explain a frame which one does not.
+    two_contacts: Option<TwoContactsJson>,
     status: Vec<&'static str>,
     #[serde(skip)]
     focal_px: f64,
@@ -37,6 +41,15 @@ pub struct Finding<'a> {
     /// Median of the picture's value or luma if nothing passes the threshold.
     #[serde(skip)]
     brightness: Option<u8>,
+}
+
+/// Two contacts, their sum first.
+#[derive(Serialize)]
+struct TwoContactsJson {
+    sum: ForceJson,
+    /// Each; `None` if they are not told apart.
+    each: Option<[ForceJson; 2]>,
+    status: Vec<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -93,6 +106,7 @@ impl<'a> Finding<'a> {
         settings: &Settings,
         blobs: &[Blob],
         measurement: Measurement,
+        two_contacts: Option<TwoContacts>,
         brightness: u8,
     ) -> Finding<'a> {
         let markers = measurement.markers.as_deref().map(|markers| {
@@ -120,6 +134,11 @@ impl<'a> Finding<'a> {
             contact: measurement
                 .force
                 .map(|_| measurement.status.contains(Status::CONTACT)),
+            two_contacts: two_contacts.map(|two| TwoContactsJson {
+                sum: ForceJson(two.sum),
+                each: two.each.map(|each| each.map(ForceJson)),
+                status: two.status.names().collect(),
+            }),
             status: measurement.status.names().collect(),
             focal_px: settings.geometry.focal.to_f64(),
             overflow: measurement.status.contains(Status::BLOB_OVERFLOW),
@@ -147,8 +166,11 @@ impl<'a> Finding<'a> {
         lines.extend(self.blob_lines());
         lines.extend(self.marker_lines());
         lines.extend(self.feature_line());
-        lines.extend(self.force_line());
-        lines.extend(self.place_line());
+        if let Some(ForceJson(force)) = &self.force {
+            lines.push(force_line("force", force));
+            lines.push(place_line("place", force));
+        }
+        lines.extend(self.two_contacts_lines());
         if self.force.is_some() {
             lines.push(format!("  contact   {}", contact_text(self.contact)));
         }
@@ -231,24 +253,47 @@ impl<'a> Finding<'a> {
         Some(format!("  features  {}", numbers.join(" ")))
     }
 
-    fn force_line(&self) -> Option<String> {
-        let ForceJson(force) = self.force.as_ref()?;
-        let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.shown(force));
-        Some(format!(
-            "  force     α {alpha}°, β {beta}°, |F| {size} mN, F ({x}, {y}, {z}) mN; \
-             ± {angle_sigma}°, ± {size_sigma} mN"
-        ))
-    }
-
-    /// The line for a force's place; a dash if the model gives no place. `None` without a force.
-    fn place_line(&self) -> Option<String> {
-        let ForceJson(force) = self.force.as_ref()?;
-        Some(match &force.place {
-            Some(place) => {
-                let [x, y, sigma] = PLACE.map(|field| field.shown(place));
-                format!("  place     ({x}, {y}) mm; ± {sigma} mm")
+    /// The lines of two contacts.
+    fn two_contacts_lines(&self) -> Vec<String> {
+        let Some(two) = &self.two_contacts else {
+            return Vec::new();
+        };
+        let ForceJson(sum) = &two.sum;
+        let mut lines = vec![force_line("sum of 2", sum), place_line("middle", sum)];
+        match &two.each {
+            Some(each) => {
+                for (number, ForceJson(force)) in (1..).zip(each) {
+                    lines.push(force_line(&format!("contact {number}"), force));
+                    lines.push(place_line("place", force));
+                }
             }
-            None => "  place     –".to_owned(),
-        })
+            None => lines.push(
+                "            each is not known: they are near, or two others fit as well"
+                    .to_owned(),
+            ),
+        }
+        if !two.status.is_empty() {
+            lines.push(format!("            the sum is {}", two.status.join(" ")));
+        }
+        lines
+    }
+}
+
+fn force_line(name: &str, force: &Force) -> String {
+    let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.shown(force));
+    format!(
+        "  {name:<10}α {alpha}°, β {beta}°, |F| {size} mN, F ({x}, {y}, {z}) mN; \
+         ± {angle_sigma}°, ± {size_sigma} mN"
+    )
+}
+
+/// The line for a force's place; a dash if the model gives no place.
+fn place_line(name: &str, force: &Force) -> String {
+    match &force.place {
+        Some(place) => {
+            let [x, y, sigma] = PLACE.map(|field| field.shown(place));
+            format!("  {name:<10}({x}, {y}) mm; ± {sigma} mm")
+        }
+        None => format!("  {name:<10}–"),
     }
 }

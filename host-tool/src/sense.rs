@@ -184,7 +184,9 @@ impl<'a> Bench<'a> {
         }
         let (blobs, measurement) = measure(&mut sensor, &picture.pixels);
         let brightness = picture.brightness();
-        let finding = Finding::new(path, sensor.settings(), &blobs, measurement, brightness);
+        let two = sensor.two_contacts(&measurement);
+        let settings = sensor.settings();
+        let finding = Finding::new(path, settings, &blobs, measurement, two, brightness);
         Ok(if self.arguments.json {
             finding.json()
         } else {

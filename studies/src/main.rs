@@ -10,6 +10,7 @@ mod paper;
 mod press;
 mod scene;
 mod slip;
+mod touches;
 mod tradeoff;
 mod units;
 mod unseen;
@@ -35,6 +36,7 @@ enum Command {
     Scene(scene::SceneCommand),
     Slip(slip::Slip),
     Stretched(units::Stretched),
+    Touches(touches::Touches),
     Tradeoff(tradeoff::TradeoffArgs),
     Unseen(unseen::Unseen),
     Units(units::Units),
@@ -51,6 +53,7 @@ fn main() -> Result<()> {
         Command::Scene(command) => command.run(),
         Command::Slip(study) => study.run(),
         Command::Stretched(study) => study.run(),
+        Command::Touches(study) => study.run(),
         Command::Tradeoff(study) => study.run(),
         Command::Unseen(study) => study.run(),
         Command::Units(study) => study.run(),

@@ -12,6 +12,7 @@ mod least_squares;
 mod matrix;
 mod noise;
 mod other_units;
+pub mod pairs;
 mod tables;
 mod unit;
 mod weight;

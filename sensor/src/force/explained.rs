@@ -1,6 +1,7 @@
 //! Computes the force that explains the markers best, with the film run forwards.
 
 use super::{Force, FrameNoise, Place, Polar, trust};
+use crate::force::forward::pair::{PairEstimate, Part};
 use crate::force::forward::{
     Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
     Sigma, Start, Turned, centre_mm,
@@ -16,6 +17,18 @@ use hivtac_terms::status::Status;
 use hivtac_terms::units::{
     MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
+
+/// Two contacts that explain a frame together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TwoContacts {
+    /// The sum of both forces. Its place is the mean of both places by the forces' sizes.
+    pub sum: Force,
+    /// Each of them; `None` if they are too near to each other for that, or if two others explain
+    /// the frame nearly as well.
+    pub each: Option<[Force; 2]>,
+    /// How far the sum can be trusted: range, reliability and contact.
+    pub status: Status,
+}
 
 /// Where a unit's markers rest, and what follows from that before the first frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -289,6 +302,41 @@ impl Resting {
         )
     }
 
+    /// Returns the two contacts that explain the markers, and their sum; `None` if one contact
+    /// explains them, two do not, or what presses is not known to be a needle.
+    pub fn two_contacts(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        markers: &[Marker],
+        noise: FrameNoise,
+    ) -> Option<TwoContacts> {
+        if self.shape != ContactShape::Needle {
+            return None;
+        }
+        let observed = self.observed(forward, markers, noise);
+        let (mounting, unknown) = (&self.mounting, forward.unknown(self.is_own));
+        let one = forward.estimate(&observed, mounting, unknown, Start::Anywhere);
+        if one.is_explained() {
+            return None;
+        }
+        let found = forward.estimate_pair(&observed, mounting, unknown, &one.pose);
+        let found = found.filter(PairEstimate::is_explained)?;
+        let strength = forward.strength(self.is_own);
+        let of_part = |part: Part| {
+            let cartesian = part.force_n.map(|part| MicroNewtons(rounded(1e6 * part)));
+            of_vector(cartesian, part.place_mm, part.sigma)
+        };
+        let (sum, by_noise) = of_part(found.sum(&strength));
+        let each = || found.contacts(&strength).map(|part| of_part(part).0);
+        let in_tables = found.size < forward.limits.size;
+        in_tables.then(|| TwoContacts {
+            status: trust(&sum, by_noise, range),
+            sum,
+            each: found.are_apart(&strength).then(each),
+        })
+    }
+
     /// Returns whether a force that one contact explains badly may be given. The contact must not
     /// be known to be a needle: what a needle leaves over is a fault. And the uncertainties,
     /// widened by what is left over, must be of use.
@@ -382,14 +430,23 @@ fn force(
     let cartesian = pose
         .direction()
         .map(|part| MicroNewtons(rounded(micronewtons * part)));
+    let place_mm = centre_mm(pose, &forward.limits);
+    of_vector(cartesian, place_mm, estimate.sigma(&strength))
+}
+
+/// Returns the force of a vector at a place, mm, and the standard uncertainty of |F| by noise.
+#[inline(always)]
+fn of_vector(
+    cartesian: [MicroNewtons; 3],
+    place_mm: [f32; 2],
+    sigma: Option<Sigma>,
+) -> (Force, UnsignedMicroNewtons) {
     let Polar {
         alpha,
         beta,
         magnitude,
     } = Polar::of_vector(cartesian);
-    let sigma = estimate.sigma(&strength);
     let [direction, magnitude_sigma, place, by_noise] = stated(sigma);
-    let place_mm = centre_mm(pose, &forward.limits);
     let [x, y] = place_mm.map(|part| SignedMicrometres(rounded(1e3 * part)));
     let force = Force {
         alpha,

@@ -44,7 +44,7 @@ mod rescale;
 mod tests;
 
 pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT, is_contact, is_force};
-pub use explained::Resting;
+pub use explained::{Resting, TwoContacts};
 pub use hivtac_terms::force::{Force, Place};
 pub use noise::{FrameNoise, NoiseLevel};
 

@@ -11,6 +11,7 @@ mod taring;
 #[cfg(test)]
 mod tests;
 mod three;
+mod two;
 
 use crate::force::features::Features;
 use crate::force::forward::Drift;

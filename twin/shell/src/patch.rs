@@ -4,7 +4,9 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use crate::design::{gauss, tip_points};
-use crate::film::Touched;
+use crate::film::{Touched, finite, mean, point_shares, weighted};
+use crate::newton::Problem;
+use crate::point::dot;
 use crate::{Contact, Equilibrium, Film, ShellError};
 
 /// Rays of the points of an ellipse and of a rim.
@@ -202,6 +204,49 @@ impl Film {
         };
         from(start).or_else(|_| from(&self.rest()))
     }
+
+    /// Returns the film under several patches at once, each with its own force, N. It is found as
+    /// by [`Film::press_patch`]. [`Equilibrium::tip_mm`] is then the mean displacement of all
+    /// patches by their forces' sizes, and [`Equilibrium::force_n`] the forces' sum.
+    ///
+    /// # Errors
+    /// As [`Film::press_patch`], and if there are no patches, or no patch has a force.
+    pub fn press_patches(
+        &self,
+        patches: &[(Patch, [f64; 3])],
+        start: &Equilibrium,
+    ) -> Result<Equilibrium, ShellError> {
+        self.fits(start)?;
+        let mut load = vec![0.0; self.unknowns()];
+        let mut sum_n = [0.0; 3];
+        let mut parts = Vec::new();
+        for (patch, force_n) in patches {
+            for (point, _) in &patch.points {
+                self.design().check_pressed(*point)?;
+            }
+            let force_n = finite("force", *force_n)?;
+            let shares = point_shares(self.shell().grid(), &patch.points);
+            for (load, part) in load.iter_mut().zip(weighted(&shares, &force_n)) {
+                *load += part;
+            }
+            for (sum, part) in sum_n.iter_mut().zip(force_n) {
+                *sum += part;
+            }
+            parts.push((patch.clone(), dot(&force_n, &force_n).sqrt()));
+        }
+        let touched = Touched::Patch(Arc::new(Patch::all(&parts)?));
+        let from = |start: &Equilibrium| {
+            let problem = Problem {
+                shell: self.shell(),
+                load: load.clone(),
+                guides: Vec::new(),
+            };
+            problem.solve(self.solver(), start.unknowns())
+        };
+        let solution = from(start).or_else(|_| from(&self.rest()))?;
+        let tip_mm = mean(&self.shares_of(&touched), &solution.unknowns);
+        Ok(self.equilibrium(solution, sum_n, &[], (touched, tip_mm)))
+    }
 }
 
 fn angle(ray: usize) -> f64 {
@@ -300,6 +345,33 @@ mod tests {
             .unwrap();
         let depth = |x: f64| film.displacement(&state, [x, 0.0])[2];
         assert!((depth(-2.0) - depth(2.0)).abs() < 1e-8 && depth(2.0) < depth(0.0) - 0.01);
+    }
+
+    /// Contacts with one direction are one patch. Forces that differ balance with the posts.
+    #[test]
+    fn each_patch_has_its_own_force() {
+        let film = film();
+        let [left, right] = [-2.0, 2.0].map(|x| Patch::tip([x, 0.0], 0.5).unwrap());
+        let rest = film.rest();
+        let (force, all) = (
+            [0.01, 0.0, -0.1],
+            [(left.clone(), 0.25), (right.clone(), 0.75)],
+        );
+        let one = film
+            .press_patch(&Patch::all(&all).unwrap(), force, &rest)
+            .unwrap();
+        let parts = |part: f64| force.map(|whole| part * whole);
+        let both = [(left, parts(0.25)), (right, parts(0.75))];
+        let two = film.press_patches(&both, &rest).unwrap();
+        close(one.tip_mm, two.tip_mm, 1e-9);
+        close(one.force_n, two.force_n, 1e-15);
+        let [(left, _), (right, _)] = both;
+        let pinched = [(left, [0.01, 0.0, -0.05]), (right, [-0.01, 0.0, -0.05])];
+        let pinched = film.press_patches(&pinched, &rest).unwrap();
+        close(pinched.reaction_n, [0.0, 0.0, 0.1], 1e-9);
+        let along = |x: f64| film.displacement(&pinched, [x, 0.0])[0];
+        assert!((along(-2.0) + along(2.0)).abs() < 1e-8 && along(-2.0) > along(2.0));
+        assert!(film.press_patches(&[], &rest).is_err());
     }
 
     #[test]

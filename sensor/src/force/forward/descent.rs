@@ -23,7 +23,7 @@ const TILT: usize = 1;
 /// Prior: standard deviations of the tilt along x and y, rad, and the place along x and y, mm,
 /// around 0. A load too weak for its direction and place stays near the prior; otherwise the steps
 /// would not end.
-const LIKELY: [f32; PRIOR] = [0.3, 0.3, 2.5, 2.5];
+pub(super) const LIKELY: [f32; PRIOR] = [0.3, 0.3, 2.5, 2.5];
 /// Factor by which the next step is shortened if one did not lower the residual.
 const SHORTER: f32 = 0.5;
 
@@ -302,7 +302,7 @@ fn put_white(whitening: &Whitening, column: &Column, rows: &mut Rows) {
 }
 
 /// The distance of a load from the prior, in standard deviations.
-fn unlikely(pose: &Pose) -> [f32; LIKELY.len()] {
+pub(super) fn unlikely(pose: &Pose) -> [f32; LIKELY.len()] {
     let ([a, b], [x, y]) = (pose.tilt, pose.place_mm);
     let parts = [a, b, x, y];
     core::array::from_fn(|k| -parts[k] / LIKELY[k])
@@ -441,7 +441,7 @@ fn after(forward: &Forward<'_>, pose: &Pose, solved: &Solved, part: f32, bend: &
 }
 
 /// The nearest load inside the tables.
-fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
+pub(super) fn within(forward: &Forward<'_>, pose: Pose) -> Pose {
     let too_steep = (pose.angle() / forward.limits.tilt).max(1.0);
     let [from, to] = forward.tables.ends_mm();
     Pose {

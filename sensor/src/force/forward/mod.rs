@@ -25,6 +25,7 @@
 //! | `widths` | the effect of how wide the contact is, which more markers tell |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 //! | `three` | the same while a marker is lost |
+//! | `pair` | two contacts, where one does not explain the markers |
 
 use pose::limited;
 
@@ -34,6 +35,7 @@ mod descent;
 mod drift;
 mod estimate;
 mod mounting;
+pub mod pair;
 mod pose;
 mod predict;
 pub(crate) mod residual;

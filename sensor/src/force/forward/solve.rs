@@ -1,6 +1,7 @@
-//! Solves linear equations for five unknowns by least squares.
+//! Solves linear equations for a contact's five unknowns, or for those of two contacts, by least
+//! squares.
 //!
-//! Modified Gram–Schmidt with the right side as a sixth column. It is as stable as Householder's
+//! Modified Gram–Schmidt with the right side as one more column. It is as stable as Householder's
 //! reflections for least squares (Björck 1967), and avoids the squared condition of normal
 //! equations.
 
@@ -35,21 +36,21 @@ pub(crate) fn square(parts: &[f32]) -> f32 {
 
 /// The solution of the equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Solved {
+pub struct Solved<const COUNT: usize = UNKNOWNS> {
     /// The unknowns.
-    pub unknowns: Unknowns,
+    pub unknowns: [f32; COUNT],
     /// The squared part of the right side that no unknowns explain.
     pub left_over: f32,
     /// The squared part that they explain.
     pub explained: f32,
     /// One row for each unknown. Products of rows are the unknowns' covariances if those of the
     /// equations are the unit matrix.
-    pub spread: [[f32; UNKNOWNS]; UNKNOWNS],
+    pub spread: [[f32; COUNT]; COUNT],
     /// The step of the contact's width, if that was unknown.
     pub width: OfWidth,
 }
 
-impl Solved {
+impl<const COUNT: usize> Solved<COUNT> {
     /// The covariance of two unknowns. Compiled once, because the near memory is scarce.
     #[inline(never)]
     pub fn covariance(&self, a: usize, b: usize) -> f32 {
@@ -59,7 +60,9 @@ impl Solved {
         let pairs = a.iter().zip(b);
         pairs.fold(0.0, |sum, (a, b)| sum + a * b)
     }
+}
 
+impl Solved {
     /// Returns the unknowns nearest to `unknowns`, weighted by the equations, whose entries at
     /// `first` and after it are smaller by `less` along the unit vector `along`.
     pub fn held_back(
@@ -85,14 +88,14 @@ impl Solved {
 /// Returns the unknowns whose combination of `columns` is nearest to `side`. Leaves the residual in
 /// `side`, and orthogonal unit columns in `columns`. Returns `None` if the columns do not determine
 /// the unknowns, or a number is not finite.
-pub fn solve<const MOST: usize>(
-    columns: &mut [List<f32, MOST>; UNKNOWNS],
+pub fn solve<const MOST: usize, const COUNT: usize>(
+    columns: &mut [List<f32, MOST>; COUNT],
     side: &mut [f32],
-) -> Option<Solved> {
+) -> Option<Solved<COUNT>> {
     let whole = columns.each_ref().map(|column| norm(column));
-    let mut upper = [[0.0; UNKNOWNS]; UNKNOWNS];
-    let mut along = [0.0; UNKNOWNS];
-    for k in 0..UNKNOWNS {
+    let mut upper = [[0.0; COUNT]; COUNT];
+    let mut along = [0.0; COUNT];
+    for k in 0..COUNT {
         let own = norm(&columns[k]);
         // Up to rounding, at most the whole column's norm; NaN is outside the range.
         if !(f32::MIN_POSITIVE.max(LEAST_OWN * whole[k])..2.0 * whole[k]).contains(&own) {
@@ -114,14 +117,14 @@ pub fn solve<const MOST: usize>(
     let left_over = dot(side, side);
     let inverse = inverse(&upper);
     let mut solved = Solved {
-        unknowns: [0.0; UNKNOWNS],
+        unknowns: [0.0; COUNT],
         left_over,
         explained: square(&along),
         spread: inverse,
         width: OfWidth::KNOWN,
     };
     for (row, unknown) in solved.unknowns.iter_mut().enumerate() {
-        for k in row..UNKNOWNS {
+        for k in row..COUNT {
             *unknown += inverse[row][k] * along[k];
         }
     }
@@ -130,9 +133,9 @@ pub fn solve<const MOST: usize>(
 }
 
 /// The inverse of an upper triangular matrix whose diagonal is not near zero.
-fn inverse(upper: &[[f32; UNKNOWNS]; UNKNOWNS]) -> [[f32; UNKNOWNS]; UNKNOWNS] {
-    let mut inverse = [[0.0; UNKNOWNS]; UNKNOWNS];
-    for column in 0..UNKNOWNS {
+fn inverse<const COUNT: usize>(upper: &[[f32; COUNT]; COUNT]) -> [[f32; COUNT]; COUNT] {
+    let mut inverse = [[0.0; COUNT]; COUNT];
+    for column in 0..COUNT {
         inverse[column][column] = 1.0 / upper[column][column];
         for row in (0..column).rev() {
             let sum =

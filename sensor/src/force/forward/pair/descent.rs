@@ -1,0 +1,225 @@
+//! Takes steps to the two contacts that explain the markers best.
+
+use super::film::{Both, PairPrediction};
+use super::interaction::{INPUTS, Interaction};
+use super::{Pair, PairEstimate};
+use crate::force::forward::Forward;
+use crate::force::forward::covariance::{Covariance, Unknown, Whitening};
+use crate::force::forward::descent::{LIKELY, unlikely, within};
+use crate::force::forward::estimate::Observed;
+use crate::force::forward::mounting::Mounting;
+use crate::force::forward::pose::Pose;
+use crate::force::forward::solve::{Column, PRIOR, Rows, Solved, solve, square};
+
+/// Most steps of a descent, and how often one step is halved.
+const STEPS: usize = 12;
+const HALVINGS: usize = 4;
+/// The steps have converged if the next one would explain at most this.
+const LEFT_TO_EXPLAIN: f32 = 0.05;
+/// The longest step of a place along an axis, mm, and of a size, relative to the largest. A longer
+/// step would leave what the slopes know.
+const LONGEST_MM: f32 = 1.5;
+const LARGEST_CHANGE: f32 = 0.25;
+
+/// What the markers of a frame show, and what is known of the unit.
+#[derive(Clone, Copy)]
+pub(super) struct Problem<'a> {
+    pub forward: &'a Forward<'a>,
+    pub interaction: &'a Interaction<'a>,
+    pub observed: &'a Observed<'a>,
+    pub mounting: &'a Mounting,
+    pub unknown: Unknown<'a>,
+}
+
+/// Two contacts, and the equations of the markers there.
+struct Point {
+    both: Both,
+    prediction: PairPrediction,
+    /// The part of the motion that they do not explain.
+    left: Column,
+}
+
+impl Problem<'_> {
+    /// Returns the contacts to which steps lead from a start.
+    pub fn descend(&self, start: Pair) -> PairEstimate {
+        let mut points = [Point::new(), Point::new()];
+        let [mut here, mut there] = points.each_mut();
+        let mut whitening = Whitening::EMPTY;
+        here.put(self, start);
+        let mut found = self.solved(here, &mut whitening);
+        for _ in 0..STEPS {
+            let Some(solved) = found.solved.filter(|own| own.explained > LEFT_TO_EXPLAIN) else {
+                break;
+            };
+            let before = here.square(&whitening);
+            let mut part = self.longest(&solved);
+            let is_lower = (0..HALVINGS).any(|_| {
+                there.put(self, self.after(&here.both, &solved, part));
+                part *= 0.5;
+                there.square(&whitening) < before
+            });
+            if !is_lower {
+                break;
+            }
+            core::mem::swap(&mut here, &mut there);
+            found = self.solved(here, &mut whitening);
+        }
+        found
+    }
+
+    /// The square of the motion, focal lengths, that two contacts do not explain.
+    pub fn left(&self, pair: &Pair) -> f32 {
+        let both = Both::new(*pair, self.forward);
+        let mut left = self.interaction.moved(&both);
+        for (part, pose) in both.alone() {
+            let beside_mm = &self.mounting.beside_mm;
+            let limits = &self.forward.limits;
+            let alone = self.forward.tables.predict(&pose, limits, beside_mm);
+            for (sum, alone) in left.iter_mut().zip(alone.moved.iter()) {
+                *sum += part * alone;
+            }
+        }
+        let pairs = left.iter().zip(self.observed.moved.iter());
+        pairs.fold(0.0, |sum, (told, seen)| sum + (seen - told) * (seen - told))
+    }
+
+    fn solved(&self, here: &Point, whitening: &mut Whitening) -> PairEstimate {
+        let mut estimate = PairEstimate {
+            pair: here.both.poses,
+            size: here.both.size,
+            unexplained: f32::INFINITY,
+            is_only: true,
+            solved: None,
+        };
+        if whitening
+            .set(|sum| here.put_covariance(self, sum))
+            .is_none()
+        {
+            return estimate;
+        }
+        let (mut columns, mut side) = here.equations(whitening);
+        let markers = side.get(..here.left.len());
+        estimate.unexplained = square(markers.unwrap_or_default());
+        estimate.solved = solve(&mut columns, &mut side);
+        estimate
+    }
+
+    /// The part of a step that is not too long.
+    fn longest(&self, solved: &Solved<INPUTS>) -> f32 {
+        let [first, second, _, _, _, _, places @ ..] = solved.unknowns;
+        let change = first.abs().max(second.abs()) / self.forward.limits.size;
+        let far = places
+            .iter()
+            .fold(0.0f32, |most, part| most.max(part.abs()));
+        (LARGEST_CHANGE / change.max(LARGEST_CHANGE)).min(LONGEST_MM / far.max(LONGEST_MM))
+    }
+
+    /// The contacts after a part of a step.
+    fn after(&self, both: &Both, solved: &Solved<INPUTS>, part: f32) -> Pair {
+        let step = solved.unknowns.map(|own| part * own);
+        let [s, t, a, b, c, d, x, y, z, w] = step;
+        let [first, second] = both.poses;
+        let moved = |pose: Pose, size: f32, tilt: [f32; 2], place: [f32; 2]| {
+            let moved = Pose {
+                size: pose.size + size,
+                tilt: [pose.tilt[0] + tilt[0], pose.tilt[1] + tilt[1]],
+                place_mm: [pose.place_mm[0] + place[0], pose.place_mm[1] + place[1]],
+            };
+            within(self.forward, moved)
+        };
+        [
+            moved(first, s, [a, b], [x, y]),
+            moved(second, t, [c, d], [z, w]),
+        ]
+    }
+}
+
+impl Point {
+    fn new() -> Point {
+        Point {
+            both: Both::NOTHING,
+            prediction: PairPrediction::default(),
+            left: Column::default(),
+        }
+    }
+
+    /// Makes this the point of two contacts.
+    fn put(&mut self, problem: &Problem<'_>, pair: Pair) {
+        let Problem {
+            forward,
+            interaction,
+            observed,
+            mounting,
+            ..
+        } = problem;
+        self.both = Both::new(pair, forward);
+        let Point {
+            both,
+            prediction,
+            left,
+        } = self;
+        prediction.put(both, forward, interaction, &mounting.beside_mm);
+        left.reset(observed.moved.len(), 0.0);
+        let pairs = observed.moved.iter().zip(prediction.moved.iter());
+        for (left, (seen, told)) in left.iter_mut().zip(pairs) {
+            *left = seen - told;
+        }
+    }
+
+    /// Puts the covariance of noise, of the tables' errors, and of what the network leaves.
+    fn put_covariance(&self, problem: &Problem<'_>, covariance: &mut Covariance) {
+        let Problem {
+            forward,
+            interaction,
+            observed,
+            mounting,
+            unknown,
+        } = problem;
+        covariance.reset(self.left.len());
+        observed.add_to(mounting, covariance);
+        let mut own = Covariance::EMPTY;
+        for (part, pose) in self.both.alone() {
+            unknown.put(&pose, &forward.limits, &self.prediction.moved, &mut own);
+            for (sums, row) in covariance.rows_mut().zip(own.rows()) {
+                for (sum, entry) in sums.iter_mut().zip(row) {
+                    *sum += part * part * entry;
+                }
+            }
+        }
+        interaction.add_uncertainty(&self.both, covariance);
+    }
+
+    /// The equations of the markers and of the prior, in units of their standard uncertainties.
+    fn equations(&self, whitening: &Whitening) -> ([Rows; INPUTS], Rows) {
+        let markers = self.left.len();
+        let mut columns = [Rows::defaults(markers + 2 * PRIOR); INPUTS];
+        let mut side = Rows::defaults(markers + 2 * PRIOR);
+        let all = columns.iter_mut().zip(&self.prediction.slopes);
+        for (rows, column) in all.chain([(&mut side, &self.left)]) {
+            if let Some(rows) = rows.get_mut(..markers) {
+                rows.copy_from_slice(column);
+                whitening.whiten(rows);
+            }
+        }
+        for (number, pose) in self.both.poses.iter().enumerate() {
+            for (k, (likely, own)) in LIKELY.into_iter().zip(unlikely(pose)).enumerate() {
+                // The tilts of both come before the places of both.
+                let unknown = 2 + 2 * number + k + if k < 2 { 0 } else { 2 };
+                let row = markers + PRIOR * number + k;
+                let one = columns.get_mut(unknown).and_then(|rows| rows.get_mut(row));
+                if let Some((one, side)) = one.zip(side.get_mut(row)) {
+                    (*one, *side) = (1.0 / likely, own);
+                }
+            }
+        }
+        (columns, side)
+    }
+
+    /// The square that a step must lower.
+    fn square(&self, whitening: &Whitening) -> f32 {
+        let mut left = self.left;
+        whitening.whiten(&mut left);
+        let unlikely = self.both.poses.iter().map(|pose| square(&unlikely(pose)));
+        square(&left) + unlikely.sum::<f32>()
+    }
+}

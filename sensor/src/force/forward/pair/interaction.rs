@@ -1,0 +1,335 @@
+//! Knows how two contacts differ from the mean of single ones, as a small network.
+//!
+//! Each single contact has the size of both together, and counts by its part of the force. The
+//! mean is exact if both contacts are at one place, or one has no force. What is left is the
+//! network's output times a factor that vanishes there.
+
+use super::film::Both;
+use crate::force::forward::covariance::{Covariance, triangle};
+use crate::force::forward::mounting::RestImage;
+use crate::force::forward::solve::Column;
+
+/// Inputs ([`Both::inputs`]).
+pub const INPUTS: usize = 10;
+/// Most neurons of a hidden layer.
+pub const MOST_WIDTH: usize = 192;
+/// Layers.
+pub const LAYERS: usize = 3;
+/// Markers of the layout.
+pub const DOTS: usize = 8;
+/// Coordinates of their images.
+pub const COORDINATES: usize = 2 * DOTS;
+/// Bytes of a file before the layers.
+pub const HEAD: usize = 4 + 8 * DOTS + 8 * INPUTS + 4;
+/// How far a marker of a model may be from the file's, mm.
+const NEAR_MM: f32 = 0.05;
+
+/// That of the layout `8v` on the nominal film, as the example `pairs` of `calibration/` writes it.
+const EIGHT_V: &[u8] = include_bytes!("../../../../data/pairs-8v.bin");
+
+/// The interaction of two contacts, borrowed from a file.
+///
+/// The file has the widths of both hidden layers (u8), the number of markers (u8) and a zero. Then
+/// f32: the places of the markers at rest, mm; the mean and the reciprocal deviation of each
+/// input; and the distance at which the factor is half of the largest, mm. For each layer, and in
+/// it for each output, follow f32 bias and step, and the weights in units of the step, i16. Then
+/// comes a lower factor of the covariance that the network leaves, in units of the factor, f32.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interaction<'a> {
+    head: &'a [u8; HEAD],
+    layers: [Layer<'a>; LAYERS],
+    left: &'a [[u8; 4]],
+}
+
+/// A layer: an output's bias, step and weights after those of the one before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Layer<'a> {
+    inputs: usize,
+    bytes: &'a [u8],
+}
+
+/// Values of a layer, and their slopes by the inputs.
+type Values = [[f32; 1 + INPUTS]; MOST_WIDTH];
+
+impl Interaction<'static> {
+    /// That of a layout, if there is one. `rest` has its markers' places.
+    pub fn of_layout(rest: &RestImage) -> Option<Interaction<'static>> {
+        Interaction::new(EIGHT_V).filter(|own| own.is_of(rest))
+    }
+}
+
+impl<'a> Interaction<'a> {
+    /// Takes a file. Returns `None` if its length is not what its widths say, or a width is 0 or
+    /// more than [`MOST_WIDTH`].
+    pub fn new(bytes: &'a [u8]) -> Option<Interaction<'a>> {
+        let (head, mut rest) = bytes.split_first_chunk::<HEAD>()?;
+        let [first, second, dots, _, ..] = head.map(usize::from);
+        let widths = [INPUTS, first, second, COORDINATES];
+        if dots != DOTS || !widths.iter().all(|width| (1..=MOST_WIDTH).contains(width)) {
+            return None;
+        }
+        let mut layers = [Layer {
+            inputs: 0,
+            bytes: &[],
+        }; LAYERS];
+        for (layer, pair) in layers.iter_mut().zip(widths.windows(2)) {
+            let [inputs, outputs] = *pair else {
+                return None;
+            };
+            let (own, others) = rest.split_at_checked(outputs * row(inputs))?;
+            *layer = Layer { inputs, bytes: own };
+            rest = others;
+        }
+        let (left, over) = rest.as_chunks();
+        let sound = over.is_empty() && left.len() == triangle(COORDINATES);
+        sound.then_some(Interaction { head, layers, left })
+    }
+
+    /// A number of the head.
+    fn number(&self, nth: usize) -> f32 {
+        let (words, _) = self.head.as_chunks();
+        f32::from_le_bytes(words.get(1 + nth).copied().unwrap_or_default())
+    }
+
+    /// Whether the markers of a rest picture are those of this layout.
+    fn is_of(&self, rest: &RestImage) -> bool {
+        let places = rest.at.iter().zip(rest.film_mm.iter());
+        let mut coordinates = places.flat_map(|([x, y], [_, across])| [across * x, across * y]);
+        let mut own = (0..COORDINATES).map(|nth| self.number(nth));
+        rest.at.len() == DOTS
+            && coordinates.all(|there| own.next().is_some_and(|own| (own - there).abs() < NEAR_MM))
+    }
+
+    /// The mean and the reciprocal deviation of an input.
+    fn scale(&self, input: usize) -> [f32; 2] {
+        [2 * input, 2 * input + 1].map(|nth| self.number(COORDINATES + nth))
+    }
+
+    /// The inputs of a pair, as the network takes them.
+    fn scaled(&self, both: &Both) -> [f32; INPUTS] {
+        let inputs = both.inputs();
+        core::array::from_fn(|nth| {
+            let [mean, per_deviation] = self.scale(nth);
+            (inputs[nth] - mean) * per_deviation
+        })
+    }
+
+    /// The factor on the network's outputs, with its slopes by the inputs.
+    fn factor(&self, both: &Both) -> [f32; 1 + INPUTS] {
+        let [size, part, .., ax, ay, bx, by] = both.inputs();
+        let far_mm = self.number(COORDINATES + 2 * INPUTS);
+        let [x, y] = [ax - bx, ay - by];
+        let square = x * x + y * y;
+        let all = square + far_mm * far_mm;
+        let apart = square / all;
+        let parts = 4.0 * part * (1.0 - part);
+        let of_square = size * parts * far_mm * far_mm / (all * all);
+        let [by_x, by_y] = [x, y].map(|way| 2.0 * way * of_square);
+        let mut factor = [0.0; 1 + INPUTS];
+        factor[0] = size * parts * apart;
+        factor[1] = parts * apart;
+        factor[2] = 4.0 * size * apart * (1.0 - 2.0 * part);
+        factor[7..].copy_from_slice(&[by_x, by_y, -by_x, -by_y]);
+        factor
+    }
+
+    /// The motion of the images that the mean of single contacts leaves, focal lengths.
+    #[inline(never)]
+    pub fn moved(&self, both: &Both) -> Column {
+        let mut values = [[0.0; MOST_WIDTH]; 2];
+        let [mut now, mut next] = values.each_mut();
+        now[..INPUTS].copy_from_slice(&self.scaled(both));
+        for (nth, layer) in self.layers.iter().enumerate() {
+            for (value, (bias, step, weights)) in next.iter_mut().zip(layer.rows()) {
+                let sum = (weights.iter().zip(&*now)).fold(0.0, |sum, (weight, value)| {
+                    sum + f32::from(i16::from_le_bytes(*weight)) * value
+                });
+                let sum = bias + step * sum;
+                *value = if nth + 1 < LAYERS { bent(sum)[0] } else { sum };
+            }
+            core::mem::swap(&mut now, &mut next);
+        }
+        let [factor, ..] = self.factor(both);
+        Column::of(now.iter().take(COORDINATES).map(|value| factor * value))
+    }
+
+    /// Adds that motion to a prediction, and its slopes by the inputs to `slopes`.
+    #[inline(never)]
+    pub fn add_to(&self, both: &Both, moved: &mut Column, slopes: &mut [Column; INPUTS]) {
+        let mut values = [[[0.0; 1 + INPUTS]; MOST_WIDTH]; 2];
+        let [mut now, mut next]: [&mut Values; 2] = values.each_mut();
+        for (nth, (value, input)) in now.iter_mut().zip(self.scaled(both)).enumerate() {
+            value[0] = input;
+            if let Some(slope) = value.get_mut(1 + nth) {
+                [_, *slope] = self.scale(nth);
+            }
+        }
+        for (nth, layer) in self.layers.iter().enumerate() {
+            for (value, (bias, step, weights)) in next.iter_mut().zip(layer.rows()) {
+                let mut sums = [0.0; 1 + INPUTS];
+                for (weight, values) in weights.iter().zip(&*now) {
+                    let weight = f32::from(i16::from_le_bytes(*weight));
+                    for (sum, value) in sums.iter_mut().zip(values) {
+                        *sum += weight * value;
+                    }
+                }
+                let mut sums = sums.map(|sum| step * sum);
+                sums[0] += bias;
+                if nth + 1 < LAYERS {
+                    let [bent, slope] = bent(sums[0]);
+                    sums = sums.map(|sum| slope * sum);
+                    sums[0] = bent;
+                }
+                *value = sums;
+            }
+            core::mem::swap(&mut now, &mut next);
+        }
+        let [factor, by_inputs @ ..] = self.factor(both);
+        for (nth, (moved, [output, of_output @ ..])) in moved.iter_mut().zip(&*now).enumerate() {
+            *moved += factor * output;
+            let parts = by_inputs.iter().zip(of_output);
+            for (slope, (by_input, of_output)) in slopes.iter_mut().zip(parts) {
+                if let Some(slope) = slope.get_mut(nth) {
+                    *slope += factor * of_output + by_input * output;
+                }
+            }
+        }
+    }
+
+    /// Adds what the network leaves to a covariance.
+    pub fn add_uncertainty(&self, both: &Both, covariance: &mut Covariance) {
+        let [factor, ..] = self.factor(both);
+        let row = |nth: usize| self.left.get(triangle(nth)..triangle(nth + 1));
+        for one in 0..COORDINATES {
+            for other in 0..=one {
+                let [Some(a), Some(b)] = [one, other].map(row) else {
+                    return;
+                };
+                let products = a.iter().zip(b).map(|(a, b)| {
+                    let [a, b] = [a, b].map(|part| f32::from_le_bytes(*part));
+                    a * b
+                });
+                covariance.add(one, other, factor * factor * products.sum::<f32>());
+            }
+        }
+    }
+}
+
+impl<'a> Layer<'a> {
+    /// Bias, step and weights of each output.
+    fn rows(&self) -> impl Iterator<Item = (f32, f32, &'a [[u8; 2]])> {
+        let rows = self.bytes.chunks_exact(row(self.inputs).max(1));
+        rows.filter_map(|row| {
+            let ([bias, step], _) = row.as_chunks::<4>().0.split_first_chunk()?;
+            let weights = row.get(8..)?.as_chunks().0;
+            Some((
+                f32::from_le_bytes(*bias),
+                f32::from_le_bytes(*step),
+                weights,
+            ))
+        })
+    }
+}
+
+/// Bytes of an output of a layer.
+const fn row(inputs: usize) -> usize {
+    8 + 2 * inputs
+}
+
+/// The hidden neurons' function x / (1 + |x|), with its slope. It needs no exponential.
+fn bent(x: f32) -> [f32; 2] {
+    let part = 1.0 / (1.0 + x.abs());
+    [x * part, part * part]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::force::forward::Pose;
+    use crate::force::model::Model;
+    use std::vec::Vec;
+
+    const MODEL: &[u8] = include_bytes!("../../../../../calibration/models/8v/default.hvtm");
+    const FOUR: &[u8] = include_bytes!("../../../../../calibration/models/default.hvtm");
+
+    fn pair(sizes: [f32; 2], places_mm: [[f32; 2]; 2]) -> [Pose; 2] {
+        [0, 1].map(|k| Pose {
+            size: sizes[k],
+            tilt: [0.05, -0.08 + 0.1 * k as f32],
+            place_mm: places_mm[k],
+        })
+    }
+
+    fn eight_dots() -> Interaction<'static> {
+        let forward = Model::parse(MODEL).unwrap().forward.unwrap();
+        Interaction::of_layout(&forward.rest_image).unwrap()
+    }
+
+    #[test]
+    fn it_is_that_of_its_layout() {
+        let four = Model::parse(FOUR).unwrap().forward.unwrap();
+        assert_eq!(Interaction::of_layout(&four.rest_image), None);
+        let mut moved = Model::parse(MODEL).unwrap().forward.unwrap().rest_image;
+        assert!(Interaction::of_layout(&moved).is_some());
+        moved.at[5][0] += 0.02;
+        assert_eq!(Interaction::of_layout(&moved), None);
+    }
+
+    #[test]
+    fn slopes_are_differences() {
+        let forward = Model::parse(MODEL).unwrap().forward.unwrap();
+        let interaction = eight_dots();
+        let both = Both::new(pair([0.3, 0.35], [[1.0, 2.0], [-1.5, 0.5]]), &forward);
+        let mut moved = Column::defaults(COORDINATES);
+        let mut slopes = [Column::defaults(COORDINATES); INPUTS];
+        interaction.add_to(&both, &mut moved, &mut slopes);
+        let alone = interaction.moved(&both);
+        for (a, b) in moved.iter().zip(alone.iter()) {
+            assert!((a - b).abs() < 1e-6, "{a} {b}");
+        }
+        for (way, slope) in slopes.iter().enumerate().skip(2) {
+            let step = 5e-3;
+            let [back, forth] = [-step, step].map(|step| {
+                let mut poses = both.poses;
+                let [first, second] = &mut poses;
+                let all = [&mut first.tilt, &mut second.tilt];
+                let places = [&mut first.place_mm, &mut second.place_mm];
+                let mut all = all.into_iter().chain(places).flatten();
+                *all.nth(way - 2).unwrap() += step;
+                interaction.moved(&Both::new(poses, &forward))
+            });
+            for (k, slope) in slope.iter().enumerate() {
+                let difference = (forth[k] - back[k]) / (2.0 * step);
+                let limit = 1e-4 + 0.05 * slope.abs();
+                assert!(
+                    (difference - slope).abs() < limit,
+                    "{way} {difference} {slope}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn where_the_mean_is_exact_it_is_nothing() {
+        let forward = Model::parse(MODEL).unwrap().forward.unwrap();
+        let together = pair([0.3, 0.3], [[1.0, 2.0]; 2]);
+        let alone = pair([0.4, 0.0], [[1.0, 2.0], [-3.0, 0.0]]);
+        for poses in [together, alone] {
+            let moved = eight_dots().moved(&Both::new(poses, &forward));
+            assert!(moved.iter().all(|part| *part == 0.0), "{moved:?}");
+        }
+    }
+
+    #[test]
+    fn other_files_are_refused() {
+        assert!(Interaction::new(EIGHT_V).is_some());
+        for length in [0, HEAD - 1, HEAD, EIGHT_V.len() - 1] {
+            assert_eq!(Interaction::new(&EIGHT_V[..length]), None, "{length}");
+        }
+        for (place, wrong) in [(0, 0), (0, 255), (1, 0), (2, 4)] {
+            let mut bytes: Vec<u8> = EIGHT_V.to_vec();
+            bytes[place] = wrong;
+            assert_eq!(Interaction::new(&bytes), None, "{place}");
+        }
+    }
+}
