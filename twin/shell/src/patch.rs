@@ -369,8 +369,6 @@ mod tests {
         let pinched = [(left, [0.01, 0.0, -0.05]), (right, [-0.01, 0.0, -0.05])];
         let pinched = film.press_patches(&pinched, &rest).unwrap();
         close(pinched.reaction_n, [0.0, 0.0, 0.1], 1e-9);
-        let along = |x: f64| film.displacement(&pinched, [x, 0.0])[0];
-        assert!((along(-2.0) + along(2.0)).abs() < 1e-8 && along(-2.0) > along(2.0));
         assert!(film.press_patches(&[], &rest).is_err());
     }
 

@@ -291,11 +291,11 @@ mod tests {
             let step = 5e-3;
             let [back, forth] = [-step, step].map(|step| {
                 let mut poses = both.poses;
-                let [first, second] = &mut poses;
-                let all = [&mut first.tilt, &mut second.tilt];
-                let places = [&mut first.place_mm, &mut second.place_mm];
-                let mut all = all.into_iter().chain(places).flatten();
-                *all.nth(way - 2).unwrap() += step;
+                let (number, axis) = ((way - 2) / 2, way % 2);
+                match number {
+                    0 | 1 => poses[number].tilt[axis] += step,
+                    _ => poses[number - 2].place_mm[axis] += step,
+                }
                 interaction.moved(&Both::new(poses, &forward))
             });
             for (k, slope) in slope.iter().enumerate() {
