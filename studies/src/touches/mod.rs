@@ -136,6 +136,7 @@ impl Bench<'_> {
             drift: None,
             hanging: None,
             pressing: None,
+            wide: None,
         };
         let one = self.one(&observed, Start::Anywhere);
         let unknown = self.forward.unknown(true);

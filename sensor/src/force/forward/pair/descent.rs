@@ -124,6 +124,7 @@ impl Problem<'_> {
                 size: pose.size + size,
                 tilt: [pose.tilt[0] + tilt[0], pose.tilt[1] + tilt[1]],
                 place_mm: [pose.place_mm[0] + place[0], pose.place_mm[1] + place[1]],
+                width: 0.0,
             };
             within(self.forward, moved)
         };

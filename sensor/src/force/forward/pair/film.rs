@@ -38,6 +38,7 @@ impl Both {
             size: 0.0,
             tilt: [0.0; 2],
             place_mm: [0.0; 2],
+            width: 0.0,
         }; 2],
         size: 0.0,
         part: 0.0,

@@ -257,6 +257,7 @@ mod tests {
             size: sizes[k],
             tilt: [0.05, -0.08 + 0.1 * k as f32],
             place_mm: places_mm[k],
+            width: 0.0,
         })
     }
 

@@ -151,6 +151,7 @@ impl Forward<'_> {
             size: self.stiffness.size_of(part * all_n, self.limits.size),
             tilt: one.tilt,
             place_mm: [0, 1].map(|i| one.place_mm[i] + way * apart_mm * along[i]),
+            width: 0.0,
         })
     }
 }
@@ -331,6 +332,7 @@ mod tests {
             drift: None,
             hanging: None,
             pressing: None,
+            wide: None,
         }
     }
 
@@ -355,11 +357,13 @@ mod tests {
             size: 0.33,
             tilt: [0.05, -0.08],
             place_mm: [2.0, 1.0],
+            width: 0.0,
         },
         Pose {
             size: 0.28,
             tilt: [-0.02, 0.06],
             place_mm: [-1.5, -0.5],
+            width: 0.0,
         },
     ];
 
@@ -397,8 +401,8 @@ mod tests {
         }
         let sum = found.sum(&strength);
         let sigma = sum.sigma.unwrap();
-        for k in 0..3 {
-            assert!((sum.force_n[k] - sum_n[k]).abs() < 3e-4, "{sum:?}");
+        for (found, force_n) in sum.force_n.iter().zip(sum_n) {
+            assert!((found - force_n).abs() < 3e-4, "{sum:?}");
         }
         // The sum is known far better than its parts.
         assert!(
