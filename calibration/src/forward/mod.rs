@@ -339,6 +339,7 @@ mod tests {
             size: pose.size as f32,
             tilt: pose.tilt.map(|part| part as f32),
             place_mm: pose.place_mm.map(|part| part as f32),
+            width: 0.0,
         };
         let predicted = (forward.tables).predict(&pose, &forward.limits, beside_mm);
         covariances::Moved::from_fn(OF_FOUR, |k| predicted.moved[k].into())
@@ -451,6 +452,7 @@ mod tests {
                 size: pose.size as f32,
                 tilt: pose.tilt.map(|part| part as f32),
                 place_mm: pose.place_mm.map(|part| part as f32),
+                width: 0.0,
             };
             hanging.add_to(&chip, &forward, &mut told);
             for c in 0..8 {
