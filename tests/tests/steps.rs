@@ -60,6 +60,7 @@ fn the_contact_is_found_from_bad_guesses() {
             size: between(200, 600) * 1e-3,
             tilt: [between(-250, 250) * 1e-3, between(-250, 250) * 1e-3],
             place_mm: [between(-3_900, 3_900) * 1e-3, between(-3_900, 3_900) * 1e-3],
+            width: 0.0,
         };
         let markers = seen(forward, &model.rest, &pose);
         let force_n = forward.stiffness.magnitude_n(pose.size);
@@ -99,6 +100,7 @@ fn the_steepest_contacts_are_found() {
             size: between(150, 500) * 1e-3,
             tilt: [steep * cos, steep * sin],
             place_mm: [between(-3_900, 3_900) * 1e-3, between(-3_900, 3_900) * 1e-3],
+            width: 0.0,
         };
         let mut markers = seen(forward, &model.rest, &pose);
         for marker in &mut markers {
@@ -123,6 +125,7 @@ fn a_bad_guess_takes_more_steps() {
         size: 0.45,
         tilt: [0.05, -0.1],
         place_mm: [1.5, -2.0],
+        width: 0.0,
     };
     for steps in 1..=3 {
         let file = models::anywhere(steps);
@@ -164,6 +167,7 @@ fn a_marker_that_is_off_is_refused() {
                 size: 0.45,
                 tilt: [0.05, -0.1],
                 place_mm,
+                width: 0.0,
             };
             let mut markers = seen(forward, &model.rest, &pose);
             markers[marker].x.0 += 32_768;
@@ -240,6 +244,7 @@ fn damaged_sections_do_no_harm() {
                     size: 0.3,
                     tilt: [0.2, 0.1],
                     place_mm: [4.0, -4.0],
+                    width: 0.0,
                 };
                 let beside = Markers::filled(forward.tables.dots(), [0.2, -0.1]);
                 let moved = forward.tables.predict(&pose, &forward.limits, &beside);

@@ -379,7 +379,7 @@ fn the_guide_shows_what_setting_prints() {
         assert_eq!(printed.trim_end(), pair[1], "{arguments:?}");
         shown += 1;
     }
-    assert_eq!(shown, 18);
+    assert_eq!(shown, 22);
 }
 
 /// The camera settings that a device received, and the tool's output.

@@ -315,7 +315,7 @@ pub fn of_another_version(flash: &Path) {
         record.extend(&word[1..]);
     }
     record.truncate(length);
-    assert_eq!(record[0], 7, "the version");
+    assert_eq!(record[0], 8, "the version");
     sector[11] = 200;
     record[0] = 200;
     let mut checked = sector[3..7].to_vec();
