@@ -178,6 +178,7 @@ fn a_dot_that_is_lost_costs_no_force() {
 
 /// A dot that moved on the film by 0.03 mm, half a pixel, since the tare.
 #[test]
+#[ignore = "30 s: many frames"]
 fn a_dot_that_lies_is_left_out() {
     for liar in [2, 4] {
         let mut sensor = tared(&nominal());
@@ -238,6 +239,7 @@ fn a_tare_is_refused_while_a_dot_is_missing_or_something_presses() {
 
 /// The files that demo, twin and calibration use are what `hivtac-calibrate layout 8v` makes.
 #[test]
+#[ignore = "90 s: the tables of eight dots are made anew"]
 fn the_models_files_are_as_they_are_made() {
     const ANEW: &str = "make it anew: hivtac-calibrate layout";
     let file = include_bytes!("../models/8v/default.hvtm");
