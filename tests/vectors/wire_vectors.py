@@ -454,7 +454,7 @@ HOST = {
     "set-temporal": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + OWN,
     "set-temporal-usual": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + USUAL,
     "set-temporal-median": COMMAND + [unsigned("id", 15), raw("SetTemporal", [13])] + LIMITS
-    + [raw("filter: MedianOfThree", [2])] + NO_REZERO + ANY_FILM,
+    + [raw("filter: MedianOfThree", [2])] + NO_REZERO + ANY_FILM + NO_OUTPUT,
     "begin-model": COMMAND
     + [unsigned("id", 16), raw("BeginModel", [14]), unsigned("bytes", 57_976)],
     "model-part": COMMAND

@@ -133,8 +133,8 @@ impl PairFilm {
         Ok(self.seen(&self.film.press_patches(patches, &self.film.rest())?))
     }
 
-    /// A frame of a scene's camera under forces, N, that are spread over patches. The number selects
-    /// its noise; its truth has no load.
+    /// A frame of a scene's camera under forces, N, that are spread over patches. The number
+    /// selects its noise; its truth has no load.
     ///
     /// # Errors
     /// If the film finds no equilibrium.

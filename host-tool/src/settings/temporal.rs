@@ -1,5 +1,5 @@
-//! Touch, slip, filter, re-zeroing, creep and the output pin as JSON, as lines, and as changes by `settings set`.
-//! They decide how forces are followed from frame to frame.
+//! Touch, slip, filter, re-zeroing, creep and the output pin as JSON, as lines, and as changes by
+//! `settings set`. They decide how forces are followed from frame to frame.
 
 use hivtac_host::decimal::Decimal;
 use hivtac_terms::temporal::{

@@ -5,7 +5,8 @@
 //! `cargo xtask test --all attacks` runs each for some seconds if there is a C++ compiler. The
 //! tests here run its corpus without one. [`ATTACKS`] is the list; `HIVTAC_ATTACK` chooses one.
 //!
-//! To attack longer (`-help=1` shows libFuzzer's options), and to try an input that an attack found:
+//! To attack longer (`-help=1` shows libFuzzer's options), and to try an input that an attack
+//! found:
 //!
 //! ```sh
 //! cd target/xtask/fuzz

@@ -38,8 +38,8 @@ const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
 
 /// Columns of the largest frames that fit a board's flash beside everything else.
 const WIDEST_ON_BOARD: u16 = 320;
-/// Most bytes of a file in the second bank.
-const LARGEST_IN_SECOND_BANK: usize = 200_000;
+/// Most bytes of a network that fits there.
+const LARGEST_ON_BOARD: usize = 200_000;
 
 fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
@@ -248,6 +248,7 @@ impl Board {
                      &{model}.0 }},\n"
                 );
             }
+            Work::Network(_) if case.model.len() > LARGEST_ON_BOARD => {}
             Work::Network(widths) => {
                 let widths: Vec<String> = widths.iter().map(u16::to_string).collect();
                 let (name, model) = (widths.join("-"), self.file(folder, &case.model)?);
@@ -268,13 +269,9 @@ impl Board {
             format!("FILE_{number}"),
         );
         write(&file, bytes)?;
-        // The first bank has the code, and room for one large model.
-        let section = match bytes.len() {
-            ..=LARGEST_IN_SECOND_BANK => "#[unsafe(link_section = \".bank2\")]\n",
-            _ => "",
-        };
+        // The first bank has the code.
         self.statics += &format!(
-            "{section}static {name}: AlignedFile<[u8; include_bytes!({file:?}).len()]> = \
+            "#[unsafe(link_section = \".bank2\")]\nstatic {name}: AlignedFile<[u8; include_bytes!({file:?}).len()]> = \
              AlignedFile(*include_bytes!({file:?}));\n"
         );
         self.files.insert(bytes.to_vec(), name.clone());
