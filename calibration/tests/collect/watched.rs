@@ -66,6 +66,7 @@ fn covered(coverage: &Value) -> usize {
 }
 
 #[test]
+#[ignore = "15 s: guided once more"]
 fn a_page_shows_what_the_terminal_says_and_orders_nothing() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();

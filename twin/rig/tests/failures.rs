@@ -156,6 +156,7 @@ fn sealed(bug: Bug, setup: impl FnOnce(Setup) -> Setup) -> Report {
 
 /// The rig's loader starts the program 0.3 s later, which fails again, four times in each round.
 #[test]
+#[ignore = "20 s: as one that stands still in its start"]
 fn a_program_that_fails_in_its_start_ends_in_the_loader() {
     let until = |virtual_ms: u64| {
         sealed(Bug::FaultAtStart, |setup| Setup {
@@ -172,7 +173,6 @@ fn a_program_that_fails_in_its_start_ends_in_the_loader() {
 }
 
 #[test]
-#[ignore = "as one that fails in its start"]
 fn a_program_that_stands_still_in_its_start_ends_in_the_loader() {
     let report = sealed(Bug::HangAtStart, |setup| Setup {
         virtual_ms: 8_500,

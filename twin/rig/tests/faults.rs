@@ -108,6 +108,7 @@ fn an_overrun_costs_a_frame_and_is_told() {
 /// Copies of bands and words of the camera wait for the bus, at random, and interrupts come again
 /// after they were cleared. No frame is lost.
 #[test]
+#[ignore = "7 s: as at half speed"]
 fn a_busy_bus_costs_nothing() {
     let run = Setup::new(firmware(), 280).fault("bus-busy").run();
     assert!(run.samples().len() >= 4, "{}", run.log());
