@@ -160,6 +160,7 @@ fn a_camera_at_half_its_rate_is_noticed() {
 }
 
 #[test]
+#[ignore = "20 s"]
 fn broken_frames_are_counted() {
     let words = ["too few or too many bytes"];
     let options = ["--scene", "rest", "--fault", "frame-short@150-100000"];
@@ -168,6 +169,7 @@ fn broken_frames_are_counted() {
 
 /// The scene presses the film during the tare.
 #[test]
+#[ignore = "13 s"]
 fn a_press_during_the_tare_is_refused() {
     let (output, report) = bring_up(&["--scene", "static"]);
     assert_eq!(output.code, Some(9), "{output:?}");

@@ -111,6 +111,7 @@ fn a_pulled_cable_is_reported_and_survived() {
 }
 
 #[test]
+#[ignore = "25 s: as one that reconnects"]
 fn a_pulled_cable_ends_a_monitor_that_does_not_reconnect() {
     let (output, ..) = watch_pulled(&["--frames", "60"]);
     assert_eq!(output.code, Some(5), "{output:?}");

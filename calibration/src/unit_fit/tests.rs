@@ -351,6 +351,7 @@ fn a_unit_of_eight_dots_is_found_from_ten_loads() {
 /// Loads that the nominal family explains determine the tip's and the posts' numbers alone: ten
 /// loads cannot distinguish a stretched film from a stiffer one.
 #[test]
+#[ignore = "30 s: as from a recording"]
 fn a_film_of_the_nominal_family_is_found_as_one() {
     let truth = stiffer(0.6);
     let loads: Vec<SeenLoad> = (0..LOADS.len()).map(|k| truth.load(k)).collect();
