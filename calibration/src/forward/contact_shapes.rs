@@ -32,7 +32,7 @@ const WIDER: f64 = 1.4;
 const WIDER_AT_DOTS: f64 = 1.6;
 const AT_DOTS_MM: [f64; 2] = [1.0, 2.5];
 /// Half the width of a rim, mm.
-const RIM_MM: f64 = 0.3;
+pub(super) const RIM_MM: f64 = 0.3;
 /// How likely each kind is, all of its kind together.
 const ROUND: f64 = 0.35;
 const FLAT: f64 = 0.25;
@@ -208,7 +208,7 @@ impl NominalFilm {
             let by_needle = self.seen(&needle);
             let mut shifts = Vec::new();
             for (member, state) in members.iter().zip(&mut states) {
-                let patch = member.at(pose.place_mm)?;
+                let patch = member.patch.moved_to(pose.place_mm)?;
                 *state = self.film.press_patch(&patch, force_n, state)?;
                 let seen = self.seen(state);
                 shifts.push(Moved::from_fn(OF_FOUR, |k| seen[k] - by_needle[k]));
@@ -216,18 +216,6 @@ impl NominalFilm {
             all.push(shifts);
         }
         Ok(all)
-    }
-}
-
-impl Member {
-    /// The patch with its centre of pressure at a place, mm.
-    fn at(&self, place_mm: [f64; 2]) -> Result<Patch> {
-        let off_mm = self.patch.centre_mm();
-        let points = self.patch.points().iter().map(|(point, part)| {
-            let there = [0, 1].map(|way| point[way] - off_mm[way] + place_mm[way]);
-            (there, *part)
-        });
-        Ok(Patch::new(points.collect())?)
     }
 }
 
@@ -271,7 +259,7 @@ fn members() -> Result<Vec<Member>> {
 }
 
 /// The rim of a tilted face: its pressure falls evenly to zero at one side.
-fn tilted(radius_mm: f64, turn: f64) -> Result<Patch> {
+pub(super) fn tilted(radius_mm: f64, turn: f64) -> Result<Patch> {
     let rim = Patch::rim([0.0; 2], radius_mm, RIM_MM)?;
     let (sin, cos) = libm::sincos(turn);
     let tilted = rim.points().iter().map(|([x, y], part)| {

@@ -15,6 +15,7 @@ use hivtac_twin::film::reduced::{LARGEST_SIZE, NOMINAL_RADIUS_MM, Unit};
 use hivtac_twin::{Camera, Disc, Preset};
 use rayon::prelude::*;
 
+use super::contact_shapes::{RIM_MM, tilted};
 use super::covariances::Moved;
 use super::{LeastSquares, UnitSetup, in_focal_lengths};
 
@@ -32,8 +33,6 @@ const DISCS_MM: [f64; 8] = [0.25, 0.6, 1.0, 1.5, 2.0, 2.75, 3.4, 4.0];
 const RIMS_MM: [f64; 5] = [0.6, 1.0, 1.75, 2.5, 3.2];
 /// Radii of faces that are tilted so far that they just touch all around.
 const TILTED_MM: [f64; 2] = [2.0, 3.0];
-/// Half the width of a rim, mm.
-const RIM_MM: f64 = 0.3;
 /// Half the axes of a pad, and half the length and the half width of an edge, mm; the radius of the
 /// soft disc that is as wide.
 const PAD_MM: ([f64; 2], f64) = ([4.0, 2.5], 3.2);
@@ -323,23 +322,15 @@ fn under_all(film: &Film, members: &[Member], place_mm: [f64; 2]) -> Result<Vec<
         let contact = Contact::Force(force_n);
         let mut states = vec![film.press_at(place_mm, NOMINAL_RADIUS_MM, contact, before(0))?];
         for (k, member) in members.iter().enumerate() {
-            states.push(film.press_patch(&member.at(place_mm)?, force_n, before(k + 1))?);
+            states.push(film.press_patch(
+                &member.patch.moved_to(place_mm)?,
+                force_n,
+                before(k + 1),
+            )?);
         }
         all.push(states);
     }
     Ok(all)
-}
-
-impl Member {
-    /// The patch with its centre of pressure at a place, mm.
-    fn at(&self, place_mm: [f64; 2]) -> Result<Patch> {
-        let off_mm = self.patch.centre_mm();
-        let points = self.patch.points().iter().map(|(point, part)| {
-            let there = [0, 1].map(|way| point[way] - off_mm[way] + place_mm[way]);
-            (there, *part)
-        });
-        Ok(Patch::new(points.collect())?)
-    }
 }
 
 /// The width of a soft disc of this radius, mm.
@@ -423,15 +414,4 @@ fn members() -> Result<Vec<Member>> {
         number += WAYS;
     }
     Ok(members)
-}
-
-/// The rim of a tilted face: its pressure falls evenly to zero at one side.
-fn tilted(radius_mm: f64, turn: f64) -> Result<Patch> {
-    let rim = Patch::rim([0.0; 2], radius_mm, RIM_MM)?;
-    let (sin, cos) = libm::sincos(turn);
-    let tilted = rim.points().iter().map(|([x, y], part)| {
-        let along = (cos * x + sin * y) / (radius_mm + RIM_MM);
-        ([*x, *y], part * (1.0 + along))
-    });
-    Ok(Patch::new(tilted.collect())?)
 }

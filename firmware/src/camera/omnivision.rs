@@ -13,8 +13,8 @@ use core::ops::RangeInclusive;
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_time::{Duration, Timer};
 use heapless::Vec;
-use hivtac_portable::device::camera::Facts;
 pub use hivtac_portable::device::camera::ov7725::{FACTS, HEIGHT, PIXELS, PRESET, WIDTH, XCLK_HZ};
+use hivtac_portable::device::camera::{Facts, Rolling};
 use hivtac_terms::camera::{CameraSettings, Rate, White};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
@@ -155,16 +155,8 @@ pub struct Part {
     pub level: u16,
     /// Gain from which the automatic control has no more to give.
     pub most_automatic_gain: Sixteenths,
-    /// Lines from frame to frame.
-    pub lines_of_frame: u16,
-    /// Longest exposure, lines.
-    pub longest_exposure: u16,
-    /// The number of lines nearest to a time.
-    pub lines: fn(Microseconds, Rate) -> u16,
-    /// The exposure of a row, of a number of lines.
-    pub exposed: fn(u32, Rate) -> Microseconds,
-    /// Time from VSYNC to the middle of the middle row's exposure of a number of lines, µs.
-    pub middle_us: fn(u32, Rate) -> i32,
+    /// The times of its rows.
+    pub rows: Rolling,
 }
 
 /// The camera's control side.
@@ -310,7 +302,7 @@ impl Camera {
         self.take(search.found);
         self.registers.set(&self.locked()).await?;
         let rate = self.settings.rate;
-        let middle_us = (part.middle_us)(self.lines(), rate);
+        let middle_us = part.rows.middle_us(self.lines(), rate);
         store(middle_us, self.settings, self.exposed(), self.kept.gain);
         Ok(())
     }
@@ -321,7 +313,7 @@ impl Camera {
         let settings = self.settings;
         let (exposure, amplified) = match () {
             () if level < *RESTS.start() => (
-                lines >= self.part.longest_exposure,
+                lines >= self.part.rows.longest_exposure,
                 gain >= self.part.most_automatic_gain,
             ),
             () if level > *RESTS.end() => (lines <= 1, gain <= Sixteenths(16)),
@@ -333,7 +325,7 @@ impl Camera {
     /// Keeps the values of the settings, otherwise those found.
     fn take(&mut self, found: Light) {
         let CameraSettings { exposure, gain, .. } = self.settings;
-        let lines = exposure.map(|time| (self.part.lines)(time, self.settings.rate));
+        let lines = exposure.map(|time| self.part.rows.lines_in(time, self.settings.rate));
         let wanted = Light {
             lines: lines.unwrap_or(found.lines),
             gain: gain.unwrap_or(found.gain),
@@ -375,12 +367,12 @@ impl Camera {
 
     /// The exposure of a row, as kept.
     fn exposed(&self) -> Microseconds {
-        (self.part.exposed)(self.lines(), self.settings.rate)
+        (self.part.rows).exposed(self.lines(), self.settings.rate)
     }
 
     /// The exposure of a row in lines, as kept.
     fn lines(&self) -> u32 {
-        u32::from(self.kept.lines.min(self.part.lines_of_frame))
+        u32::from(self.kept.lines.min(self.part.rows.lines))
     }
 
     /// Reads exposure and gain.

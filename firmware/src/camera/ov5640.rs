@@ -7,9 +7,7 @@ use super::ov5640_registers::{
     RESET, TABLE, clock, format, white,
 };
 use super::registers::few;
-use hivtac_portable::device::camera::ov5640::{
-    FACTS, LINES, LONGEST_EXPOSURE, WHITE, exposed, lines, middle_us,
-};
+use hivtac_portable::device::camera::ov5640::{FACTS, ROWS, WHITE};
 use hivtac_terms::units::Sixteenths;
 
 /// The camera.
@@ -35,11 +33,7 @@ pub const PART: Part = Part {
     held_of,
     level: LEVEL,
     most_automatic_gain: MOST_AUTOMATIC_GAIN,
-    lines_of_frame: LINES,
-    longest_exposure: LONGEST_EXPOSURE,
-    lines,
-    exposed,
-    middle_us,
+    rows: ROWS,
 };
 
 /// Exposure has 20 bits, in sixteenths of a line; gain ten, in sixteenths.

@@ -7,9 +7,7 @@ use super::ov7725_registers::{
     MOST_AUTOMATIC_GAIN, NEEDED, TABLE, clock, format, white,
 };
 use super::registers::few;
-use hivtac_portable::device::camera::ov7725::{
-    FACTS, LINES, LONGEST_EXPOSURE, exposed, lines, middle_us,
-};
+use hivtac_portable::device::camera::ov7725::{FACTS, ROWS};
 use hivtac_terms::camera::White;
 use hivtac_terms::units::Sixteenths;
 
@@ -36,11 +34,7 @@ pub const PART: Part = Part {
     held_of,
     level: LEVEL,
     most_automatic_gain: MOST_AUTOMATIC_GAIN,
-    lines_of_frame: LINES,
-    longest_exposure: LONGEST_EXPOSURE,
-    lines,
-    exposed,
-    middle_us,
+    rows: ROWS,
 };
 
 fn light_of(held: &[u8]) -> Light {

@@ -166,7 +166,7 @@ impl Camera {
     fn lines_of(&self, exposure: Microseconds) -> u16 {
         let rate = self.settings.rate;
         match self.kind {
-            Kind::Ov7725 => ov7725::lines(exposure, rate),
+            Kind::Ov7725 => ov7725::ROWS.lines_in(exposure, rate),
             Kind::Mt9v034 => mt9v034::rows_in(exposure).clamp(1, mt9v034::longest_exposure(rate)),
         }
     }
@@ -179,7 +179,7 @@ impl Camera {
     /// The exposure of each row.
     fn exposed(&self) -> Microseconds {
         match self.kind {
-            Kind::Ov7725 => ov7725::exposed(self.lines.into(), self.settings.rate),
+            Kind::Ov7725 => ov7725::ROWS.exposed(self.lines.into(), self.settings.rate),
             Kind::Mt9v034 => Microseconds(mt9v034::rows_us(self.lines)),
         }
     }
@@ -213,7 +213,7 @@ impl Camera {
     /// Time from a frame's begin to the middle of its exposure, µs.
     pub fn middle_us(&self) -> i32 {
         match self.kind {
-            Kind::Ov7725 => ov7725::middle_us(self.lines.into(), self.settings.rate),
+            Kind::Ov7725 => ov7725::ROWS.middle_us(self.lines.into(), self.settings.rate),
             Kind::Mt9v034 => mt9v034::middle_us(self.exposed()),
         }
     }

@@ -1,7 +1,9 @@
 //! Tests of the second board, an OpenMV Cam H7 with an MT9V034: it has the properties of the first
 //! one.
 
-use crate::common::{Bug, Run, Setup, command, firmware, openmv, other, set_threshold};
+use crate::common::{
+    Bug, Run, Setup, assert_usual, command, firmware, openmv, other, set_threshold,
+};
 use crate::led;
 use hivtac_rig::board;
 use hivtac_rig::camera::part;
@@ -9,26 +11,14 @@ use hivtac_rig::chip::Revision;
 use hivtac_rig::script::Action;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
-use hivtac_wire::message::{Outcome, Request, Sample};
-
-/// All statuses of a sample in an undisturbed scene before a tare. The demo's tip wanders over the
-/// film; fast parts are a slip.
-const USUAL: Status =
-    Status(Status::TARE_MISSING.0 | Status::NOT_CALIBRATED.0 | Status::CONTACT.0 | Status::SLIP.0);
-
-/// Returns the time of the middle of a frame's exposure, s.
-fn exposed_s(run: &Run, frame: u64) -> f64 {
-    let line = run.truth.iter().find(|line| line["frame"] == frame);
-    line.expect("exposed")["time_s"].as_f64().unwrap()
-}
+use hivtac_wire::message::{Outcome, Request};
 
 fn assert_good(run: &Run) {
     let samples = run.samples();
     assert!(samples.len() >= 6, "{}: {}", samples.len(), run.log());
     for sample in &samples {
         assert!(sample.force.is_some(), "{sample:?}");
-        let others = sample.status.0 & !USUAL.0 & !Status::CAMERA_RESTARTED.0;
-        assert_eq!(others & !Status::FRAME_DROPPED.0, 0, "{sample:?}");
+        assert_usual(sample);
     }
     run.assert_times();
     run.assert_only_setup_drops();
@@ -44,16 +34,10 @@ fn every_frame_is_measured_at_230_a_second_within_7_ms() {
     assert_eq!((hello.width, hello.height), (160, 152));
     assert_eq!(hello.board.as_str(), "openmv-h7 + mt9v034");
     assert_eq!(hello.preset.as_str(), "mt9v034");
-    let frames: Vec<u64> = (run.arrivals.iter())
-        .map(|line| line["frame"].as_u64().unwrap())
-        .collect();
-    let [first, last] = [frames[0], frames[frames.len() - 1]];
-    let rate_hz = (last - first) as f64 / (exposed_s(&run, last) - exposed_s(&run, first));
+    let rate_hz = run.rate_hz();
     assert!(rate_hz >= 230.0, "{rate_hz} forces a second");
-    for line in &run.arrivals {
-        let exposed_s = exposed_s(&run, line["frame"].as_u64().unwrap());
-        let latency_s = line["time_s"].as_f64().unwrap() - exposed_s;
-        assert!(latency_s <= 0.007, "{latency_s} s of {line}");
+    for (frame, latency_s) in run.latencies() {
+        assert!(latency_s <= 0.007, "{latency_s} s of {frame}");
     }
 }
 
@@ -61,12 +45,7 @@ fn every_frame_is_measured_at_230_a_second_within_7_ms() {
 #[test]
 fn forces_are_the_true_ones() {
     let run = openmv(420).run();
-    let off_un = |sample: &&Sample| {
-        let truth = run.truth.iter().find(|line| line["frame"] == sample.frame);
-        let truth_n = truth.unwrap()["magnitude_n"].as_f64().unwrap();
-        (f64::from(sample.force.unwrap().magnitude.0) - 1e6 * truth_n).abs()
-    };
-    let worst_un = run.samples().iter().map(off_un).fold(0.0, f64::max);
+    let worst_un = run.worst_force_un(&run.samples());
     assert!(worst_un < 600.0, "{worst_un} µN");
 }
 

@@ -1,7 +1,7 @@
 //! Tests of the first board with an OV5640 in its camera's socket: the firmware is the same as with
 //! an OV7725, and so are the properties.
 
-use crate::common::{Bug, Run, Setup, command, firmware, other, set_threshold};
+use crate::common::{Bug, Run, Setup, assert_usual, command, firmware, other, set_threshold};
 use hivtac_rig::camera::part;
 use hivtac_rig::script::Action;
 use hivtac_terms::camera::{CameraSettings, Rate, White};
@@ -11,10 +11,6 @@ use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::health::Problem;
 use hivtac_wire::message::{DeviceMessage, Outcome, Request, Sample};
 
-/// All statuses of a sample in an undisturbed scene before a tare. The demo's tip wanders over the
-/// film; fast parts are a slip.
-const USUAL: Status =
-    Status(Status::TARE_MISSING.0 | Status::NOT_CALIBRATED.0 | Status::CONTACT.0 | Status::SLIP.0);
 /// The camera was set up before this time, ms.
 const READY_MS: u64 = 480;
 /// 463 of the 467 lines of a frame.
@@ -29,12 +25,6 @@ fn ov5640(virtual_ms: u64) -> Setup {
 
 fn send(id: u16, request: Request) -> Action {
     Action::Send(command(id, request))
-}
-
-/// Returns the time of the middle of a frame's exposure, s.
-fn exposed_s(run: &Run, frame: u64) -> f64 {
-    let line = run.truth.iter().find(|line| line["frame"] == frame);
-    line.expect("exposed")["time_s"].as_f64().unwrap()
 }
 
 /// Returns the samples with a force. More noise than usual is not known in the first frames, and
@@ -58,8 +48,7 @@ fn forces(run: &Run) -> Vec<&Sample> {
 
 fn assert_good(run: &Run) {
     for sample in forces(run) {
-        let others = sample.status.0 & !USUAL.0 & !Status::CAMERA_RESTARTED.0;
-        assert_eq!(others & !Status::FRAME_DROPPED.0, 0, "{sample:?}");
+        assert_usual(sample);
     }
     run.assert_times();
     run.assert_only_setup_drops();
@@ -75,17 +64,11 @@ fn every_frame_is_measured_at_110_a_second_within_10_ms() {
     let hello = run.hellos()[0];
     assert_eq!((hello.width, hello.height), (320, 240));
     assert_eq!(hello.board.as_str(), "weact-h743 + ov5640");
-    let frames: Vec<u64> = (run.arrivals.iter())
-        .map(|line| line["frame"].as_u64().unwrap())
-        .collect();
-    let [first, last] = [frames[0], frames[frames.len() - 1]];
-    let rate_hz = (last - first) as f64 / (exposed_s(&run, last) - exposed_s(&run, first));
+    let rate_hz = run.rate_hz();
     assert!(rate_hz >= 110.0, "{rate_hz} forces a second");
     // The first frames' motion and noise are not known, which costs time.
-    for line in &run.arrivals[2..] {
-        let exposed_s = exposed_s(&run, line["frame"].as_u64().unwrap());
-        let latency_s = line["time_s"].as_f64().unwrap() - exposed_s;
-        assert!(latency_s <= 0.010, "{latency_s} s of {line}");
+    for (frame, latency_s) in run.latencies().into_iter().skip(2) {
+        assert!(latency_s <= 0.010, "{latency_s} s of {frame}");
     }
 }
 
@@ -93,13 +76,8 @@ fn every_frame_is_measured_at_110_a_second_within_10_ms() {
 #[test]
 fn forces_are_the_true_ones() {
     let run = ov5640(700).run();
-    let off_un = |sample: &&Sample| {
-        let truth = run.truth.iter().find(|line| line["frame"] == sample.frame);
-        let truth_n = truth.unwrap()["magnitude_n"].as_f64().unwrap();
-        (f64::from(sample.force.unwrap().magnitude.0) - 1e6 * truth_n).abs()
-    };
     let samples = forces(&run);
-    let worst_un = samples.iter().map(off_un).fold(0.0, f64::max);
+    let worst_un = run.worst_force_un(&samples);
     assert!(samples.len() >= 20 && worst_un < 1_500.0, "{worst_un} µN");
 }
 

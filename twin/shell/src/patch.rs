@@ -142,6 +142,19 @@ impl Patch {
         Patch::new(points.collect())
     }
 
+    /// Returns this patch with its centre of pressure at a place, mm.
+    ///
+    /// # Errors
+    /// If the place is not finite.
+    pub fn moved_to(&self, place_mm: [f64; 2]) -> Result<Patch, ShellError> {
+        let off_mm = self.centre_mm();
+        let points = self.points.iter().map(|(point, part)| {
+            let there = [0, 1].map(|way| point[way] - off_mm[way] + place_mm[way]);
+            (there, *part)
+        });
+        Patch::new(points.collect())
+    }
+
     /// Returns the points, mm, and their parts of the force.
     pub fn points(&self) -> &[([f64; 2], f64)] {
         &self.points

@@ -356,6 +356,17 @@ fn frame(message: &HostMessage) -> Vec<u8> {
     [&[0], encode(message, &mut buffer).unwrap()].concat()
 }
 
+/// All statuses of a sample in an undisturbed scene before a tare. The demo's tip wanders over the
+/// film; fast parts are a slip.
+const USUAL: Status =
+    Status(Status::TARE_MISSING.0 | Status::NOT_CALIBRATED.0 | Status::CONTACT.0 | Status::SLIP.0);
+
+/// Asserts that a sample has no statuses but the usual ones, and those of frames lost before it.
+pub fn assert_usual(sample: &Sample) {
+    let others = sample.status.0 & !USUAL.0 & !Status::CAMERA_RESTARTED.0;
+    assert_eq!(others & !Status::FRAME_DROPPED.0, 0, "{sample:?}");
+}
+
 /// The results of a run.
 pub struct Run {
     pub bytes: Vec<u8>,
@@ -559,9 +570,36 @@ impl Run {
             .collect()
     }
 
+    /// Returns the forces a second on the wire, from the exposures of the first and the last one.
+    pub fn rate_hz(&self) -> f64 {
+        let frame = |line: &Value| line["frame"].as_u64().unwrap();
+        let ends = [self.arrivals.first(), self.arrivals.last()];
+        let [first, last] = ends.map(|line| frame(line.expect("samples")));
+        let [begin_s, end_s] = [first, last].map(|frame| self.exposed_s(frame));
+        (last - first) as f64 / (end_s - begin_s)
+    }
+
+    /// Returns the largest difference between |F| of these samples and the truth, µN.
+    pub fn worst_force_un(&self, samples: &[&Sample]) -> f64 {
+        let off_un = |sample: &&Sample| {
+            let truth_n = self.truth_of(sample.frame)["magnitude_n"].as_f64().unwrap();
+            (f64::from(sample.force.unwrap().magnitude.0) - 1e6 * truth_n).abs()
+        };
+        samples.iter().map(off_un).fold(0.0, f64::max)
+    }
+
+    /// Returns the time of the middle of a frame's exposure, s.
+    fn exposed_s(&self, frame: impl Into<u64>) -> f64 {
+        self.truth_of(frame)["time_s"].as_f64().unwrap()
+    }
+
+    fn truth_of(&self, frame: impl Into<u64>) -> &Value {
+        let frame = frame.into();
+        let exposed = self.truth.iter().find(|truth| truth["frame"] == frame);
+        exposed.unwrap_or_else(|| panic!("frame {frame} was never exposed"))
+    }
+
     fn true_time_us(&self, frame: u32) -> i64 {
-        let exposed = self.truth.iter().find(|t| t["frame"] == frame);
-        let exposed = exposed.unwrap_or_else(|| panic!("frame {frame} was never exposed"));
-        (exposed["time_s"].as_f64().unwrap() * 1e6) as i64
+        (self.exposed_s(frame) * 1e6) as i64
     }
 }

@@ -3,12 +3,11 @@
 //! Frames and model are those of the OV7725: with a lens of 1.8 mm, the window makes a radian as
 //! many pixels.
 
-use super::Facts;
+use super::{Facts, Rolling};
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, Rate, White};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
-use hivtac_terms::units::Microseconds;
 
 /// Name in the device's hello.
 pub const NAME: &str = "ov5640";
@@ -38,31 +37,30 @@ pub const SUBSAMPLING: u16 = 4;
 pub const LINES: u16 = WINDOW[1] / SUBSAMPLING + 2 + 24;
 /// Clocks of a line: OpenMV has no fewer.
 pub const LINE_CLOCKS: u16 = 1_438;
+/// Clocks from frame to frame.
+const FRAME_CLOCKS: u64 = LINES as u64 * LINE_CLOCKS as u64;
 /// The clock of the lines at the full rate, Hz: that of OpenMV. Lower rates divide it.
 const FULL_CLOCK_HZ: u64 = 80_000_000;
 /// Longest exposure, lines, as in Linux.
 pub const LONGEST_EXPOSURE: u16 = LINES - 4;
 /// Lines from the VSYNC edge that begins a frame to the first row (data sheet, DVP timing).
 const LINES_TO_FIRST_ROW: u32 = 17;
-/// The same to the middle row. A row's exposure ends when it is read, which is when it is sent.
+/// The same to the middle row.
 const LINES_TO_MIDDLE_ROW: u32 = LINES_TO_FIRST_ROW + (WINDOW[1] / SUBSAMPLING) as u32 / 2;
 /// Exposure of its rows, one after the other: a row of a frame is 1.84 lines.
 pub const MOTION: Motion =
     Motion::rolling((LINES as u32 * HEIGHT as u32 / (WINDOW[1] / SUBSAMPLING) as u32) as u16);
 
+/// The times of its rows.
+pub const ROWS: Rolling = Rolling {
+    lines: LINES,
+    longest_exposure: LONGEST_EXPOSURE,
+    to_middle_row: LINES_TO_MIDDLE_ROW,
+    frame_clocks: FRAME_CLOCKS,
+    full_clock_hz: FULL_CLOCK_HZ,
+};
 /// The limits of its settings.
-pub const LIMITS: CameraLimits = super::limits(
-    [
-        frame_us(Rate::Full),
-        frame_us(Rate::Half),
-        frame_us(Rate::Quarter),
-    ],
-    [
-        exposures(Rate::Full),
-        exposures(Rate::Half),
-        exposures(Rate::Quarter),
-    ],
-);
+pub const LIMITS: CameraLimits = ROWS.limits();
 
 /// Its facts.
 pub const FACTS: Facts = Facts {
@@ -74,30 +72,5 @@ pub const FACTS: Facts = Facts {
 
 /// Time from frame to frame, µs.
 pub const fn frame_us(rate: Rate) -> u32 {
-    let clocks = LINES as u64 * LINE_CLOCKS as u64 * rate.divisor() as u64;
-    (clocks * 1_000_000 / FULL_CLOCK_HZ) as u32
-}
-
-/// Shortest and longest exposure: from one line to the longest.
-const fn exposures(rate: Rate) -> [Microseconds; 2] {
-    [
-        Microseconds(frame_us(rate).div_ceil(LINES as u32)),
-        exposed(LONGEST_EXPOSURE as u32, rate),
-    ]
-}
-
-/// The number of lines nearest to a time, at least 1 and at most [`LONGEST_EXPOSURE`].
-pub fn lines(exposure: Microseconds, rate: Rate) -> u16 {
-    super::lines_in(exposure, frame_us(rate), LINES).clamp(1, LONGEST_EXPOSURE)
-}
-
-/// The exposure of a row, of a number of lines.
-pub const fn exposed(lines: u32, rate: Rate) -> Microseconds {
-    Microseconds(lines * frame_us(rate) / LINES as u32)
-}
-
-/// Time from the VSYNC edge that begins a frame to the middle of its middle row's exposure of at
-/// most [`LINES`] lines, µs.
-pub const fn middle_us(lines: u32, rate: Rate) -> i32 {
-    super::middle_us(LINES_TO_MIDDLE_ROW, lines, frame_us(rate), LINES)
+    ROWS.frame_us(rate)
 }

@@ -1,11 +1,10 @@
 //! OmniVision OV7725: 320 × 240, RGB565 or YUV422, rows exposed one after the other.
 
-use super::Facts;
+use super::{Facts, Rolling};
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, Rate};
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
-use hivtac_terms::units::Microseconds;
 
 /// Name in the device's hello.
 pub const NAME: &str = "ov7725";
@@ -32,24 +31,21 @@ pub const MOTION: Motion = Motion::rolling(LINES);
 /// Clocks from frame to frame: lines of 576 pixels of two bytes, one byte per PCLK.
 const FRAME_CLOCKS: u64 = LINES as u64 * 576 * 2;
 /// Lines from the VSYNC edge that begins a frame to the middle row: 22 blank lines and half of the
-/// rows. A row's exposure ends when it is read, which is when it is sent.
+/// rows.
 const LINES_TO_MIDDLE_ROW: u32 = 22 + HEIGHT as u32 / 2;
 /// PCLK at the full rate: XCLK times the sensor's PLL factor. Lower rates divide it.
 const FULL_PCLK_HZ: u64 = 4 * XCLK_HZ as u64;
 
+/// The times of its rows.
+pub const ROWS: Rolling = Rolling {
+    lines: LINES,
+    longest_exposure: LONGEST_EXPOSURE,
+    to_middle_row: LINES_TO_MIDDLE_ROW,
+    frame_clocks: FRAME_CLOCKS,
+    full_clock_hz: FULL_PCLK_HZ,
+};
 /// The limits of its settings.
-pub const LIMITS: CameraLimits = super::limits(
-    [
-        frame_us(Rate::Full),
-        frame_us(Rate::Half),
-        frame_us(Rate::Quarter),
-    ],
-    [
-        exposures(Rate::Full),
-        exposures(Rate::Half),
-        exposures(Rate::Quarter),
-    ],
-);
+pub const LIMITS: CameraLimits = ROWS.limits();
 
 /// Its facts.
 pub const FACTS: Facts = Facts {
@@ -61,29 +57,5 @@ pub const FACTS: Facts = Facts {
 
 /// Time from frame to frame, µs.
 pub const fn frame_us(rate: Rate) -> u32 {
-    (FRAME_CLOCKS * rate.divisor() as u64 * 1_000_000 / FULL_PCLK_HZ) as u32
-}
-
-/// Shortest and longest exposure: from one line to the longest.
-const fn exposures(rate: Rate) -> [Microseconds; 2] {
-    [
-        Microseconds(frame_us(rate).div_ceil(LINES as u32)),
-        exposed(LONGEST_EXPOSURE as u32, rate),
-    ]
-}
-
-/// The number of lines nearest to a time, at least 1 and at most [`LONGEST_EXPOSURE`].
-pub fn lines(exposure: Microseconds, rate: Rate) -> u16 {
-    super::lines_in(exposure, frame_us(rate), LINES).clamp(1, LONGEST_EXPOSURE)
-}
-
-/// The exposure of a row, of a number of lines.
-pub const fn exposed(lines: u32, rate: Rate) -> Microseconds {
-    Microseconds(lines * frame_us(rate) / LINES as u32)
-}
-
-/// Time from the VSYNC edge that begins a frame to the middle of its middle row's exposure of at
-/// most [`LINES`] lines, µs.
-pub const fn middle_us(lines: u32, rate: Rate) -> i32 {
-    super::middle_us(LINES_TO_MIDDLE_ROW, lines, frame_us(rate), LINES)
+    ROWS.frame_us(rate)
 }
