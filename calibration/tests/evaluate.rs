@@ -1,14 +1,8 @@
 //! Evaluates a model on the paper's poses and draws the paper's figures.
 
-use std::sync::LazyLock;
-
 use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::data::range::Range;
 use hivtac_calibration::evaluation::Evaluation;
-use hivtac_calibration::fit::fit;
-use hivtac_calibration::network::Arithmetic;
-use hivtac_calibration::quantize::export;
-use hivtac_calibration::train::Options;
 use hivtac_terms::conditions::CentroidEstimator;
 
 /// A tip in the film's middle.
@@ -30,28 +24,13 @@ fn data(loads: Loads, seed: u64) -> Dataset {
     generate(&recipe, || ()).unwrap()
 }
 
-fn model() -> &'static [u8] {
-    static MODEL: LazyLock<Vec<u8>> = LazyLock::new(|| {
-        let options = Options {
-            hidden: vec![16, 16],
-            epochs: 300,
-            rounded_epochs: 60,
-            batch: 64,
-            arithmetic: Arithmetic::Int16,
-            direction_weight: None,
-            ..Options::default()
-        };
-        let data = data(Loads::Random(1500), 1);
-        let fitted = fit(&data, &options, |_| ()).unwrap();
-        export(&fitted.weights).unwrap()
-    });
-    &MODEL
-}
+/// The committed model, which answers with a force and a place.
+const MODEL: &[u8] = include_bytes!("../models/default.hvtm");
 
 #[test]
 fn the_report_says_what_it_is_and_needs_nothing_else() {
     let poses = data(Loads::PaperPoses(1), 2);
-    let evaluation = Evaluation::of(model(), &poses).unwrap();
+    let evaluation = Evaluation::of(MODEL, &poses).unwrap();
     let [(_, all), (_, weak), (_, strong)] = evaluation.groups();
     let (all, weak, strong) = (all.unwrap(), weak.unwrap(), strong.unwrap());
     assert_eq!((all.frames, weak.frames + strong.frames), (357, 357));
@@ -77,7 +56,7 @@ fn the_report_says_what_it_is_and_needs_nothing_else() {
             .all(|words| !outside.contains(words))
     );
 
-    let random = Evaluation::of(model(), &data(Loads::Random(60), 3)).unwrap();
+    let random = Evaluation::of(MODEL, &data(Loads::Random(60), 3)).unwrap();
     assert_eq!(random.to_html().matches("<svg").count(), 7);
 }
 
@@ -91,12 +70,12 @@ fn what_does_not_fit_is_refused() {
         ..Recipe::default()
     };
     let other = generate(&recipe, || ()).unwrap();
-    let error = Evaluation::of(model(), &other).unwrap_err().to_string();
+    let error = Evaluation::of(MODEL, &other).unwrap_err().to_string();
     assert!(error.contains("other conditions"), "{error}");
     let error = Evaluation::of(b"HVTM", &other).unwrap_err().to_string();
     assert!(error.contains("not a usable model file"), "{error}");
     let mut untouched = data(Loads::Random(1), 4);
     untouched.rows.truncate(8);
-    let error = Evaluation::of(model(), &untouched).unwrap_err().to_string();
+    let error = Evaluation::of(MODEL, &untouched).unwrap_err().to_string();
     assert!(error.contains("no accepted frame with a force"), "{error}");
 }

@@ -65,6 +65,7 @@ fn a_film_that_cannot_be_tared_is_not_recorded() {
 }
 
 #[test]
+#[ignore = "24 s: as a unit is led from presses anywhere, from a recording"]
 fn from_a_recording_to_a_model_for_the_unit() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
