@@ -1,9 +1,9 @@
-//! Runs scripts in the Cortex-M7 image under QEMU, and on this computer.
+//! Runs scripts in the images for Cortex-M cores under QEMU, and on this computer.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::string::String;
-use std::{fs, vec::Vec};
+use std::{env, fs, vec::Vec};
 
 use anyhow::{Context, Result, ensure};
 
@@ -11,15 +11,52 @@ use crate::artifact;
 use crate::golden::{Buffers, MAX_ROW_PIXELS, NO_USUAL_MODEL, Runner, TWO_BANDS_PIXELS};
 use crate::script::Script;
 
-/// Runs a script on the emulated Cortex-M7 (`HIVTAC_QEMU_IMAGE`) and returns the printed text.
+/// A core that QEMU emulates.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Core {
+    /// Cortex-M7, the sensor's own. `HIVTAC_QEMU_IMAGE` names its image.
+    M7,
+    /// Cortex-M55. `HIVTAC_M55_IMAGE` names its image.
+    M55,
+}
+
+/// The variable that names the Cortex-M55's image.
+const M55_IMAGE: &str = "HIVTAC_M55_IMAGE";
+
+impl Core {
+    /// Returns the Cortex-M7, and the Cortex-M55 if its image is named.
+    pub fn wanted() -> Vec<Core> {
+        match env::var_os(M55_IMAGE) {
+            Some(_) => Vec::from([Core::M7, Core::M55]),
+            None => Vec::from([Core::M7]),
+        }
+    }
+
+    fn image(self) -> PathBuf {
+        artifact::named_by(match self {
+            Core::M7 => "HIVTAC_QEMU_IMAGE",
+            Core::M55 => M55_IMAGE,
+        })
+    }
+
+    /// Returns QEMU's name of a machine with this core.
+    fn machine(self) -> &'static str {
+        match self {
+            Core::M7 => "mps2-an500",
+            Core::M55 => "mps3-an547",
+        }
+    }
+}
+
+/// Runs a script on an emulated core and returns the printed text.
 ///
 /// # Errors
 /// If QEMU cannot be started, or the image fails.
-pub fn run(script: &Script) -> Result<String> {
+pub fn run(core: Core, script: &Script) -> Result<String> {
     let folder = tempfile::tempdir().context("creating a temporary folder")?;
     let (input, output) = (folder.path().join("script"), folder.path().join("results"));
     fs::write(&input, script.bytes()).context("writing the script")?;
-    let run = command(&artifact::named_by("HIVTAC_QEMU_IMAGE"), &input, &output)
+    let run = command(core, &input, &output)
         .output()
         .context("starting qemu-system-arm (Debian package qemu-system-arm)")?;
     let said = String::from_utf8_lossy(&run.stderr);
@@ -54,7 +91,7 @@ pub fn run_on_host(script: &Script) -> Result<String> {
 }
 
 /// Returns the command for QEMU with the image; `timeout` ends it if it hangs.
-fn command(image: &Path, input: &Path, output: &Path) -> Command {
+fn command(core: Core, input: &Path, output: &Path) -> Command {
     let (input, output) = (input.display(), output.display());
     let semihosting =
         std::format!("enable=on,target=native,arg=hivtac-qemu-image,arg={input},arg={output}");
@@ -64,7 +101,7 @@ fn command(image: &Path, input: &Path, output: &Path) -> Command {
             "300",
             "qemu-system-arm",
             "-M",
-            "mps2-an500",
+            core.machine(),
             "-display",
             "none",
         ])
@@ -77,7 +114,7 @@ fn command(image: &Path, input: &Path, output: &Path) -> Command {
             &semihosting,
         ])
         .arg("-kernel")
-        .arg(image);
+        .arg(core.image());
     command
 }
 

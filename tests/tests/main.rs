@@ -3,7 +3,7 @@
 
 mod bring_up;
 mod calibration;
-mod cortex_m7;
+mod cortex_m;
 mod documents;
 mod faults;
 mod forces;

@@ -226,8 +226,19 @@ pub fn qemu_image() -> Result<PathBuf> {
 
 /// The cargo command that builds it.
 fn qemu_image_command() -> Command {
-    build_for_target("tests/qemu")
+    build_for_target(QEMU_IMAGE)
 }
+
+/// Builds the same as a Cortex-M55 program.
+pub fn m55_image() -> Result<PathBuf> {
+    build(
+        &mut toolchain::build_for_m55(QEMU_IMAGE)?,
+        "hivtac-qemu-image",
+    )
+}
+
+/// The folder of the program for QEMU.
+const QEMU_IMAGE: &str = "tests/qemu";
 
 /// Builds the WebAssembly module of the page that needs no server.
 pub fn web_module() -> Result<PathBuf> {

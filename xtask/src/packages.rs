@@ -34,10 +34,10 @@ pub fn install(packages: &str, why: &str) -> Result<()> {
     installed.with_context(|| format!("{why}, and installing {packages} failed"))
 }
 
-/// Installs QEMU's Cortex-M7 machine for tests and benchmark, if missing.
+/// Installs QEMU's Cortex-M machines for tests and benchmark, if missing.
 pub fn ensure_qemu() -> Result<()> {
     if process::find_program("qemu-system-arm").is_none() {
-        install("qemu-system-arm", "the Cortex-M7 emulator is missing")?;
+        install("qemu-system-arm", "the Cortex-M emulator is missing")?;
     }
     Ok(())
 }

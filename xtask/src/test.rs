@@ -242,6 +242,7 @@ fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
     command.env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image()?);
     if shared.all {
         // Only slow tests run these programs.
+        command.env("HIVTAC_M55_IMAGE", artifacts::m55_image()?);
         command.env(
             "HIVTAC_CALIBRATE",
             artifacts::host_program("hivtac-calibrate")?,

@@ -11,6 +11,8 @@ use crate::process::{self, command};
 
 /// The microcontroller's target: Cortex-M7 with a double-precision FPU.
 const TARGET: &str = "thumbv7em-none-eabihf";
+/// The target of a Cortex-M55, which only QEMU runs.
+const M55_TARGET: &str = "thumbv8m.main-none-eabihf";
 /// The target of browsers.
 pub const WEB_TARGET: &str = "wasm32-unknown-unknown";
 
@@ -47,6 +49,17 @@ pub fn build_for_target(folder: &str) -> Command {
     let mut command = cargo("build --release --target", folder);
     command.arg(TARGET);
     debian::instead(command)
+}
+
+/// `cargo build` for a Cortex-M55, whose target is added if it is missing.
+pub fn build_for_m55(folder: &str) -> Result<Command> {
+    ensure!(
+        add_target(M55_TARGET)?,
+        "rustup cannot add {M55_TARGET}: run `rustup target add {M55_TARGET}`"
+    );
+    let mut command = cargo("build --release --target", folder);
+    command.arg(M55_TARGET);
+    Ok(command)
 }
 
 /// The variable with the program that replaces the compiler for the project's own packages.

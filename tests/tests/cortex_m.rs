@@ -1,5 +1,5 @@
 //! Tests that the sensing gives the same bits on a Cortex-M7, emulated by QEMU, and on this
-//! computer.
+//! computer; with all tests, on a Cortex-M55, too.
 
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::MOST_STEPS;
@@ -13,17 +13,19 @@ use hivtac_terms::threshold::{Mono, Yuv422};
 use hivtac_terms::units::Px;
 use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
-use hivtac_tests::qemu;
+use hivtac_tests::qemu::{self, Core};
 use hivtac_tests::script::Script;
 use hivtac_twin::{Format, Load, Options, Preset, Scene};
 
-/// Runs a script on both and compares their output, byte for byte. Returns the text for further
-/// checks.
-fn same_on_both(script: &Script) -> String {
+/// Runs a script on this computer and on each emulated core, and compares their output, byte for
+/// byte. Returns the text for further checks.
+fn same_on_all(script: &Script) -> String {
     let host = qemu::run_on_host(script).unwrap();
-    let emulated = qemu::run(script).unwrap();
-    if let Some(difference) = qemu::first_difference(&host, &emulated) {
-        panic!("host (left) and Cortex-M7 (right) differ at {difference}");
+    for core in Core::wanted() {
+        let emulated = qemu::run(core, script).unwrap();
+        if let Some(difference) = qemu::first_difference(&host, &emulated) {
+            panic!("host (left) and {core:?} (right) differ at {difference}");
+        }
     }
     assert!(!host.is_empty(), "the script printed nothing");
     host
@@ -41,6 +43,13 @@ fn loads() -> Vec<Load> {
         }
     }
     loads
+}
+
+/// The other tests leave the Cortex-M55 out if nothing names its image.
+#[test]
+#[ignore = "all tests: its target is one more download"]
+fn the_cortex_m55_is_among_the_cores() {
+    assert!(Core::wanted().contains(&Core::M55));
 }
 
 #[test]
@@ -72,7 +81,7 @@ fn frames_of_the_scene_give_the_same_forces() {
         3,
     ));
     script.sense(320, &frames);
-    let text = same_on_both(&script);
+    let text = same_on_all(&script);
     let forces = text
         .lines()
         .filter(|line| line.contains("force: Some"))
@@ -112,7 +121,7 @@ fn frames_without_a_force_give_the_same_reasons() {
         3,
     ));
     script.sense(320, &frames);
-    let text = same_on_both(&script);
+    let text = same_on_all(&script);
     assert!(
         !text.contains("force: Some"),
         "no such frame has a force:\n{text}"
@@ -147,7 +156,7 @@ fn blobs_of_extreme_pictures_are_the_same() {
             script.scan(width, pixels, 1, 1);
         }
     }
-    let text = same_on_both(&script);
+    let text = same_on_all(&script);
     // All pixels are red, 800 × 600, with one dilation or none: Σx² is the largest of all moments.
     let sum_xx: u64 = 600 * (0..800_u64).map(|x| x * x).sum::<u64>();
     assert!(text.contains(&format!("sum_xx: {sum_xx}")), "{text}");
@@ -170,7 +179,7 @@ fn every_pixel_value_passes_the_same_thresholds() {
             }
         }
     }
-    same_on_both(&script);
+    same_on_all(&script);
 }
 
 #[test]
@@ -203,7 +212,7 @@ fn other_formats_pass_the_same_thresholds() {
             script.scan(320, &plain[..240 * words(320)], 1, 1);
         }
     }
-    same_on_both(&script);
+    same_on_all(&script);
 }
 
 #[test]
@@ -237,7 +246,7 @@ fn frames_in_other_formats_give_the_same_forces() {
         script.model(&models::file(widths, weights, output, 3));
         script.sense(320, &frames);
     }
-    let text = same_on_both(&script);
+    let text = same_on_all(&script);
     let count = |what: &str| text.lines().filter(|line| line.contains(what)).count();
     assert_eq!(count("force: Some"), 2 * loads().len(), "{text}");
     assert_eq!(count("force: None"), 2 * loads().len(), "{text}");
@@ -273,7 +282,7 @@ fn networks_give_the_same_outputs() {
             script.network(&models::rest(), &moved(&mut random, i64::from(i32::MAX)));
         }
     }
-    let text = same_on_both(&script);
+    let text = same_on_all(&script);
     assert!(
         text.contains("input_saturated: true"),
         "no input met its limit:\n{text}"
@@ -297,7 +306,7 @@ fn layers_of_every_width_give_the_same_outputs() {
             script.network(&moved(&mut random, 1 << 18), &models::rest());
         }
     }
-    same_on_both(&script);
+    same_on_all(&script);
 }
 
 /// The kernels cannot read the file at this place, but the model still runs.
@@ -312,7 +321,7 @@ fn networks_of_files_at_any_place_give_the_same_outputs() {
             script.network(&moved(&mut random, 1 << 18), &models::rest());
         }
     }
-    same_on_both(&script);
+    same_on_all(&script);
 }
 
 /// Single precision gives the same bits: for markers moved by presses, and anywhere in a picture.
@@ -329,7 +338,7 @@ fn steps_lead_to_the_same_forces() {
             }
         }
     }
-    let text = same_on_both(&script);
+    let text = same_on_all(&script);
     let count = |what: &str| text.lines().filter(|line| line.contains(what)).count();
     assert_eq!(count("Force {"), 3 * 5 * 6, "{text}");
 }
@@ -368,7 +377,7 @@ fn force_conversions_are_the_same() {
     for _ in 0..2_000 {
         script.force([0; 3].map(|_| random.between(-250_000, 250_000) as i32));
     }
-    same_on_both(&script);
+    same_on_all(&script);
 }
 
 /// Returns features that differ from the rest position by up to `distance`, in 1/65,536 px.
