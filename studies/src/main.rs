@@ -3,8 +3,6 @@
 
 mod anywhere;
 mod contacts;
-mod dots;
-mod maps;
 mod page;
 mod paper;
 mod press;
@@ -30,12 +28,10 @@ struct Cli {
 enum Command {
     Anywhere(anywhere::Anywhere),
     Contacts(contacts::Contacts),
-    Dots(dots::DotsStudy),
     Paper(paper::Paper),
     #[command(subcommand)]
-    Scene(scene::SceneCommand),
+    Scene(Box<scene::SceneCommand>),
     Slip(slip::Slip),
-    Stretched(units::Stretched),
     Touches(touches::Touches),
     Tradeoff(tradeoff::TradeoffArgs),
     Unseen(unseen::Unseen),
@@ -48,11 +44,9 @@ fn main() -> Result<()> {
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),
         Command::Contacts(study) => study.run(),
-        Command::Dots(study) => study.run(),
         Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
         Command::Slip(study) => study.run(),
-        Command::Stretched(study) => study.run(),
         Command::Touches(study) => study.run(),
         Command::Tradeoff(study) => study.run(),
         Command::Unseen(study) => study.run(),

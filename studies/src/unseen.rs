@@ -15,14 +15,17 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::anywhere::WEIGHTS;
-use crate::maps::{self, CALIBRATED_MM, Map, PLACES, place_mm};
 use crate::page;
+use crate::press::REACH_MM;
 
 /// Forces, mN.
 const FORCES_MN: [u32; 2] = [50, 200];
 /// Displacements of a marker, px, and number of directions.
 const OFF_PX: [f64; 10] = [0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.5, 0.7, 1.0];
 const WAYS: u32 = 8;
+/// Places of the tip along each axis, and the largest coordinate, mm.
+const PLACES: usize = 41;
+const FARTHEST_MM: f64 = 5.0;
 /// Largest error that agrees with the sensor's statement, in stated standard uncertainties.
 const SIGMAS: f64 = 3.0;
 
@@ -33,10 +36,7 @@ pub struct Unseen {
     /// A weights file of a network that tells places, with its film.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
-    /// The picture to write.
-    #[arg(long, default_value = "docs/pictures/unseen.svg")]
-    picture: PathBuf,
-    /// Print one JSON object and write neither page nor picture.
+    /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
 }
@@ -76,19 +76,14 @@ impl Unseen {
         let bytes = export(&Weights::load(&self.weights)?)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
         let film = Film::new(&model).context("the model has no film")?;
-        let maps = FORCES_MN.map(|force_mn| -> (u32, Vec<Cell>) {
+        let rows = FORCES_MN.map(|force_mn| {
             let cells = (0..PLACES * PLACES).into_par_iter();
             let cells = cells.map(|number| cell(&film, force_mn, number));
-            (force_mn, cells.collect())
+            Row::of(force_mn, &cells.collect::<Vec<_>>())
         });
-        let rows: Vec<Row> = maps
-            .iter()
-            .map(|(force_mn, cells)| Row::of(*force_mn, cells))
-            .collect();
         if self.json {
             return page::print_rows(&rows);
         }
-        maps::write(&self.picture, 2, &panels(&maps))?;
         let mut text = String::from(
             "| force | refused, of displacements that matter | displaced unseen: median, most | \
              direction then: median, most | \\|F\\|: median, most | place: median, most | the most \
@@ -138,6 +133,12 @@ impl<'m> Film<'m> {
         };
         (pose, observed)
     }
+}
+
+/// The coordinates of a place, mm, by its number, which counts row by row.
+fn place_mm(number: usize) -> [f64; 2] {
+    let at = |k: usize| FARTHEST_MM * (2.0 * k as f64 / (PLACES - 1) as f64 - 1.0);
+    [at(number % PLACES), at(number / PLACES)]
 }
 
 fn cell(film: &Film<'_>, force_mn: u32, number: usize) -> Cell {
@@ -208,7 +209,7 @@ fn errors(forward: &Forward<'_>, found: &Pose, truth: &Pose) -> [f64; 3] {
 
 impl Row {
     fn of(force_mn: u32, cells: &[Cell]) -> Row {
-        let is_inside = |cell: &&Cell| cell.place_mm.iter().all(|part| part.abs() <= CALIBRATED_MM);
+        let is_inside = |cell: &&Cell| cell.place_mm.iter().all(|part| part.abs() <= REACH_MM);
         let cells: Vec<&Cell> = cells.iter().filter(is_inside).collect();
         let both = |of: &dyn Fn(&Cell) -> f64| {
             let mut all: Vec<f64> = cells.iter().map(|cell| of(cell)).collect();
@@ -245,19 +246,4 @@ impl Row {
              ({x}, {y}) mm |\n"
         )
     }
-}
-
-/// Maps of the largest displacement that is not refused, and of the direction's error with it.
-fn panels(maps: &[(u32, Vec<Cell>)]) -> Vec<Map> {
-    let displaced = maps.iter().map(|(force_mn, cells)| Map {
-        title: format!("displaced unseen, px, {force_mn} mN"),
-        levels: &[0.04, 0.06, 0.08, 0.12, 0.25, 0.4, 0.8],
-        values: cells.iter().map(|cell| cell.off_px).collect(),
-    });
-    let errors = maps.iter().map(|(force_mn, cells)| Map {
-        title: format!("error of the direction then, degrees, {force_mn} mN"),
-        levels: &[0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0],
-        values: cells.iter().map(|cell| cell.errors[0]).collect(),
-    });
-    displaced.chain(errors).collect()
 }

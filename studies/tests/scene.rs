@@ -83,37 +83,6 @@ fn mistakes_are_named() {
     assert_refused(here, &render("swep"), &["swep", "sweep", "demo"]);
     let back = [&render("demo")[..], &["--at", "-1"]].concat();
     assert_refused(here, &back, &["--at -1"]);
-    let film = |more: &[&str], words: &[&str]| {
-        assert_refused(here, &[&["film"], more].concat(), words);
-    };
-    film(&["--force-n", "0.6"], &["0.6 N", "0.25"]);
-    film(&["--contact", "glue"], &["glue", "stick"]);
-    film(&["--offset-mm", "5.3,0"], &["offset is 5.3", "up to 5"]);
-    film(&["--offset-mm", "1"], &["--offset-mm", "0.1,-0.2"]);
-}
-
-/// The tip's depth and the markers' (x, y) from `scene film --json`.
-fn film(more: &[&str]) -> (f64, [[f64; 2]; 4]) {
-    let pressed = ["film", "--force-n", "0.1", "--alpha-deg", "5", "--json"];
-    let said = stdout(Path::new("."), &[&pressed[..], more].concat());
-    let answer: Value = serde_json::from_str(&said).unwrap();
-    let number = |value: &Value| value.as_f64().unwrap();
-    let seen = |id: usize| ["x_px", "y_px"].map(|key| number(&answer["markers"][id][key]));
-    (number(&answer["tip_depth_mm"]), [0, 1, 2, 3].map(seen))
-}
-
-#[test]
-fn the_films_tables_agree_with_its_solver() {
-    assert!((film(&[]).0 - 4.707).abs() < 0.005);
-    for more in [&["--contact", "stick"], &["--offset-mm", "0.15,-0.1"]] {
-        let (depth, reduced) = film(more);
-        let (full_depth, full) = film(&[&more[..], &["--solver", "full"]].concat());
-        assert!((depth - full_depth).abs() < 0.005, "{more:?}");
-        for (a, b) in reduced.iter().zip(&full) {
-            let off = (a[0] - b[0]).hypot(a[1] - b[1]);
-            assert!(off < 0.1, "{more:?}: {off} px");
-        }
-    }
 }
 
 /// The kit's mechanics take their lengths from this file, `hardware/` has no other.

@@ -52,12 +52,6 @@ pub struct Contacts {
     /// Press only beside dots, where they bend most.
     #[arg(long)]
     near_dots: bool,
-    /// Draw each dot as a plane disc that moves and tilts as the film does in the mean.
-    #[arg(long)]
-    plane: bool,
-    /// Print the presses with their truth as one JSON object, and read none.
-    #[arg(long)]
-    truth: bool,
 }
 
 impl Contacts {
@@ -69,7 +63,6 @@ impl Contacts {
         let weights = Weights::load(&self.weights)?;
         let bytes = export(&weights)?;
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-        let camera = weights.conditions.camera()?;
         let film = Film::new(&Design {
             fineness: self.fineness,
             ..Design::default()
@@ -79,10 +72,7 @@ impl Contacts {
             seed: self.seed,
             near_dots: self.near_dots,
         };
-        let presses = presses(&film, &camera, plan)?;
-        if self.truth {
-            return page::print_rows(&presses);
-        }
+        let presses = presses(&film, plan)?;
         let layout = weights.conditions.layout()?;
         let rows = self.rows(&model, &film, layout, &presses)?;
         if self.json {
@@ -90,7 +80,7 @@ impl Contacts {
         }
         let table = row::table(&rows);
         print!("{table}");
-        if self.plane || self.near_dots || layout != Layout::default() {
+        if self.near_dots || layout != Layout::default() {
             return Ok(());
         }
         page::write("contacts.md", include_str!("page.md"), &table)
@@ -104,7 +94,7 @@ impl Contacts {
         layout: Layout,
         presses: &[Press],
     ) -> Result<Vec<Row>> {
-        let reader = Reader::new(model, film, layout, (self.frames, self.seed, self.plane))?;
+        let reader = Reader::new(model, film, layout, (self.frames, self.seed))?;
         let numbered = presses.par_iter().enumerate();
         let read = numbered.map(|(number, press)| {
             let shapes = Setting::ALL.map(|setting| setting.shape(press));

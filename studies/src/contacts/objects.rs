@@ -8,7 +8,6 @@ use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_twin::{Load, MARKER_REST_MM};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
-use serde::Serialize;
 
 use crate::press::{ANGLE_DEG, REACH_MM, seeded};
 
@@ -23,7 +22,7 @@ const FACES_MM: [f64; 2] = [1.0, 3.0];
 const CYLINDER_MM: f64 = 0.8;
 
 /// A kind of objects.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// The model's own tip.
     Needle,

@@ -4,10 +4,10 @@ use anyhow::Result;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::pipeline::Measurement;
-use hivtac_shell::{Film, pressed};
+use hivtac_shell::Film;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_twin::film::Layout;
-use hivtac_twin::{Disc, Frame, Load, Options};
+use hivtac_twin::{Frame, Load, Options};
 
 use super::presses::Press;
 use crate::press::{Tared, TestedUnit};
@@ -24,12 +24,11 @@ pub struct Reader<'m> {
     unit: TestedUnit,
     rest: Rest,
     frames: u32,
-    plane: bool,
 }
 
 impl<'m> Reader<'m> {
     /// Returns a sensor with a model, tared on a film at rest. It takes this many frames of each
-    /// press. With `plane`, each dot's image is that of a plane disc.
+    /// press.
     ///
     /// # Errors
     /// If the film at rest gives no rest position.
@@ -37,7 +36,7 @@ impl<'m> Reader<'m> {
         model: &'m Model<'m>,
         film: &'m Film,
         layout: Layout,
-        (frames, seed, plane): (u32, u64, bool),
+        (frames, seed): (u32, u64),
     ) -> Result<Reader<'m>> {
         let options = Options {
             layout,
@@ -50,7 +49,6 @@ impl<'m> Reader<'m> {
             film,
             unit,
             frames,
-            plane,
         })
     }
 
@@ -67,7 +65,7 @@ impl<'m> Reader<'m> {
         let first = number as u64 * NUMBERS;
         let frames = (0..self.frames)
             .map(|frame| self.frame(press, first + u64::from(frame)))
-            .collect::<Result<Vec<_>>>()?;
+            .collect::<Vec<_>>();
         let mut tared = Tared::new(self.model, self.rest)?;
         let mut measure = |shape: Option<ContactShape>| {
             let Some(shape) = shape else {
@@ -82,16 +80,9 @@ impl<'m> Reader<'m> {
     }
 
     /// Returns a frame of a press; `number` selects its noise.
-    fn frame(&self, press: &Press, number: u64) -> Result<Frame> {
-        let scene = &self.unit.scene;
-        if self.plane {
-            let dots = scene.options().layout.centres_mm();
-            let discs = dots.into_iter().map(Disc::marker);
-            let film = pressed(self.film, &press.state, discs)?;
-            return Ok(scene.render_pressed(film, &Load::REST, number));
-        }
+    fn frame(&self, press: &Press, number: u64) -> Frame {
         let moved = |rest_mm| self.film.displacement(&press.state, rest_mm);
-        Ok(scene.render_film(moved, &Load::REST, number))
+        self.unit.scene.render_film(moved, &Load::REST, number)
     }
 }
 
@@ -116,21 +107,15 @@ mod tests {
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"));
         let model = model.unwrap();
         let film = Film::new(&Design::default()).unwrap();
-        let camera = weights.conditions.camera().unwrap();
         let drawn = Kind::Needle.draw(12, 71, true).unwrap();
-        let press = Press::solve(&film, &camera, (Kind::Needle, drawn), &[[0.0; 2]; 4]);
-        let press = press.unwrap();
-        let most = |plane| {
-            let reader = Reader::new(&model, &film, Layout::default(), (5, 1, plane)).unwrap();
-            let [answers] = reader.read((0, &press), [press.shape]).unwrap();
-            for answer in answers {
-                let force = answer.force.ok_or(answer.status).unwrap();
-                assert!(answer.markers.is_some(), "{:?}", answer.status);
-                let off_n = f64::from(force.magnitude.0) * 1e-6 - norm(press.force_n);
-                assert!(off_n.abs() < 0.005, "{off_n} N");
-            }
-            reader.frame(&press, 0).unwrap()
-        };
-        assert!(most(true).pixels != most(false).pixels);
+        let press = Press::solve(&film, Kind::Needle, drawn).unwrap();
+        let reader = Reader::new(&model, &film, Layout::default(), (5, 1)).unwrap();
+        let [answers] = reader.read((0, &press), [press.shape]).unwrap();
+        for answer in answers {
+            let force = answer.force.ok_or(answer.status).unwrap();
+            assert!(answer.markers.is_some(), "{:?}", answer.status);
+            let off_n = f64::from(force.magnitude.0) * 1e-6 - norm(press.force_n);
+            assert!(off_n.abs() < 0.005, "{off_n} N");
+        }
     }
 }

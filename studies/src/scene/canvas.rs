@@ -12,7 +12,6 @@ use hivtac_twin::Frame;
 pub type Colour = [u8; 3];
 
 pub const BLACK: Colour = [0, 0, 0];
-pub const WHITE: Colour = [255, 255, 255];
 /// Distinct from the film's grey and from the markers' red.
 pub const CYAN: Colour = [0, 255, 255];
 
@@ -52,22 +51,6 @@ impl Canvas {
         canvas
     }
 
-    /// Half of the width and height: each pixel is the mean of four, in steps of 4 of 255. Noise
-    /// rarely changes such a step, and the file is a third as large.
-    pub fn halved(&self) -> Canvas {
-        let mut small = Canvas::new(self.width / 2, self.height / 2, BLACK);
-        for y in 0..small.height {
-            for x in 0..small.width {
-                let four = [(0, 0), (1, 0), (0, 1), (1, 1)];
-                let four = four.map(|(dx, dy)| self.pixel(2 * x + dx, 2 * y + dy));
-                let sum = |c: usize| four.iter().map(|pixel| u32::from(pixel[c])).sum::<u32>();
-                let mean = std::array::from_fn(|c| ((sum(c) + 8) / 16 * 4).min(255) as u8);
-                small.set(x.into(), y.into(), mean);
-            }
-        }
-        small
-    }
-
     fn pixel(&self, x: u32, y: u32) -> Colour {
         let at = 3 * (y as usize * self.width as usize + x as usize);
         [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
@@ -89,19 +72,9 @@ impl Canvas {
         }
     }
 
-    /// Draws another picture with its upper left pixel at (x, y).
-    pub fn paste(&mut self, [x, y]: [i64; 2], other: &Canvas) {
-        for row in 0..other.height {
-            for column in 0..other.width {
-                let colour = other.pixel(column, row);
-                self.set(x + i64::from(column), y + i64::from(row), colour);
-            }
-        }
-    }
-
     /// Draws text from the upper left pixel of its first character; each of its pixels is a square
     /// of `scale`. Characters that the font lacks become question marks.
-    pub fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
+    fn text(&mut self, [x, y]: [i64; 2], scale: u32, text: &str, colour: Colour) {
         let side = i64::from(scale);
         let advance = side * i64::from(CHARACTER);
         for (nth, character) in (0..).zip(text.chars()) {

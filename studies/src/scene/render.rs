@@ -9,13 +9,17 @@ use hivtac_twin::hard_cases::hard_cases;
 use hivtac_twin::{Layout, Options, Preset, Scene, Truth};
 
 use super::canvas::{BLACK, CHARACTER, CYAN, Canvas};
-use super::figures::{SHOWN_S, SIZE};
+
+/// Frame size of named scenes.
+const SIZE: [u32; 2] = [320, 240];
+/// Time of the shown frame of a moving hard case, s.
+const SHOWN_S: f64 = 0.25;
 
 /// Arguments of `scene render`.
 #[derive(Args)]
 pub struct RenderArgs {
     /// A scene file (docs/scene-file.md), or a name: of a motion of the usual sensor (rest, static,
-    /// demo, …), or of a hard case (their picture is of `scene figures`).
+    /// demo, …), or of a hard case (docs/results/hard-cases.md).
     scene: String,
     /// The PNG file to write.
     #[arg(long)]
@@ -92,7 +96,7 @@ fn scene(source: &str) -> Result<(Scene, f64)> {
 
 /// Draws a cross at each marker's true centroid, with its identity, into a picture of a frame at a
 /// scale.
-pub(super) fn mark_truth(canvas: &mut Canvas, truth: &Truth, scale: u32) {
+fn mark_truth(canvas: &mut Canvas, truth: &Truth, scale: u32) {
     for (id, marker) in truth.markers.iter().enumerate() {
         if let Some(marker) = marker {
             let at = marker.centroid_px.map(|px| in_picture(px, scale));

@@ -41,7 +41,7 @@ pub struct Tolerances {
     /// Only the dimensions whose names contain this word.
     #[arg(long, default_value = "")]
     only: String,
-    /// Print one JSON object and write no page.
+    /// Print one JSON object.
     #[arg(long)]
     json: bool,
 }
@@ -155,9 +155,8 @@ impl Tolerances {
         if self.json {
             return page::print_rows(&rows);
         }
-        let text = table(&rows)?;
-        print!("{text}");
-        page::write("tolerances.md", include_str!("tolerances.md"), &text)
+        print!("{}", table(&rows)?);
+        Ok(())
     }
 
     fn row(

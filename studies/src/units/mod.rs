@@ -1,7 +1,6 @@
 //! Tests randomly drawn units: with a tare alone, and after a calibration.
 
 mod bench;
-mod stretched;
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -19,7 +18,6 @@ use crate::anywhere::WEIGHTS;
 use crate::page;
 use crate::press::{Errors, REACH_MM, Tared, TestedUnit, press};
 pub use bench::{Bench, Jig};
-pub use stretched::Stretched;
 
 /// Draw units as people build them; measure them with a tare alone, and after they were calibrated.
 #[derive(Args)]
