@@ -1,37 +1,67 @@
-//! A QEMU plugin that records what a program executes, exactly and repeatably: which blocks of
-//! instructions run, and in which order they follow each other.
+//! A QEMU plugin that counts the instructions that a program executes, exactly and repeatably.
 //!
-//! Recording begins when the program calls a function named `counting_begins`, and ends when it
+//! Counting begins when the program calls a function named `counting_begins`, and ends when it
 //! calls `counting_ends`; both may be repeated. A call of `last_band_begins` separates what ran
-//! before from what runs after it. At the end of the run the plugin writes one JSON object to
-//! QEMU's log:
+//! before from what runs after it. At the end of the run the plugin writes both numbers to QEMU's
+//! log: `[BEFORE,AFTER]`.
 //!
-//! ```text
-//! {"blocks":[[ADDRESS,…],…],"runs":[[LAST_BAND,FROM,TO,COUNT],…]}
-//! ```
-//!
-//! A block is the list of its instructions' addresses, in order. COUNT is the number of times that
-//! block TO ran right after block FROM, which is `null` after a call. Blocks that QEMU translated
-//! several times count as one. Without interrupts and faults a program leaves a block only at its
-//! end, and the counts are exact.
+//! QEMU runs blocks of instructions. Without interrupts and faults a program leaves a block only at
+//! its end, and the counts are exact.
 
 mod qemu;
-mod record;
 
 use std::ffi::{CStr, CString, c_char, c_int, c_uint, c_void};
 use std::ptr;
 use std::sync::{Mutex, PoisonError};
 
 use qemu::{BlockHandle, PluginId};
-use record::{Mark, Record};
 
 /// The plugin interface's version that this plugin uses; QEMU reads it first.
 #[unsafe(no_mangle)]
 #[allow(non_upper_case_globals)]
 pub static qemu_plugin_version: c_int = if cfg!(feature = "plugin-api-2") { 2 } else { 1 };
 
-/// The data recorded until now. With one processor, the lock is always free.
-static RECORD: Mutex<Record> = Mutex::new(Record::new());
+/// What was counted until now. With one processor, the lock is always free.
+static COUNTER: Mutex<Counter> = Mutex::new(Counter {
+    blocks: Vec::new(),
+    is_counting: false,
+    part: 0,
+    counts: [0; 2],
+});
+
+/// What a block of instructions does.
+#[derive(Clone, Copy)]
+enum Block {
+    /// It is the body of `counting_begins`, which is not counted, nor are the other two.
+    Begin,
+    /// It is the body of `counting_ends`.
+    End,
+    /// It is the body of `last_band_begins`.
+    LastBand,
+    /// It has so many instructions.
+    Work(usize),
+}
+
+struct Counter {
+    /// All blocks that QEMU translated, in that order.
+    blocks: Vec<Block>,
+    is_counting: bool,
+    /// 0, and 1 from the last band on.
+    part: usize,
+    counts: [usize; 2],
+}
+
+impl Counter {
+    fn run(&mut self, number: usize) {
+        match self.blocks[number] {
+            Block::Begin => self.is_counting = true,
+            Block::End => self.is_counting = false,
+            Block::LastBand => self.part = 1,
+            Block::Work(count) if self.is_counting => self.counts[self.part] += count,
+            Block::Work(_) => {}
+        }
+    }
+}
 
 /// QEMU calls this once, when it loads the plugin.
 #[unsafe(no_mangle)]
@@ -51,7 +81,11 @@ pub extern "C" fn qemu_plugin_install(
 
 /// QEMU has translated a block.
 extern "C" fn translated(_id: PluginId, handle: BlockHandle) {
-    let number = with_record(|record| record.add_block(addresses(handle), mark(handle)));
+    let block = block(handle);
+    let number = with_counter(|counter| {
+        counter.blocks.push(block);
+        counter.blocks.len() - 1
+    });
     // The number is passed as a pointer, through which nothing is ever read.
     let data = ptr::without_provenance_mut(number);
     // SAFETY: the handle is valid during this call.
@@ -62,41 +96,36 @@ extern "C" fn translated(_id: PluginId, handle: BlockHandle) {
 
 /// QEMU is about to run a block.
 extern "C" fn executed(_cpu: c_uint, data: *mut c_void) {
-    with_record(|record| record.run(data.addr()));
+    with_counter(|counter| counter.run(data.addr()));
 }
 
 /// QEMU ends.
 extern "C" fn ended(_id: PluginId, _data: *mut c_void) {
-    let text = CString::new(with_record(|record| record.report())).unwrap_or_default();
+    let text = with_counter(|counter| format!("{:?}\n", counter.counts));
+    let text = CString::new(text).unwrap_or_default();
     // SAFETY: a string that ends with a zero byte.
     unsafe { qemu::qemu_plugin_outs(text.as_ptr()) };
 }
 
-fn with_record<T>(work: impl FnOnce(&mut Record) -> T) -> T {
-    work(&mut RECORD.lock().unwrap_or_else(PoisonError::into_inner))
+fn with_counter<T>(work: impl FnOnce(&mut Counter) -> T) -> T {
+    work(&mut COUNTER.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-fn addresses(handle: BlockHandle) -> Vec<u64> {
-    // SAFETY: the handle is valid while QEMU translates the block, and the indices are inside it.
-    unsafe {
-        (0..qemu::qemu_plugin_tb_n_insns(handle))
-            .map(|i| qemu::qemu_plugin_insn_vaddr(qemu::qemu_plugin_tb_get_insn(handle, i)))
-            .collect()
-    }
-}
-
-/// The block's mark: its function's name, if that is a marking function.
-fn mark(handle: BlockHandle) -> Option<Mark> {
-    // SAFETY: as above, and a block has at least one instruction.
-    let symbol = unsafe { qemu::qemu_plugin_insn_symbol(qemu::qemu_plugin_tb_get_insn(handle, 0)) };
+fn block(handle: BlockHandle) -> Block {
+    // SAFETY: the handle is valid while QEMU translates the block, which has an instruction.
+    let (symbol, count) = unsafe {
+        let first = qemu::qemu_plugin_tb_get_insn(handle, 0);
+        let symbol = qemu::qemu_plugin_insn_symbol(first);
+        (symbol, qemu::qemu_plugin_tb_n_insns(handle))
+    };
     if symbol.is_null() {
-        return None;
+        return Block::Work(count);
     }
     // SAFETY: not null, so it is a string of QEMU's that ends with a zero byte.
     match unsafe { CStr::from_ptr(symbol) }.to_bytes() {
-        b"counting_begins" => Some(Mark::Begin),
-        b"counting_ends" => Some(Mark::End),
-        b"last_band_begins" => Some(Mark::LastBand),
-        _ => None,
+        b"counting_begins" => Block::Begin,
+        b"counting_ends" => Block::End,
+        b"last_band_begins" => Block::LastBand,
+        _ => Block::Work(count),
     }
 }

@@ -31,7 +31,6 @@ unsafe extern "C" {
     );
     pub fn qemu_plugin_tb_n_insns(block: BlockHandle) -> usize;
     pub fn qemu_plugin_tb_get_insn(block: BlockHandle, index: usize) -> InstructionHandle;
-    pub fn qemu_plugin_insn_vaddr(instruction: InstructionHandle) -> u64;
     pub fn qemu_plugin_insn_symbol(instruction: InstructionHandle) -> *const c_char;
     pub fn qemu_plugin_outs(text: *const c_char);
 }

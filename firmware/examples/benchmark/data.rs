@@ -16,7 +16,7 @@ pub struct Frame {
 
 /// A model that is measured alone.
 pub struct Network {
-    /// Its layers: `11-64-64-3`.
+    /// Its layers: `network 11-64-64-3`.
     pub name: &'static str,
     /// A model file.
     pub model: &'static [u8],

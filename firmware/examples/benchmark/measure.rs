@@ -101,7 +101,7 @@ pub fn network(place: &mut Workplace, network: &Network, meter: &Meter) {
     for _ in 0..REPETITIONS {
         (_, cycles) = meter.time(|| inference.run(&model, &rest, &rest));
     }
-    hprintln!("network {}|320x240|rgb565|{}", network.name, cycles);
+    hprintln!("{}|320x240|rgb565|{}", network.name, cycles);
 }
 
 /// Returns the cycles of a frame from its first row to the force, and from its last band on.

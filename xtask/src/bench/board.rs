@@ -4,9 +4,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use super::measure;
-use super::tables::decimal;
+use super::{CLOCK_MHZ, cases};
 use crate::artifacts::{self, Board};
+use crate::size::grouped;
 use crate::{process, toolchain};
 
 /// The image, an example of the firmware.
@@ -43,7 +43,7 @@ pub fn lint() -> Result<()> {
 
 fn command() -> Result<Command> {
     let data = toolchain::work_folder("bench")?;
-    measure::cases(&data)?;
+    cases(&data)?;
     let mut command = artifacts::firmware_command(Board::Weact, "");
     command.env("HIVTAC_BOARD_DATA", data);
     command.args(["--example", EXAMPLE]);
@@ -56,10 +56,10 @@ fn row(line: &str) -> Option<String> {
     let [item, frame, format, cycles] = words[..] else {
         return None;
     };
-    let cycles: f64 = cycles.split_whitespace().next()?.parse().ok()?;
-    let (cycles, time) = (decimal(cycles), decimal((cycles / 48.0).round() / 10.0));
+    let cycles: u64 = cycles.split_whitespace().next()?.parse().ok()?;
+    let (cycles, time) = (grouped(cycles), cycles as f64 / CLOCK_MHZ);
     Some(format!(
-        "| {item} | {frame} | {format} | {cycles} | {time} |\n"
+        "| {item} | {frame} | {format} | {cycles} | {time:.1} |\n"
     ))
 }
 
@@ -70,7 +70,7 @@ mod tests {
     #[test]
     fn what_the_board_says_becomes_a_row() {
         let line = "frame full, 5 % salt|320x240|rgb565|96000\n";
-        let expected = "| frame full, 5 % salt | 320x240 | rgb565 | 96,000 | 200 |\n";
+        let expected = "| frame full, 5 % salt | 320x240 | rgb565 | 96,000 | 200.0 |\n";
         assert_eq!(row(line).as_deref(), Some(expected));
         assert_eq!(row("Finished in 1.2s"), None);
     }

@@ -1,32 +1,30 @@
-//! `cargo xtask bench`: measures the cost of a frame and of an inference on the microcontroller.
-//! Instructions are counted in QEMU, exactly and repeatably; LLVM's model of the core gives the
-//! cycles.
+//! `cargo xtask bench`: counts the instructions of a frame and of an inference on the
+//! microcontroller, in QEMU, exactly and repeatably.
 
 pub mod board;
-mod cycles;
-mod lowering;
-mod measure;
-mod stages;
-mod tables;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
+use crate::size::grouped;
 use crate::{artifacts, packages, process, size, toolchain};
-use tables::Item;
 
 const BASELINE: &str = "xtask/baseline.json";
 const DOCUMENT: &str = "docs/results/performance.md";
+/// The core's clock, in MHz.
+const CLOCK_MHZ: f64 = 480.0;
+/// The emulator's command line, up to the script for the image.
+const QEMU: &str = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial none \
+    -d plugin -semihosting-config";
 
 /// Options of `cargo xtask bench`.
 #[derive(Args, Default)]
 pub struct Bench {
-    /// Print one JSON object instead of tables.
-    #[arg(long)]
-    json: bool,
     /// Make what is measured now the baseline that later counts are held to.
     #[arg(long)]
     write_baseline: bool,
@@ -34,35 +32,40 @@ pub struct Bench {
     #[arg(long)]
     write_docs: bool,
     /// Measure on an STM32H743 that is attached by a debug probe instead.
-    #[arg(long, conflicts_with_all = ["json", "write_baseline", "write_docs"])]
+    #[arg(long, conflicts_with_all = ["write_baseline", "write_docs"])]
     board: bool,
 }
 
 impl Bench {
-    /// Measures and prints every case, and compares the counts with the baseline.
+    /// Counts and prints every case, and compares the counts with the baseline.
     pub fn run(&self) -> Result<()> {
         if self.board {
             return board::run();
         }
         packages::ensure_qemu()?;
         let folder = toolchain::work_folder("bench")?;
-        let cases = measure::cases(&folder)?.into_iter();
-        let mut bench = measure::Bench::new(artifacts::qemu_image()?, folder)?;
-        let measured: Result<Vec<_>> = cases.map(|case| bench.measure(case)).collect();
-        let measured = measured?;
-        let items: Vec<Item> = measured.iter().flat_map(tables::items).collect();
-        let tables = tables::all(&items, &measured);
-        match self.json {
-            true => println!("{}", serde_json::json!({ "items": items })),
-            false => process::print(&tables),
+        let plugin = artifacts::instruction_counter(plugin_version()?)?;
+        let image = artifacts::qemu_image()?;
+        let mut instructions = BTreeMap::new();
+        for case in cases(&folder)? {
+            let [before, last_band] = counts(&image, &plugin, &folder, &case)?;
+            if let Some(name) = case.name.strip_prefix("frame full") {
+                instructions.insert(format!("latency{name}"), last_band);
+            }
+            instructions.insert(case.name, before + last_band);
         }
+        let table = table(&instructions);
+        process::print(&table);
         let (document, baseline) = (toolchain::at(DOCUMENT), toolchain::at(BASELINE));
         if self.write_docs {
-            let text = replaced(&process::read(&document)?, "bench", &tables)?;
+            let text = replaced(&process::read(&document)?, "bench", &table)?;
             let text = replaced(&text, "memory", &size::memories()?)?;
             process::write(&document, &text)?;
         }
-        let now = Baseline::of(&items)?;
+        let now = Baseline {
+            compiler: toolchain::target_compiler()?,
+            instructions,
+        };
         if self.write_baseline {
             let text = serde_json::to_string_pretty(&now)? + "\n";
             return process::write(&baseline, &text);
@@ -72,28 +75,67 @@ impl Bench {
     }
 }
 
+/// One script, as described by `benchmark-cases` (in `tests`).
+#[derive(Deserialize)]
+struct Case {
+    /// What it measures, with its frame's size and format. A whole frame begins with `frame full`.
+    name: String,
+    file: PathBuf,
+}
+
+/// Writes all scripts into a folder; returns their cases.
+fn cases(folder: &Path) -> Result<Vec<Case>> {
+    let mut command = Command::new(artifacts::host_program("benchmark-cases")?);
+    let lines = process::output(command.current_dir(toolchain::at("")).arg(folder))?;
+    let cases: Result<_, _> = lines.lines().map(serde_json::from_str).collect();
+    cases.context("what benchmark-cases says")
+}
+
+/// Runs a case; returns its instructions before the last band of rows is there, and from then on.
+fn counts(image: &Path, plugin: &Path, folder: &Path, case: &Case) -> Result<[u64; 2]> {
+    let (log, results) = (folder.join("counts"), folder.join("results"));
+    let (script, results) = (case.file.display(), results.display());
+    let arguments = format!("arg=hivtac-qemu-image,arg={script},arg={results}");
+    let mut qemu = process::command(QEMU);
+    qemu.arg(format!("enable=on,target=native,{arguments}"));
+    qemu.arg("-kernel").arg(image);
+    qemu.arg("-plugin").arg(plugin).arg("-D").arg(&log);
+    process::output(&mut qemu)?;
+    let counts = serde_json::from_str(&process::read(&log)?);
+    counts.with_context(|| format!("what the plugin wrote: {}", log.display()))
+}
+
+/// The plugin interface's version that this QEMU accepts: 1 before QEMU 9, 2 from then on.
+fn plugin_version() -> Result<u32> {
+    let text = process::output(&mut process::command("qemu-system-arm --version"))?;
+    // `QEMU emulator version 7.2.22 (Debian …`
+    let version = text
+        .split_once("version ")
+        .and_then(|(_, rest)| rest.split('.').next());
+    let major: u32 = version.context("no version of QEMU")?.parse()?;
+    Ok(if major < 9 { 1 } else { 2 })
+}
+
+/// The table of all counts, with the time of a core that issues one instruction a cycle.
+fn table(instructions: &BTreeMap<String, u64>) -> String {
+    let rows = instructions.iter().map(|(name, count)| {
+        let time_us = *count as f64 / CLOCK_MHZ;
+        format!("| {name} | {} | {time_us:.1} |\n", grouped(*count))
+    });
+    let head = "| item | instructions | µs at 480 MHz, one a cycle |\n|---|---:|---:|\n";
+    head.to_owned() + &rows.collect::<String>()
+}
+
 /// Measured counts, with the compiler that built the image.
 #[derive(Debug, Serialize, Deserialize)]
 struct Baseline {
     /// The output of `rustc -V`.
     compiler: String,
-    /// Instructions, by the item's label.
-    instructions: BTreeMap<String, f64>,
+    /// Instructions, by the item's name.
+    instructions: BTreeMap<String, u64>,
 }
 
 impl Baseline {
-    fn of(items: &[Item]) -> Result<Baseline> {
-        let mut instructions = BTreeMap::new();
-        for item in items {
-            let label = format!("{}, {} {}", item.item, item.frame, item.format);
-            instructions.insert(label, item.instructions);
-        }
-        Ok(Baseline {
-            compiler: toolchain::target_compiler()?,
-            instructions,
-        })
-    }
-
     /// Compares new counts with this committed baseline, and prints every difference.
     fn check(&self, now: &Baseline) -> Result<()> {
         let labels = self.instructions.keys().chain(now.instructions.keys());
@@ -144,17 +186,17 @@ mod tests {
 
     #[test]
     fn one_instruction_or_item_more_or_less_is_refused_of_the_same_compiler() {
-        let baseline = |compiler: &str, counts: &[(&str, f64)]| Baseline {
+        let baseline = |compiler: &str, counts: &[(&str, u64)]| Baseline {
             compiler: compiler.to_owned(),
             instructions: counts
                 .iter()
                 .map(|(label, count)| ((*label).into(), *count))
                 .collect(),
         };
-        let committed = baseline("rustc 1", &[("blobs", 100.0)]);
+        let committed = baseline("rustc 1", &[("blobs", 100)]);
         assert!(committed.check(&committed).is_ok());
-        let two = [("blobs", 100.0), ("mac", 1.0)];
-        for counts in [&[("blobs", 99.0)][..], &[("blobs", 101.0)], &two, &[]] {
+        let two = [("blobs", 100), ("mac", 1)];
+        for counts in [&[("blobs", 99)][..], &[("blobs", 101)], &two, &[]] {
             assert!(committed.check(&baseline("rustc 1", counts)).is_err());
             assert!(committed.check(&baseline("rustc 2", counts)).is_ok());
         }

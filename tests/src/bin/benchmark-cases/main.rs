@@ -1,8 +1,6 @@
 //! `benchmark-cases FOLDER`: writes the scripts that `cargo xtask bench` runs, one file each, and
-//! prints what they are, one JSON object a line:
-//! `{"work":…,"file":…,"size":[columns,rows],"format":…}`, where the work is `{"Frame":"…"}`, with
-//! what is special about the frame, `{"Network":[widths]}`, `{"Steps":n}` or `"Table"`. What a
-//! board can hold of them it writes as `board.rs`, too, for `firmware/examples/benchmark`.
+//! prints what they are, one JSON object a line: `{"name":…,"file":…}`. What a board's program can
+//! measure of them it writes as `board.rs`, too, for `firmware/examples/benchmark`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -27,19 +25,10 @@ use serde_json::{Value, json};
 
 /// The model that the sensor runs.
 const SMALL: [u16; 4] = [11, 64, 64, 3];
-/// The paper's model.
-const PAPER: [u16; 5] = [11, 512, 512, 512, 3];
-/// Columns and rows of the reference frames.
-const SIZES: [[u16; 2]; 4] = [[160, 120], [320, 240], [640, 480], [800, 600]];
+/// Columns and rows of all frames.
+const SIZE: [u16; 2] = [320, 240];
 /// How many frames may be without a force before one has one.
 const ATTEMPTS: u64 = 16;
-/// The sizes whose worst cases are measured: the firmware's and the paper's.
-const STRAINED: [[u16; 2]; 2] = [[320, 240], [800, 600]];
-
-/// Columns of the largest frames that fit a board's flash beside everything else.
-const WIDEST_ON_BOARD: u16 = 320;
-/// Most bytes of a network that fits there.
-const LARGEST_ON_BOARD: usize = 200_000;
 
 fn main() -> Result<()> {
     // Whoever reads the output may have enough of it.
@@ -59,8 +48,6 @@ struct Case {
     work: Work,
     /// A model file for such frames.
     model: Vec<u8>,
-    /// Columns and rows.
-    size: [u16; 2],
     format: PixelFormat,
 }
 
@@ -73,8 +60,8 @@ enum Work {
         before: Vec<Vec<u16>>,
         pixels: Vec<u16>,
     },
-    /// One inference of a model with these layer widths.
-    Network(&'static [u16]),
+    /// One inference of the small model.
+    Network,
     /// The network of a model that tells places, and the number of steps from its answer.
     Steps(u8, [Marker; 4], Box<Rest>),
     /// The threshold's table of 64 KiB.
@@ -86,8 +73,24 @@ impl Case {
     fn write(&self, folder: &Path, number: usize) -> Result<Value> {
         let file = folder.join(format!("{number}.script"));
         write(&file, self.script().bytes())?;
-        let (work, size) = (self.work.description(), self.size);
-        Ok(json!({ "work": work, "file": file, "size": size, "format": self.format.name() }))
+        Ok(json!({ "name": self.name(), "file": file }))
+    }
+
+    fn name(&self) -> String {
+        let mut size = SIZE;
+        let item = match &self.work {
+            Work::Frame { special: "", .. } => "frame full".to_owned(),
+            Work::Frame { special, .. } => format!("frame full, {special}"),
+            Work::Network => network_name(),
+            Work::Steps(1, ..) => "network and 1 step".to_owned(),
+            Work::Steps(steps, ..) => format!("network and {steps} steps"),
+            Work::Table => {
+                // As many values as a pixel has.
+                size = [256, 256];
+                "table".to_owned()
+            }
+        };
+        format!("{item}, {}x{} {}", size[0], size[1], self.format.name())
     }
 
     fn script(&self) -> Script {
@@ -97,39 +100,28 @@ impl Case {
         match &self.work {
             Work::Frame { before, pixels, .. } => {
                 let frames = before.iter().chain([pixels]).map(|frame| &frame[..]);
-                script.sense(self.size[0], &frames.collect::<Vec<_>>())
+                script.sense(SIZE[0], &frames.collect::<Vec<_>>())
             }
             Work::Table => {
                 script.counted_threshold(Threshold::red(self.format), ByteOrder::Swapped)
             }
             Work::Steps(_, markers, rest) => script.press(markers, rest),
-            Work::Network(_) => script.network(&models::rest(), &models::rest()),
+            Work::Network => script.network(&models::rest(), &models::rest()),
         };
         script
     }
 }
 
-impl Work {
-    fn description(&self) -> Value {
-        match self {
-            Work::Frame { special, .. } => json!({ "Frame": special }),
-            Work::Network(widths) => json!({ "Network": widths }),
-            Work::Steps(steps, ..) => json!({ "Steps": steps }),
-            Work::Table => json!("Table"),
-        }
-    }
+fn network_name() -> String {
+    format!("network {}", SMALL.map(|width| width.to_string()).join("-"))
 }
 
 fn cases() -> Result<Vec<Case>> {
     let mut cases = Vec::new();
-    for (format, size) in PixelFormat::ALL
-        .into_iter()
-        .flat_map(|format| SIZES.map(|size| (format, size)))
-    {
-        let [model, weighted_model] =
-            [BinaryMask, RednessWeighted].map(|it| model(format, size, it));
+    for format in PixelFormat::ALL {
+        let [model, weighted_model] = [BinaryMask, RednessWeighted].map(|it| model(format, it));
         let model = model?;
-        let usual = usual_frame(&model, format, &scene("static", format, size)?, size)?;
+        let usual = usual_frame(&model, format)?;
         let case = |(special, pixels)| Case {
             work: Work::Frame {
                 special,
@@ -137,7 +129,6 @@ fn cases() -> Result<Vec<Case>> {
                 pixels,
             },
             model: model.clone(),
-            size,
             format,
         };
         cases.push(case(("", usual.clone())));
@@ -146,26 +137,23 @@ fn cases() -> Result<Vec<Case>> {
             ..case(("weighted", usual.clone()))
         });
         // What is special are colours, drawn in RGB565.
-        if format == PixelFormat::Rgb565 && STRAINED.contains(&size) {
-            cases.extend(strained(size, &usual).map(case));
+        if format == PixelFormat::Rgb565 {
+            cases.extend(strained(&usual).map(case));
         }
     }
     cases.push(pressed("one step", "4", models::anywhere(1))?);
     cases.push(pressed("eight dots", "8v", models::eight_dots())?);
-    cases.extend([&SMALL[..], &PAPER].map(|widths| Case {
-        work: Work::Network(widths),
-        model: models::file(widths, Weights::Random, OutputKind::ForceVector, 1),
-        size: [320, 240],
+    cases.push(Case {
+        work: Work::Network,
+        model: models::file(&SMALL, Weights::Random, OutputKind::ForceVector, 1),
         format: PixelFormat::Rgb565,
-    }));
+    });
     for steps in 1..=MOST_STEPS {
         cases.push(stepping(steps)?);
     }
     cases.push(Case {
         work: Work::Table,
         model: Vec::new(),
-        // As many values as a pixel has.
-        size: [256, 256],
         format: PixelFormat::Rgb565,
     });
     Ok(cases)
@@ -173,8 +161,8 @@ fn cases() -> Result<Vec<Case>> {
 
 /// A frame of a press of 0.1 N off the middle that grows, with the model that measures it.
 fn pressed(special: &'static str, layout: &str, model: Vec<u8>) -> Result<Case> {
-    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
-    let scene = scene("rest", format, size)?;
+    let format = PixelFormat::Rgb565;
+    let scene = scene("rest", format)?;
     let scene = scene.clone().with_options(Options {
         layout: layout.parse()?,
         ..scene.options().clone()
@@ -191,7 +179,6 @@ fn pressed(special: &'static str, layout: &str, model: Vec<u8>) -> Result<Case> 
             pixels,
         },
         model,
-        size,
         format,
     };
     let results = qemu::run_on_host(&case.script())?;
@@ -202,19 +189,17 @@ fn pressed(special: &'static str, layout: &str, model: Vec<u8>) -> Result<Case> 
 
 /// Steps at a press of 0.1 N off the middle.
 fn stepping(steps: u8) -> Result<Case> {
-    let (format, size) = (PixelFormat::Rgb565, [320, 240]);
+    let format = PixelFormat::Rgb565;
     let model = models::anywhere(steps);
     let rest = Model::parse(&model)
         .map_err(|error| anyhow!("{error}"))?
         .rest;
     let load = Load::from_angles(0.1, 4.0, -3.0)?.with_offset_mm([1.5, -2.25])?;
-    let pressed = scene("rest", format, size)?.render_load(&load, 1)?;
-    let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
-    let markers = seen(geometry, format, RednessWeighted, &pressed.words())?.1;
+    let pressed = scene("rest", format)?.render_load(&load, 1)?;
+    let markers = seen(format, RednessWeighted, &pressed.words())?.1;
     Ok(Case {
         work: Work::Steps(steps, markers, Box::new(rest)),
         model,
-        size,
         format,
     })
 }
@@ -235,23 +220,20 @@ impl Board {
             Work::Steps(..) | Work::Table => {}
             // The board's program measures single frames of RGB565.
             Work::Frame { before, .. } if !before.is_empty() => {}
-            Work::Frame { .. } if case.size[0] > WIDEST_ON_BOARD => {}
             Work::Frame { .. } if case.format != PixelFormat::Rgb565 => {}
             Work::Frame {
                 special, pixels, ..
             } => {
                 let swapped: Vec<u8> = pixels.iter().flat_map(|it| it.to_be_bytes()).collect();
-                let (size, pixels) = (case.size, self.file(folder, &swapped)?);
+                let pixels = self.file(folder, &swapped)?;
                 let model = self.file(folder, &case.model)?;
                 self.frames += &format!(
-                    "Frame {{ size: {size:?}, special: {special:?}, pixels: &{pixels}.0, model: \
+                    "Frame {{ size: {SIZE:?}, special: {special:?}, pixels: &{pixels}.0, model: \
                      &{model}.0 }},\n"
                 );
             }
-            Work::Network(_) if case.model.len() > LARGEST_ON_BOARD => {}
-            Work::Network(widths) => {
-                let widths: Vec<String> = widths.iter().map(u16::to_string).collect();
-                let (name, model) = (widths.join("-"), self.file(folder, &case.model)?);
+            Work::Network => {
+                let (name, model) = (network_name(), self.file(folder, &case.model)?);
                 self.networks += &format!("Network {{ name: {name:?}, model: &{model}.0 }},\n");
             }
         }
@@ -293,7 +275,8 @@ impl Board {
 }
 
 /// Worst cases beside the usual frame.
-fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16>); 4] {
+fn strained(usual: &[u16]) -> [(&'static str, Vec<u16>); 4] {
+    let [width, height] = SIZE;
     [
         ("5 % salt", pictures::salted(usual.to_vec(), 5, 1)),
         ("checkerboard", pictures::checkerboard(width, height)),
@@ -306,30 +289,25 @@ fn strained([width, height]: [u16; 2], usual: &[u16]) -> [(&'static str, Vec<u16
 }
 
 /// The simulated sensor with its usual light and noise under 0.1 N at α = 4°, β = −3°: its first
-/// frame that goes all the way to a force, so that all of it is measured. In the smallest frames
-/// noise can make a marker implausible.
-fn usual_frame(
-    model: &[u8],
-    format: PixelFormat,
-    scene: &Scene,
-    [width, height]: [u16; 2],
-) -> Result<Vec<u16>> {
+/// frame that goes all the way to a force, so that all of it is measured.
+fn usual_frame(model: &[u8], format: PixelFormat) -> Result<Vec<u16>> {
+    let scene = scene("static", format)?;
     for number in 0..ATTEMPTS {
-        let pixels = frame(scene, number, 1.0);
+        let pixels = frame(&scene, number, 1.0);
         let mut script = Script::new();
         script
             .model(model)
             .threshold(Threshold::red(format), ByteOrder::Native)
-            .sense(width, &[&pixels]);
+            .sense(SIZE[0], &[&pixels]);
         if qemu::run_on_host(&script)?.contains("force: Some") {
             return Ok(pixels);
         }
     }
-    bail!("none of {ATTEMPTS} frames of {width}x{height} has a force")
+    bail!("none of {ATTEMPTS} frames has a force")
 }
 
-fn scene(name: &str, format: PixelFormat, [width, height]: [u16; 2]) -> Result<Scene> {
-    let (width, height) = (u32::from(width), u32::from(height));
+fn scene(name: &str, format: PixelFormat) -> Result<Scene> {
+    let [width, height] = SIZE.map(u32::from);
     let scene = Scene::preset(name, Preset::Ov7725, width, height, 1)?;
     let format: Format = format.name().parse()?;
     Ok(scene.with_options(Options {
@@ -343,22 +321,21 @@ fn frame(scene: &Scene, number: u64, seconds: f64) -> Vec<u16> {
     scene.frame(number, seconds).words().into_owned()
 }
 
-/// The small model, for frames of a size.
-fn model(format: PixelFormat, size: [u16; 2], centroid: CentroidEstimator) -> Result<Vec<u8>> {
-    let geometry = Geometry::preset(Preset::Ov7725, size[0], size[1]);
-    let pixels = frame(&scene("rest", format, size)?, 0, 0.0);
-    let rest = position(geometry, format, centroid, &pixels)?;
-    Ok(models::file_for(geometry, format, (centroid, rest), &SMALL))
+/// The small model.
+fn model(format: PixelFormat, centroid: CentroidEstimator) -> Result<Vec<u8>> {
+    let pixels = frame(&scene("rest", format)?, 0, 0.0);
+    let rest = position(format, centroid, &pixels)?;
+    let rest = (centroid, rest);
+    Ok(models::file_for(geometry(), format, rest, &SMALL))
+}
+
+fn geometry() -> Geometry {
+    Geometry::preset(Preset::Ov7725, SIZE[0], SIZE[1])
 }
 
 /// Where a frame shows the markers.
-fn position(
-    geometry: Geometry,
-    format: PixelFormat,
-    centroid: CentroidEstimator,
-    pixels: &[u16],
-) -> Result<Rest> {
-    let (features, markers) = seen(geometry, format, centroid, pixels)?;
+fn position(format: PixelFormat, centroid: CentroidEstimator, pixels: &[u16]) -> Result<Rest> {
+    let (features, markers) = seen(format, centroid, pixels)?;
     Ok(Rest {
         features,
         areas: markers.map(|marker| marker.area).into(),
@@ -367,7 +344,6 @@ fn position(
 
 /// What a frame shows.
 fn seen(
-    geometry: Geometry,
     format: PixelFormat,
     centroid: CentroidEstimator,
     pixels: &[u16],
@@ -376,7 +352,7 @@ fn seen(
     let settings = Settings {
         threshold: Threshold::red(format),
         centroid,
-        ..Settings::usual(geometry, ByteOrder::Native)
+        ..Settings::usual(geometry(), ByteOrder::Native)
     };
     sensor.configure(settings, None)?;
     let measurement = sensor.measure_frame(pixels);
