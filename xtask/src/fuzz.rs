@@ -26,9 +26,9 @@ const LINKED: [&str; 2] = ["--config", "profile.tools.package.hivtac-shell.opt-l
 const TRIED: &str = "stat::number_of_executed_units:";
 
 /// Why attacks cannot run here; `None` if they can.
-pub fn obstacle() -> Option<&'static str> {
+pub fn obstacle() -> Option<String> {
     let has_compiler = process::find_program("c++").is_some();
-    (!has_compiler).then_some("there is no C++ compiler, which libFuzzer needs")
+    (!has_compiler).then(|| "there is no C++ compiler, which libFuzzer needs".to_owned())
 }
 
 /// Builds and runs every attack, as many at a time as there are cores. If one finds a fault, its

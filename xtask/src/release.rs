@@ -8,6 +8,7 @@ use clap::Args;
 use hivtac_wire::image::Image;
 use serde_json::Value;
 
+use crate::python::Environment;
 use crate::{artifacts, process, python, toolchain, web};
 
 /// Options of `cargo xtask release`.
@@ -26,13 +27,13 @@ const LINUX: [&str; 4] = [
     "aarch64-unknown-linux-gnu",
     "aarch64-unknown-linux-musl",
 ];
-/// What builds programs and wheels for other computers: the environment's folder below `target/`,
-/// imported modules, and packages of PyPI.
-const BUILDERS: [&str; 3] = [
-    "python-release",
-    "maturin, ziglang",
-    "maturin>=1.9,<2 cargo-zigbuild>=0.20,<1 ziglang",
-];
+/// What builds programs and wheels for other computers.
+const BUILDERS: Environment = Environment {
+    folder: "python-release",
+    modules: "maturin, ziglang",
+    packages: "maturin>=1.9,<2 cargo-zigbuild>=0.20,<1 ziglang",
+    needs: "Python 3.9",
+};
 /// Programs without symbols are a third as large.
 const STRIP: [&str; 2] = ["CARGO_PROFILE_RELEASE_STRIP", "symbols"];
 /// Files beside the program in each archive.
@@ -49,7 +50,7 @@ impl Release {
         std::fs::create_dir_all(&folder)?;
         let changes = process::read(&toolchain::at("CHANGELOG.md"))?;
         std::fs::write(folder.join("notes.md"), notes(&changes, VERSION)?)?;
-        let python = python::python(BUILDERS)?;
+        let python = BUILDERS.python()?;
         let mut names: Vec<&str> = self.target.iter().map(String::as_str).collect();
         if names.is_empty() {
             names.extend(LINUX);

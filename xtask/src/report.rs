@@ -94,7 +94,7 @@ impl Report {
     pub fn step(
         &self,
         name: &'static str,
-        obstacle: impl FnOnce() -> Option<&'static str>,
+        obstacle: impl FnOnce() -> Option<String>,
         work: impl FnOnce(&mut Tally) -> Result<()>,
     ) {
         let number = 1 + self.begun.fetch_add(1, Ordering::Relaxed);
@@ -102,7 +102,7 @@ impl Report {
         let (begin, mut tally) = (Instant::now(), Tally::default());
         let log = self.logs.join(name.replace([':', ' '], "-") + ".txt");
         let work = || match obstacle() {
-            Some(why) => Ok(("not run", why.to_owned())),
+            Some(why) => Ok(("not run", why)),
             None => work(&mut tally).map(|()| ("ok", String::new())),
         };
         let file = File::create(&log).with_context(|| log.display().to_string());
@@ -205,7 +205,11 @@ mod tests {
                 Ok(())
             },
         );
-        report.step("xtask three", || Some("it is night"), |_| bail!("it ran"));
+        report.step(
+            "xtask three",
+            || Some("it is night".to_owned()),
+            |_| bail!("it ran"),
+        );
         let error = report.finish().unwrap_err().to_string();
         assert!(ran && error == "failed: xtask one", "{error}");
     }

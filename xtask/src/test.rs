@@ -26,7 +26,7 @@ pub struct Test {
 
 /// A step: its name, its work, and for a step of `--all` a function that finds an obstacle to it
 /// here.
-type Step = (&'static str, Work, Option<fn() -> Option<&'static str>>);
+type Step = (&'static str, Work, Option<fn() -> Option<String>>);
 type Work = fn(&Shared, &mut Tally) -> Result<()>;
 
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
@@ -53,32 +53,32 @@ static STEPS: [Step; 19] = [
     (
         "tests: python",
         |_, tally| python::test_package(tally),
-        Some(python::no_package),
+        Some(|| python::PACKAGE.obstacle()),
     ),
     (
         "tests: serve",
         |_, tally| python::test_serve(tally),
-        Some(python::no_serve),
+        Some(|| python::SERVE.obstacle()),
     ),
     (
         "tests: lerobot",
         |_, tally| python::test_lerobot(tally),
-        Some(python::no_lerobot),
+        Some(|| python::LEROBOT.obstacle()),
     ),
     (
         "tests: rerun",
         |_, tally| python::test_rerun(tally),
-        Some(python::no_rerun),
+        Some(|| python::RERUN.obstacle()),
     ),
     (
         "tests: mujoco",
         |_, tally| python::test_mujoco(tally),
-        Some(python::no_mujoco),
+        Some(|| python::MUJOCO.obstacle()),
     ),
     (
         "tests: kit",
         |_, tally| python::test_kit(tally),
-        Some(python::no_kit),
+        Some(|| python::KIT.obstacle()),
     ),
     ("benchmark", |shared, _| shared.benchmark(), None),
     ("build: board benchmark", |_, _| bench::board::lint(), None),
@@ -274,10 +274,10 @@ fn rig_tests_at_half_speed(shared: &Shared, tally: &mut Tally) -> Result<()> {
 /// Systems on which the host tool is not tested, but compiles.
 const OTHER_SYSTEMS: [&str; 2] = ["x86_64-pc-windows-gnu", "aarch64-apple-darwin"];
 
-fn no_other_systems() -> Option<&'static str> {
+fn no_other_systems() -> Option<String> {
     let mut add = process::command("rustup target add");
     let added = process::succeeds(add.args(OTHER_SYSTEMS).env("RUSTUP_AUTO_INSTALL", "0"));
-    (!added).then_some("rustup cannot add the targets of Windows and macOS")
+    (!added).then(|| "rustup cannot add the targets of Windows and macOS".to_owned())
 }
 
 fn other_systems() -> Result<()> {
@@ -288,9 +288,9 @@ fn other_systems() -> Result<()> {
     Ok(())
 }
 
-fn no_cargo_deny() -> Option<&'static str> {
+fn no_cargo_deny() -> Option<String> {
     let missing = "cargo-deny is not installed: `cargo install cargo-deny`";
-    (!toolchain::has("deny")).then_some(missing)
+    (!toolchain::has("deny")).then(|| missing.to_owned())
 }
 
 /// Checks licences and sources of foreign packages against `deny.toml`. Known flaws (`cargo deny

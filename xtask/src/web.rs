@@ -9,6 +9,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use base64::prelude::{BASE64_STANDARD, Engine};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use hivtac_wire::image::Image;
@@ -47,7 +48,7 @@ pub fn page(images: &[Image]) -> Result<PathBuf> {
     let sensing = format!(
         "// The WebAssembly module, and the script of its worker.\nglobalThis.HIVTAC = {{\n  \
          module: \"{}\",\n  engine: {},\n}};\n",
-        base64(&packed(&wasm)?),
+        packed(&wasm)?,
         serde_json::to_string(&engine)?
     );
     let folder = toolchain::work_folder("web")?;
@@ -68,7 +69,7 @@ pub fn page(images: &[Image]) -> Result<PathBuf> {
 fn firmware(images: &[Image]) -> Result<String> {
     let packed: Result<BTreeMap<String, String>> = images
         .iter()
-        .map(|image| Ok((image.board(), base64(&packed(image.bytes())?))))
+        .map(|image| Ok((image.board(), packed(image.bytes())?)))
         .collect();
     let json = serde_json::to_string(&packed?)?;
     Ok(format!(
@@ -179,45 +180,16 @@ fn exported_name(line: &str) -> Option<&str> {
     rest.get(..end)
 }
 
-/// Packs bytes as a file of gzip.
-fn packed(bytes: &[u8]) -> Result<Vec<u8>> {
+/// Packs bytes as a file of gzip, and that as base64.
+fn packed(bytes: &[u8]) -> Result<String> {
     let mut packer = GzEncoder::new(Vec::new(), Compression::best());
     packer.write_all(bytes)?;
-    Ok(packer.finish()?)
-}
-
-/// Encodes bytes as base64 with padding.
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let part = |index: usize| u32::from(three.get(index).copied().unwrap_or(0));
-        let bits = part(0) << 16 | part(1) << 8 | part(2);
-        for (place, shift) in [18, 12, 6, 0].into_iter().enumerate() {
-            match place <= three.len() {
-                true => text.push(char::from(LETTERS[(bits >> shift & 63) as usize])),
-                false => text.push('='),
-            }
-        }
-    }
-    text
+    Ok(BASE64_STANDARD.encode(packer.finish()?))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn base64_is_that_of_the_standard() {
-        for (bytes, text) in [
-            ("", ""),
-            ("f", "Zg=="),
-            ("fo", "Zm8="),
-            ("foobar", "Zm9vYmFy"),
-        ] {
-            assert_eq!(base64(bytes.as_bytes()), text);
-        }
-    }
 
     fn bundled(modules: &[(&str, &str)]) -> Result<String> {
         let modules = modules.iter();
