@@ -13,7 +13,7 @@
 //! followed, and is missing in every later force, up to the total. A force that grows faster
 //! becomes a contact and stays whole, except for the part that was followed until then. In the
 //! simulated sensor at 320×240 a straight press moves each coordinate by 2.6 px for its first mN,
-//! and by 0.1 px per mN at 0.1 N. (`twin/shell/examples/solve.rs` prints this.) So the usual rate of
+//! and by 0.1 px per mN at 0.1 N (`twin/shell`, its example `solve`). So the usual rate of
 //! 0.005 px a second is 2 µN a second at rest. The usual total of 0.2 px takes 0.08 mN of a force
 //! of a few mN, and at most 2 mN of one of 0.1 N.
 

@@ -30,9 +30,9 @@ enum Command {
     Contacts(contacts::Contacts),
     Paper(paper::Paper),
     #[command(subcommand)]
-    Scene(Box<scene::SceneCommand>),
+    Scene(scene::SceneCommand),
     Slip(slip::Slip),
-    Touches(touches::Touches),
+    Touches(Box<touches::Touches>),
     Tradeoff(tradeoff::TradeoffArgs),
     Unseen(unseen::Unseen),
     Units(units::Units),

@@ -29,8 +29,8 @@ pub const PACKAGE: Environment = Environment {
     needs: "Python 3.9",
 };
 
-/// For a receiver of `hivtac serve`: Cyclone DDS, which ROS 2 itself uses, a WebSocket client, and a
-/// reader of ROS 2's messages.
+/// For a receiver of `hivtac serve`: Cyclone DDS, which ROS 2 itself uses, a WebSocket client, and
+/// a reader of ROS 2's messages.
 pub const SERVE: Environment = Environment {
     folder: "python-serve",
     modules: "cyclonedds, mcap_ros2, websockets",
