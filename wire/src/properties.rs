@@ -119,32 +119,6 @@ proptest! {
         prop_assert!(decoder.rejected().frames() >= 1);
     }
 
-    #[test]
-    fn arbitrary_bytes_never_panic_and_are_accounted_for(
-        bytes in proptest::collection::vec(any::<u8>(), 0..2000),
-    ) {
-        let mut small = Decoder::<5>::new();
-        let _: Vec<Received<HostMessage>> = decode_all(&mut small, &bytes);
-        let mut decoder = HostDecoder::new();
-        let received: Vec<Received<DeviceMessage>> = decode_all(&mut decoder, &bytes);
-        decoder.reset();
-        if received.is_empty() {
-            let lost = bytes.iter().filter(|byte| **byte != 0).count();
-            prop_assert_eq!(decoder.rejected().bytes as usize, lost);
-        }
-    }
-
-    /// Right frames around arbitrary bodies reach the body decoder.
-    #[test]
-    fn arbitrary_bodies_never_panic(body in proptest::collection::vec(any::<u8>(), 0..240)) {
-        let bytes = frame_of_body(&Raw(&body));
-        let mut decoder = HostDecoder::new();
-        let received: Vec<Received<DeviceMessage>> = decode_all(&mut decoder, &bytes);
-        prop_assert_eq!(received.len() as u32 + decoder.rejected().frames(), 1);
-        let rejected = decoder.rejected();
-        prop_assert_eq!(rejected.body + rejected.trailing, rejected.frames());
-    }
-
     /// For any later version, whatever follows the prefix, both versions can be named.
     #[test]
     fn any_later_hello_is_named(

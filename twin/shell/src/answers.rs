@@ -10,8 +10,6 @@ use crate::{Design, Equilibrium, Film, ShellError};
 const TIP_STEP_MM: f64 = 1e-3;
 const POST_STEP_MM: f64 = 2e-2;
 const MORPH_STEP_MM: f64 = 1e-3;
-/// Step of finite differences of the surface along the film, mm.
-const SURFACE_STEP_MM: f64 = 1e-3;
 /// The directions of a change, for films on both sides of the one in question.
 const BESIDE: [f64; 2] = [-1.0, 1.0];
 
@@ -275,19 +273,6 @@ impl Film {
         let flat = self.half_rate(point_mm, 1.0, 0.0, response.change);
         let up = [0.0, 0.0, flat];
         std::array::from_fn(|c| moved[c] - thinner * n[c] - half * leant[c] + up[c])
-    }
-
-    /// Returns the derivatives of [`Film::displacement`] along the mounted film by x and by y, mm
-    /// per mm.
-    pub fn surface_slopes(&self, state: &Equilibrium, point_mm: [f64; 2]) -> [[f64; 3]; 2] {
-        [0, 1].map(|way| {
-            let [back, forth] = BESIDE.map(|sign| {
-                let mut there = point_mm;
-                there[way] += sign * SURFACE_STEP_MM;
-                self.displacement(state, there)
-            });
-            std::array::from_fn(|c| (forth[c] - back[c]) / (2.0 * SURFACE_STEP_MM))
-        })
     }
 
     /// Returns the derivative of half of the thickness at a point by a change, mm per unit. The

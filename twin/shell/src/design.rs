@@ -139,11 +139,6 @@ impl Design {
         self.span_mm / 2.0 + self.overhang_mm
     }
 
-    /// Returns the thickness before mounting, mm, at a point (mm) of the mounted film.
-    pub fn thickness_mm_at(&self, point_mm: [f64; 2]) -> f64 {
-        self.material.thickness_mm * self.sheet().relative(point_mm)
-    }
-
     /// Checks that such a film is possible.
     ///
     /// # Errors
