@@ -8,7 +8,8 @@
 //! ([`threshold`]), forces ([`force_fields`], [`decimal`]), markers ([`marker_fields`]), texts
 //! ([`shown`]), the usual tare ([`usual_tare`]), counts ([`tally`]), true forces ([`truth`]), times
 //! ([`clock`]), what two fingers feel together ([`grip`]). Also the live page ([`page`]), and
-//! recordings: written ([`bag`], [`ros`]) and read ([`recording`]).
+//! recordings: written ([`bag`], [`ros`]) and read ([`recording`]). With the feature `twin`, the
+//! simulated sensor in real time (`live`).
 //!
 //! In a browser (`web/`) there are neither ports nor files: what needs them is left out there.
 
@@ -26,6 +27,8 @@ pub mod frame;
 pub mod grip;
 #[cfg(not(target_family = "wasm"))]
 pub mod link;
+#[cfg(feature = "twin")]
+pub mod live;
 pub mod look;
 pub mod marker_fields;
 #[cfg(not(target_family = "wasm"))]

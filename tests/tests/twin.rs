@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use crate::rig::{Rig, TIMEOUT_S, tool};
 use hivtac_host::link::Link;
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::device::{Captured, Device};
 use hivtac_host::port::Address;
-use hivtac_live::camera::Kind;
-use hivtac_live::device::{Captured, Device};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::HsvBox;

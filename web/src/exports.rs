@@ -4,7 +4,7 @@
 use crate::engine::Engine;
 use crate::firmware::Firmware;
 use crate::{photograph, same_bits};
-use hivtac_live::camera::Kind;
+use hivtac_host::live::camera::Kind;
 use std::cell::RefCell;
 
 thread_local! {

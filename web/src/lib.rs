@@ -1,7 +1,7 @@
 //! The page that needs no server: what `hivtac view` and `hivtac view --twin` do, for a browser.
 //!
 //! ```text
-//! simulated sensor (hivtac-live) ─┐
+//! simulated sensor (hivtac_host) ─┐
 //!                                 ├─ bytes ─ conversation ─ feed ─ events ─ the page's files
 //! a device at the serial port ────┘
 //! ```

@@ -1,10 +1,10 @@
 //! What the sensing makes of a picture of one's own, as `hivtac sense` does.
 
 use hivtac_host::frame::{Frame, Taken};
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::device::Device;
 use hivtac_host::one_picture::{Sensor, measure, rgb565, settings};
 use hivtac_host::page::{lights, picture, rows};
-use hivtac_live::camera::Kind;
-use hivtac_live::device::Device;
 use hivtac_sensor::force::model::Model;
 use hivtac_twin::Layout;
 use hivtac_wire::message::{DeviceHello, Sample};

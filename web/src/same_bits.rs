@@ -1,7 +1,7 @@
 //! Frames whose samples are the same bytes on every machine, in WebAssembly too.
 
-use hivtac_live::camera::Kind;
-use hivtac_live::device::{Captured, Device};
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::device::{Captured, Device};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{CRC32, MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};

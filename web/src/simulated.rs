@@ -1,10 +1,10 @@
 //! The simulated sensor, frame by frame: its film is pressed by hand.
 
-use hivtac_live::camera::Kind;
-use hivtac_live::device::Device;
-use hivtac_live::eye::{Disturbances, Eye, Presses};
-use hivtac_live::hand::{Hand, Touch};
-use hivtac_live::run::{Due, Frames, Told, device_id};
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::device::Device;
+use hivtac_host::live::eye::{Disturbances, Eye, Presses};
+use hivtac_host::live::hand::{Hand, Touch};
+use hivtac_host::live::run::{Due, Frames, Told, device_id};
 use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 

@@ -3,12 +3,12 @@
 
 #![cfg(unix)]
 
-use hivtac_live::camera::Kind;
-use hivtac_live::device::Device;
-use hivtac_live::eye::{Disturbances, Eye, Presses};
-use hivtac_live::hand::Hand;
-use hivtac_live::line::Tcp;
-use hivtac_live::run::{Clock, Shared, device_id};
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::device::Device;
+use hivtac_host::live::eye::{Disturbances, Eye, Presses};
+use hivtac_host::live::hand::Hand;
+use hivtac_host::live::line::Tcp;
+use hivtac_host::live::run::{Clock, Shared, device_id};
 use hivtac_twin::Scene;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

@@ -4,11 +4,11 @@
 use crate::error::Error;
 use crate::told::{self, SampleNumbers};
 use hivtac_host::contact_shape;
-use hivtac_live::camera::Kind;
-use hivtac_live::device::Device;
-use hivtac_live::eye::{Disturbances, Eye, Presses};
-use hivtac_live::hand::{Hand, Touch};
-use hivtac_live::run::{Due, Frames, device_id};
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::device::Device;
+use hivtac_host::live::eye::{Disturbances, Eye, Presses};
+use hivtac_host::live::hand::{Hand, Touch};
+use hivtac_host::live::run::{Due, Frames, device_id};
 use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request};

@@ -8,8 +8,8 @@ mod tares;
 #[cfg(test)]
 mod tests;
 
-use crate::camera::{Camera, Kind};
-use crate::outbox::Outbox;
+use super::camera::{Camera, Kind};
+use super::outbox::Outbox;
 use hivtac_portable::device::answer::{self, Identity, text};
 use hivtac_portable::device::kept::Keeper;
 use hivtac_portable::device::model::{self, Fitting};

@@ -1,8 +1,8 @@
 //! What the camera sees: the scene, its disturbances, and what presses it.
 
-use crate::camera::{Camera, Kind};
-use crate::course::Course;
-use crate::hand::{Following, Hand};
+use super::camera::{Camera, Kind};
+use super::course::Course;
+use super::hand::{Following, Hand};
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_twin::{Format, Load, Options, Paint, Patch, Scene, SceneError, Shutter, Truth};
 

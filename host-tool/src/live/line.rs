@@ -1,6 +1,6 @@
 //! Bytes to and from a host: one at a time, over TCP, or over anything that reads and writes.
 
-use crate::run::Shared;
+use super::run::Shared;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};

@@ -1,8 +1,8 @@
 //! The clock: one frame after the other, in real time.
 
-use crate::camera::{Camera, Kind};
-use crate::device::{Captured, Device};
-use crate::eye::Eye;
+use super::camera::{Camera, Kind};
+use super::device::{Captured, Device};
+use super::eye::Eye;
 use hivtac_twin::Truth;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};

@@ -1,8 +1,8 @@
 //! The truth log: one JSON object per frame, as `hivtac monitor --truth` reads it.
 
 use hivtac_host::failure::Failure;
+use hivtac_host::live::run::Told;
 use hivtac_host::shown::to_json;
-use hivtac_live::run::Told;
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::Write;

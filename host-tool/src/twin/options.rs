@@ -2,12 +2,12 @@
 
 use clap::{Args, ValueEnum};
 use hivtac_host::failure::Failure;
-use hivtac_live::camera::Kind;
-use hivtac_live::course::Course;
-use hivtac_live::device::Device;
-use hivtac_live::eye::{Disturbances, Eye, Presses};
-use hivtac_live::hand::Hand;
-use hivtac_live::run::device_id;
+use hivtac_host::live::camera::Kind;
+use hivtac_host::live::course::Course;
+use hivtac_host::live::device::Device;
+use hivtac_host::live::eye::{Disturbances, Eye, Presses};
+use hivtac_host::live::hand::Hand;
+use hivtac_host::live::run::device_id;
 use hivtac_twin::units;
 use hivtac_twin::{Layout, Options, Scene};
 use std::ops::RangeInclusive;

@@ -5,8 +5,8 @@
 //! of the one before it.
 
 use hivtac_host::failure::Failure;
-use hivtac_live::line::converse;
-use hivtac_live::run::Shared;
+use hivtac_host::live::line::converse;
+use hivtac_host::live::run::Shared;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{Mode, OFlags, open};
 use rustix::io::{Errno, FdFlags, fcntl_setfd};

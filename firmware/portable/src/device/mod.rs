@@ -1,5 +1,5 @@
 //! What a device does with settings, rest positions and models, whatever it runs on: the firmware,
-//! or the twin on a computer (`twin/live/`). No register, no task, no allocation.
+//! or the twin on a computer (`host-tool/src/live/`). No register, no task, no allocation.
 //!
 //! | module | subject |
 //! |---|---|

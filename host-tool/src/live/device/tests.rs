@@ -1,9 +1,9 @@
 //! Tests a conversation with the device, message by message.
 
 use super::{Captured, Device};
-use crate::camera::Kind;
-use crate::eye::{Disturbances, Eye, Presses};
-use crate::hand::Hand;
+use crate::live::camera::Kind;
+use crate::live::eye::{Disturbances, Eye, Presses};
+use crate::live::hand::Hand;
 use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
