@@ -76,15 +76,16 @@ class Serve:
     """`hivtac serve`, until it is left."""
 
     def __init__(self, *options):
+        self._errors = tempfile.NamedTemporaryFile()
         self._process = subprocess.Popen(
             [os.environ["HIVTAC_TOOL"], "serve", "--json", *options],
             stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
+            stderr=self._errors,
             text=True,
         )
         line = self._process.stdout.readline()
         if not line:
-            raise AssertionError(self._process.communicate()[1])
+            raise AssertionError(self.said())
         self.told = json.loads(line)
 
     def __enter__(self):
@@ -92,14 +93,19 @@ class Serve:
 
     def __exit__(self, *_):
         self.said()
+        self._errors.close()
+
+    def heard(self):
+        """What it has said on standard error until now."""
+        return Path(self._errors.name).read_text()
 
     def said(self):
         """Ends it as Ctrl-C does; what it said on standard error."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
-        _, said = self._process.communicate(timeout=20)
+        self._process.communicate(timeout=20)
         self.code = self._process.returncode
-        return said
+        return self.heard()
 
 
 class Node:
@@ -305,12 +311,8 @@ class OfARecording(unittest.TestCase):
                 self.assertEqual(refused.returncode, 1)
                 self.assertIn("choose another port with --listen", refused.stderr)
                 with Replay(self.file) as third, Serve(*ROS2, *third.port) as second:
-                    time.sleep(4)
-                    for serve in (second, first):
-                        said = serve.said()
-                        self.assertIn(
-                            f"another node in domain {DOMAIN} is called /hivtac, too", said
-                        )
+                    words = f"another node in domain {DOMAIN} is called /hivtac, too"
+                    until(lambda: all(words in serve.heard() for serve in (second, first)))
 
     def test_of_several_sensors_each_has_names_of_its_own(self):
         other_file = self.file.with_name("other.mcap")
@@ -333,9 +335,8 @@ class OfARecording(unittest.TestCase):
         on_zenoh = mock.patch.dict(os.environ, RMW_IMPLEMENTATION="rmw_zenoh_cpp")
         with on_zenoh, Replay(self.file) as replay:
             with Serve(*alone, *replay.port) as serve:
-                time.sleep(12)
+                until(lambda: "nothing else of ROS 2 is in domain 231" in serve.heard())
                 said = serve.said()
-        self.assertIn("nothing else of ROS 2 is in domain 231", said)
         self.assertIn("RMW_IMPLEMENTATION is rmw_zenoh_cpp", said)
 
     def test_a_grip_of_two_sensors_has_topics_of_its_own(self):

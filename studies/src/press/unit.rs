@@ -1,6 +1,7 @@
 //! A simulated unit: its scene, its tare and its answers.
 
 use anyhow::{Result, anyhow};
+use hivtac_calibration::forward::untared;
 use hivtac_sensor::force::Force;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::{Conditions, Model};
@@ -9,7 +10,6 @@ use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::ByteOrder;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_twin::film::{Dots, Layout, Pressed};
 use hivtac_twin::{Frame, Load, Options, Scene, Truth};
@@ -159,12 +159,13 @@ impl TestedUnit {
 
     /// The rest position of this unit for a model.
     pub fn rest(&self, model: &Model<'_>) -> Result<Rest> {
-        let mut untared = Tared::untared(model)?;
+        let mut sensor = untared(model)?;
         let mut tare = TareBuilder::new(TARE_FRAMES).ok_or_else(|| anyhow!("no frames"))?;
         // Every second frame may be bad.
         for number in 0..2 * TARE_FRAMES {
-            let seen = untared.measure(&self.frame(&Load::REST, 1_000_000 + u64::from(number))?);
-            if let Some(outcome) = untared.sensor.tare_with(&mut tare, &seen) {
+            let frame = self.frame(&Load::REST, 1_000_000 + u64::from(number))?;
+            let seen = sensor.measure_frame(&frame.to_rgb565());
+            if let Some(outcome) = sensor.tare_with(&mut tare, &seen) {
                 return outcome.map_err(|refusal| anyhow!("no rest position: {refusal:?}"));
             }
         }
@@ -175,17 +176,11 @@ impl TestedUnit {
 impl<'m> Tared<'m> {
     /// A sensor with this model and this rest position.
     pub fn new(model: &Model<'m>, rest: Rest) -> Result<Tared<'m>> {
-        let mut tared = Self::untared(model)?;
+        let mut tared = Tared {
+            sensor: untared(model)?,
+        };
         tared.begin(rest);
         Ok(tared)
-    }
-
-    fn untared(model: &Model<'m>) -> Result<Tared<'m>> {
-        let mut sensor = Box::new(Sensor::new());
-        let settings = model.conditions.settings(ByteOrder::Native);
-        let configured = sensor.configure(settings, Some(*model));
-        configured.map_err(|error| anyhow!("{error}"))?;
-        Ok(Tared { sensor })
     }
 }
 

@@ -4,9 +4,8 @@ use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 
-use super::{CLOCK_MHZ, cases};
+use super::cases;
 use crate::artifacts::{self, Board};
-use crate::size::grouped;
 use crate::{process, toolchain};
 
 /// The image, an example of the firmware.
@@ -23,14 +22,13 @@ pub fn run() -> Result<()> {
         "the image is built; to run it, connect an STM32H743 by a debug probe"
     );
     let mut command = process::command("probe-rs run --chip STM32H743VITx");
-    let (mut rows, mut done) = (String::new(), false);
+    let mut done = false;
+    println!("item|frame|format|cycles, measured");
     process::for_each_line(command.arg(&image), |line| {
-        rows.extend(row(line));
+        println!("{line}");
         done |= line.contains("done");
     })?;
     ensure!(done, "the board stopped before it had measured everything");
-    println!("| item | frame | format | cycles, measured | µs at 480 MHz |");
-    println!("|---|---|---|---:|---:|\n{rows}");
     Ok(())
 }
 
@@ -48,30 +46,4 @@ fn command() -> Result<Command> {
     command.env("HIVTAC_BOARD_DATA", data);
     command.args(["--example", EXAMPLE]);
     Ok(command)
-}
-
-/// Finds a row such as `frame full|320x240|rgb565|200000` in a line.
-fn row(line: &str) -> Option<String> {
-    let words: Vec<&str> = line.trim().split('|').collect();
-    let [item, frame, format, cycles] = words[..] else {
-        return None;
-    };
-    let cycles: u64 = cycles.split_whitespace().next()?.parse().ok()?;
-    let (cycles, time) = (grouped(cycles), cycles as f64 / CLOCK_MHZ);
-    Some(format!(
-        "| {item} | {frame} | {format} | {cycles} | {time:.1} |\n"
-    ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::row;
-
-    #[test]
-    fn what_the_board_says_becomes_a_row() {
-        let line = "frame full, 5 % salt|320x240|rgb565|96000\n";
-        let expected = "| frame full, 5 % salt | 320x240 | rgb565 | 96,000 | 200.0 |\n";
-        assert_eq!(row(line).as_deref(), Some(expected));
-        assert_eq!(row("Finished in 1.2s"), None);
-    }
 }

@@ -12,10 +12,9 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 
 use crate::size::grouped;
-use crate::{artifacts, packages, process, size, toolchain};
+use crate::{artifacts, packages, process, toolchain};
 
 const BASELINE: &str = "xtask/baseline.json";
-const DOCUMENT: &str = "docs/results/performance.md";
 /// The core's clock, in MHz.
 const CLOCK_MHZ: f64 = 480.0;
 /// The emulator's command line, up to the script for the image.
@@ -28,11 +27,8 @@ pub struct Bench {
     /// Make what is measured now the baseline that later counts are held to.
     #[arg(long)]
     write_baseline: bool,
-    /// Put the tables into docs/results/performance.md.
-    #[arg(long)]
-    write_docs: bool,
     /// Measure on an STM32H743 that is attached by a debug probe instead.
-    #[arg(long, conflicts_with_all = ["write_baseline", "write_docs"])]
+    #[arg(long, conflicts_with = "write_baseline")]
     board: bool,
 }
 
@@ -54,14 +50,8 @@ impl Bench {
             }
             instructions.insert(case.name, before + last_band);
         }
-        let table = table(&instructions);
-        process::print(&table);
-        let (document, baseline) = (toolchain::at(DOCUMENT), toolchain::at(BASELINE));
-        if self.write_docs {
-            let text = replaced(&process::read(&document)?, "bench", &table)?;
-            let text = replaced(&text, "memory", &size::memories()?)?;
-            process::write(&document, &text)?;
-        }
+        process::print(&table(&instructions));
+        let baseline = toolchain::at(BASELINE);
         let now = Baseline {
             compiler: toolchain::target_compiler()?,
             instructions,
@@ -168,18 +158,6 @@ impl Baseline {
     }
 }
 
-/// Replaces the text between `<!-- NAME: begin … -->` and `<!-- NAME: end -->` in a document.
-fn replaced(document: &str, name: &str, text: &str) -> Result<String> {
-    let parts = || {
-        let begin = document.find(&format!("<!-- {name}: begin"))?;
-        let start = begin + document[begin..].find("-->")? + "-->".len();
-        let end = start + document[start..].find(&format!("<!-- {name}: end -->"))?;
-        Some((&document[..start], &document[end..]))
-    };
-    let (head, tail) = parts().with_context(|| format!("{DOCUMENT} has no place for `{name}`"))?;
-    Ok(format!("{head}\n\n{}\n\n{tail}", text.trim()))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -200,14 +178,5 @@ mod tests {
             assert!(committed.check(&baseline("rustc 1", counts)).is_err());
             assert!(committed.check(&baseline("rustc 2", counts)).is_ok());
         }
-    }
-
-    #[test]
-    fn only_what_lies_between_the_marks_changes() {
-        let document = "one\n<!-- a: begin, by x -->\nold\n<!-- a: end -->\ntwo\n";
-        let expected = document.replace("\nold\n", "\n\nnew\n\n");
-        assert_eq!(replaced(document, "a", "new\n").unwrap(), expected);
-        assert_eq!(replaced(&expected, "a", "new").unwrap(), expected);
-        assert!(replaced(document, "c", "new").is_err());
     }
 }
