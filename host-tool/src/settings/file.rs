@@ -139,7 +139,7 @@ pub struct Kept {
     rezeroed_px: f64,
     /// Distance in px.
     seen_px: Option<f64>,
-    kept: KeptParts,
+    kept: Selection,
     found: &'static str,
     erases: u32,
     failures: u32,
@@ -147,42 +147,14 @@ pub struct Kept {
     drift_q16: Option<Px>,
 }
 
-#[derive(Serialize)]
-struct KeptParts {
-    name: bool,
-    threshold: bool,
-    tare: bool,
-    temporal: bool,
-    camera: bool,
-    down: bool,
-    contact_shape: bool,
-}
-
 impl Kept {
     /// From a device's report.
     pub fn new(device_id: &[u8; 12], report: &SettingsReport) -> Kept {
-        let Selection {
-            name,
-            threshold,
-            tare,
-            temporal,
-            camera,
-            down,
-            contact_shape,
-        } = report.kept;
         Kept {
             file: File::new(device_id, report),
             rezeroed_px: report.rezeroed.to_f64(),
             seen_px: report.seen.map(MilliPx::to_f64),
-            kept: KeptParts {
-                name,
-                threshold,
-                tare,
-                temporal,
-                camera,
-                down,
-                contact_shape,
-            },
+            kept: report.kept,
             found: match report.found {
                 Found::Nothing => "nothing",
                 Found::Settings => "settings",
