@@ -15,11 +15,8 @@ use crate::size::grouped;
 use crate::{artifacts, packages, process, toolchain};
 
 const BASELINE: &str = "xtask/baseline.json";
-/// The core's clock, in MHz.
-const CLOCK_MHZ: f64 = 480.0;
-/// The emulator's command line, up to the script for the image.
-const QEMU: &str = "qemu-system-arm -M mps2-an500 -display none -monitor none -serial none \
-    -d plugin -semihosting-config";
+/// The emulator's command line, up to the machine.
+const QEMU: &str = "qemu-system-arm -display none -monitor none -serial none -d plugin -M";
 
 /// Options of `cargo xtask bench`.
 #[derive(Args, Default)]
@@ -27,9 +24,21 @@ pub struct Bench {
     /// Make what is measured now the baseline that later counts are held to.
     #[arg(long)]
     write_baseline: bool,
-    /// Measure on an STM32H743 that is attached by a debug probe instead.
+    /// Count on a Cortex-M55 instead, for which there is no baseline.
     #[arg(long, conflicts_with = "write_baseline")]
+    m55: bool,
+    /// Measure on an STM32H743 that is attached by a debug probe instead.
+    #[arg(long, conflicts_with_all = ["write_baseline", "m55"])]
     board: bool,
+}
+
+/// A core that QEMU emulates.
+struct Core {
+    /// QEMU's name of a machine with it.
+    machine: &'static str,
+    /// Its clock on the sensor's board, in MHz.
+    clock_mhz: u32,
+    image: PathBuf,
 }
 
 impl Bench {
@@ -41,16 +50,19 @@ impl Bench {
         packages::ensure_qemu()?;
         let folder = toolchain::work_folder("bench")?;
         let plugin = artifacts::instruction_counter(plugin_version()?)?;
-        let image = artifacts::qemu_image()?;
+        let core = Core::new(self.m55)?;
         let mut instructions = BTreeMap::new();
         for case in cases(&folder)? {
-            let [before, last_band] = counts(&image, &plugin, &folder, &case)?;
+            let [before, last_band] = counts(&core, &plugin, &folder, &case)?;
             if let Some(name) = case.name.strip_prefix("frame full") {
                 instructions.insert(format!("latency{name}"), last_band);
             }
             instructions.insert(case.name, before + last_band);
         }
-        process::print(&table(&instructions));
+        process::print(&table(&instructions, core.clock_mhz));
+        if self.m55 {
+            return Ok(());
+        }
         let baseline = toolchain::at(BASELINE);
         let now = Baseline {
             compiler: toolchain::target_compiler()?,
@@ -62,6 +74,24 @@ impl Bench {
         }
         let committed: Baseline = serde_json::from_str(&process::read(&baseline)?)?;
         committed.check(&now)
+    }
+}
+
+impl Core {
+    /// Builds the image for the sensor's Cortex-M7, or for a Cortex-M55.
+    fn new(m55: bool) -> Result<Core> {
+        Ok(match m55 {
+            false => Core {
+                machine: "mps2-an500",
+                clock_mhz: 480,
+                image: artifacts::qemu_image()?,
+            },
+            true => Core {
+                machine: "mps3-an547",
+                clock_mhz: 800,
+                image: artifacts::m55_image()?,
+            },
+        })
     }
 }
 
@@ -82,13 +112,14 @@ fn cases(folder: &Path) -> Result<Vec<Case>> {
 }
 
 /// Runs a case; returns its instructions before the last band of rows is there, and from then on.
-fn counts(image: &Path, plugin: &Path, folder: &Path, case: &Case) -> Result<[u64; 2]> {
+fn counts(core: &Core, plugin: &Path, folder: &Path, case: &Case) -> Result<[u64; 2]> {
     let (log, results) = (folder.join("counts"), folder.join("results"));
     let (script, results) = (case.file.display(), results.display());
     let arguments = format!("arg=hivtac-qemu-image,arg={script},arg={results}");
     let mut qemu = process::command(QEMU);
+    qemu.arg(core.machine).arg("-semihosting-config");
     qemu.arg(format!("enable=on,target=native,{arguments}"));
-    qemu.arg("-kernel").arg(image);
+    qemu.arg("-kernel").arg(&core.image);
     qemu.arg("-plugin").arg(plugin).arg("-D").arg(&log);
     process::output(&mut qemu)?;
     let counts = serde_json::from_str(&process::read(&log)?);
@@ -107,13 +138,14 @@ fn plugin_version() -> Result<u32> {
 }
 
 /// The table of all counts, with the time of a core that issues one instruction a cycle.
-fn table(instructions: &BTreeMap<String, u64>) -> String {
+fn table(instructions: &BTreeMap<String, u64>, clock_mhz: u32) -> String {
     let rows = instructions.iter().map(|(name, count)| {
-        let time_us = *count as f64 / CLOCK_MHZ;
+        let time_us = *count as f64 / f64::from(clock_mhz);
         format!("| {name} | {} | {time_us:.1} |\n", grouped(*count))
     });
-    let head = "| item | instructions | µs at 480 MHz, one a cycle |\n|---|---:|---:|\n";
-    head.to_owned() + &rows.collect::<String>()
+    let head =
+        format!("| item | instructions | µs at {clock_mhz} MHz, one a cycle |\n|---|---:|---:|\n");
+    head + &rows.collect::<String>()
 }
 
 /// Measured counts, with the compiler that built the image.
