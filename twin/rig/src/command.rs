@@ -15,17 +15,18 @@ use crate::camera::part;
 use crate::chip::Revision;
 use crate::faults::{Fault, Faults};
 use crate::frame_source::{FrameSource, SceneSource, TestPicture};
-use crate::link::{Endpoint, Link, Pty, Tcp};
+use crate::link::{Endpoint, Link, Plug, Pty, Tcp};
 use crate::machine::Entry;
 use crate::mpu::Protection;
 use crate::peripherals::flash::Cut;
 use crate::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program};
 use crate::script::Script;
 use crate::truth::TruthLog;
+use crate::usbip::Server;
 
 /// Runs the firmware on an emulated STM32H743 with a simulated camera and a USB host.
 ///
-/// Prints `ready tcp=ADDRESS pty=PATH` once the serial port is there. Ends at a limit, on SIGTERM
+/// Prints `ready tcp=ADDRESS pty=PATH`, or `ready usbip=ADDRESS`, once the port is there. Ends at a limit, on SIGTERM
 /// or Ctrl-C, or, with --exit-on-hangup, when the client leaves. Exit code 0 when the run ended so,
 /// 1 when it could not be done or the firmware broke a rule of the chip, 2 for wrong arguments.
 #[derive(Parser, Debug)]
@@ -61,6 +62,10 @@ pub struct Arguments {
     /// Make a symbolic link to the pseudo-terminal.
     #[arg(long, value_name = "PATH", requires = "pty")]
     pty_link: Option<PathBuf>,
+    /// Offer the device itself by USB/IP at this TCP port of 127.0.0.1, as `1-1`, instead of a
+    /// serial port; 0 takes a free one. Linux attaches it: `usbip attach -r 127.0.0.1 -b 1-1`.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["tcp", "pty", "script"])]
+    usbip: Option<u16>,
     /// Start without a client, and go on without one.
     #[arg(long)]
     no_wait: bool,
@@ -120,6 +125,8 @@ pub struct Port {
     pub tcp: Option<u16>,
     /// Path of the pseudo-terminal.
     pub pty: Option<PathBuf>,
+    /// Port on 127.0.0.1 for USB/IP.
+    pub usbip: Option<u16>,
 }
 
 impl Arguments {
@@ -217,17 +224,25 @@ impl Arguments {
             }
             return Ok((Program::Script(Script::load(path)?), None));
         }
-        let (link, port) = self.open_link()?;
+        let (plug, port) = self.open()?;
         let program = Program::Client {
-            link,
+            plug,
             wait: !self.no_wait,
             exit_on_hangup: self.exit_on_hangup,
         };
         Ok((program, Some(port)))
     }
 
-    /// Opens the endpoints; by default a TCP port.
-    fn open_link(&self) -> anyhow::Result<(Link, Port)> {
+    /// Opens what the client uses; by default a TCP port with the serial port.
+    fn open(&self) -> anyhow::Result<(Box<dyn Plug>, Port)> {
+        if let Some(wanted) = self.usbip {
+            let server = Server::listen(wanted)?;
+            let port = Port {
+                usbip: Some(server.port()?),
+                ..Port::default()
+            };
+            return Ok((Box::new(server), port));
+        }
         let mut endpoints: Vec<Box<dyn Endpoint>> = Vec::new();
         let mut port = Port::default();
         if self.tcp.is_some() || !self.pty {
@@ -240,19 +255,22 @@ impl Arguments {
             port.pty = Some(pty.path().to_owned());
             endpoints.push(Box::new(pty));
         }
-        Ok((Link::new(endpoints), port))
+        Ok((Box::new(Link::new(endpoints)), port))
     }
 }
 
 impl Port {
-    /// Returns the line that announces that a client may connect: `ready tcp=ADDRESS pty=PATH`.
+    /// Returns the line that announces that a client may connect: `ready tcp=ADDRESS pty=PATH`,
+    /// or `ready usbip=ADDRESS`.
     pub fn ready_line(&self) -> String {
         let tcp = self.tcp.map(|port| format!(" tcp=127.0.0.1:{port}"));
+        let usbip = (self.usbip).map(|port| format!(" usbip=127.0.0.1:{port}"));
         let pty = (self.pty.as_ref()).map(|path| format!(" pty={}", path.display()));
         ["ready".to_owned()]
             .into_iter()
             .chain(tcp)
             .chain(pty)
+            .chain(usbip)
             .collect()
     }
 }
@@ -265,7 +283,7 @@ mod tests {
     fn a_port_is_told_in_one_line() {
         let tcp = Port {
             tcp: Some(4000),
-            pty: None,
+            ..Port::default()
         };
         assert_eq!(tcp.ready_line(), "ready tcp=127.0.0.1:4000");
         let both = Port {

@@ -15,7 +15,7 @@
 //! | [`chip`], [`board`], [`machine`], `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM, watchdog and clock recovery |
 //! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
-//! | [`usb_host`], [`link`], [`script`] | the host; who uses its serial port |
+//! | [`usb_host`], [`link`], [`usbip`], [`script`] | the host; who uses its serial port, or the device itself |
 //! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules`, `power` | what goes wrong on request; what firmware must not do; what a power-on leaves |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
@@ -47,3 +47,4 @@ mod start_rules;
 mod translations;
 pub mod truth;
 pub mod usb_host;
+pub mod usbip;

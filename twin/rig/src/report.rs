@@ -145,6 +145,8 @@ impl Report {
                 "enumerations": self.usb.enumerations,
                 "failed_transfers": self.usb.failed_transfers,
                 "repeated_packets": self.usb.repeated_packets,
+                "port_resets": self.usb.port_resets,
+                "suspends": self.usb.suspends,
                 "bytes_in": self.usb.bytes_in,
                 "packets_in": self.usb.packets_in,
                 "bytes_out": self.usb.bytes_out,

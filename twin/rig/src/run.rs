@@ -22,7 +22,7 @@ use crate::dma_reach;
 use crate::dma_requests;
 use crate::faults::Faults;
 use crate::frame_source::FrameSource;
-use crate::link::Link;
+use crate::link::Plug;
 use crate::machine::{Entry, Sensor};
 use crate::mpu::Protection;
 use crate::peripherals::flash::{self, Bank, Contents, Cut};
@@ -64,7 +64,7 @@ pub enum Program {
     /// A program on this machine.
     Client {
         /// The port's other end.
-        link: Link,
+        plug: Box<dyn Plug>,
         /// Whether to start, and go on, only while a client holds the port.
         wait: bool,
         /// Whether to end when the client leaves.
@@ -151,7 +151,11 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         rules.clone(),
         options.seed,
     ));
-    let host = SharedHost::new(Host::new(options.faults.clone(), options.arrivals));
+    let host = Host::new(options.faults.clone(), options.arrivals);
+    let host = SharedHost::new(match &options.program {
+        Program::Client { plug, .. } if plug.is_host() => host.of_client(),
+        _ => host,
+    });
     let chip = Chip::new(
         camera.clone(),
         host.clone(),
@@ -415,8 +419,8 @@ impl Conductor {
                 }
                 Turn::End => return false,
                 Turn::Wait => {
-                    if let Program::Client { link, .. } = &self.program {
-                        link.wait();
+                    if let Program::Client { plug, .. } = &self.program {
+                        plug.wait();
                     }
                 }
             }
@@ -425,10 +429,10 @@ impl Conductor {
     }
 
     fn look_for_client(&mut self, now: u64) -> Client {
-        let Program::Client { link, .. } = &mut self.program else {
+        let Program::Client { plug, .. } = &mut self.program else {
             return Client::None;
         };
-        match (link.connected(), self.client) {
+        match (plug.connected(), self.client) {
             (true, _) => Client::Here,
             (false, Client::Here) => Client::Left(now),
             (false, before) => before,
@@ -437,28 +441,21 @@ impl Conductor {
 
     fn exchange(&mut self, now: u64) -> Turn {
         let Program::Client {
-            link,
+            plug,
             wait,
             exit_on_hangup,
         } = &mut self.program
         else {
             return Turn::Over;
         };
-        let mut host = self.host.lock();
-        host.set_open(self.client == Client::Here);
-        let Host {
-            from_device,
-            to_device,
-            ..
-        } = &mut *host;
-        let waiting = (from_device.len(), to_device.len());
-        link.exchange(from_device, to_device);
-        if waiting != (from_device.len(), to_device.len()) {
+        let is_here = self.client == Client::Here;
+        let traffic = plug.exchange(&mut self.host.lock(), is_here);
+        if traffic.moved {
             self.heard_at = now;
         }
         let held_up = match self.client {
             // A slow client slows the run down; it does not make the device lose samples.
-            Client::Here => !from_device.is_empty(),
+            Client::Here => traffic.waits,
             Client::None => *wait,
             Client::Left(_) if *exit_on_hangup => return Turn::End,
             Client::Left(at) => *wait && now >= at + LINGER_NS,

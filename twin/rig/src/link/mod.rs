@@ -1,5 +1,5 @@
-//! The serial port for programs on this machine: a TCP port, a pseudo-terminal, or both; one client
-//! at a time.
+//! What programs on this machine use: here the serial port, as a TCP port, a pseudo-terminal, or
+//! both; one client at a time. [`crate::usbip`] has the device itself.
 
 mod pty;
 mod tcp;
@@ -13,6 +13,8 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 pub use pty::Pty;
 pub use tcp::Tcp;
+
+use crate::usb_host::Host;
 
 /// The longest duration of one check for a client, ms.
 const LOOK: u8 = 20;
@@ -35,6 +37,33 @@ pub trait Endpoint: Send + std::fmt::Debug {
     fn writable(&self) -> Option<BorrowedFd<'_>>;
 }
 
+/// The near end of what clients use.
+pub trait Plug: Send + std::fmt::Debug {
+    /// Returns whether the client is a USB host itself, not a program on the serial port.
+    fn is_host(&self) -> bool {
+        false
+    }
+
+    /// Returns whether a client is there; looks for one if not.
+    fn connected(&mut self) -> bool;
+
+    /// Moves bytes between client and host, without waiting; `is_here` tells whether a client is
+    /// there.
+    fn exchange(&mut self, host: &mut Host, is_here: bool) -> Traffic;
+
+    /// Waits a short time for the client to take more, or for a client to come.
+    fn wait(&self);
+}
+
+/// The result of an exchange with a client.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Traffic {
+    /// Whether bytes moved.
+    pub moved: bool,
+    /// Whether bytes wait for the client.
+    pub waits: bool,
+}
+
 /// The port's endpoints.
 #[derive(Debug, Default)]
 pub struct Link {
@@ -51,10 +80,11 @@ impl Link {
             holder: None,
         }
     }
+}
 
-    /// Returns whether a client holds the port; looks for a new one if not. The departure of a
-    /// client is reported before the arrival of the next one.
-    pub fn connected(&mut self) -> bool {
+impl Plug for Link {
+    /// The departure of a client is reported before the arrival of the next one.
+    fn connected(&mut self) -> bool {
         match self.holder {
             Some(holder) => {
                 if !self.endpoints[holder].held() {
@@ -71,16 +101,25 @@ impl Link {
         self.holder.is_some()
     }
 
-    /// Moves bytes in both directions, without waiting.
-    pub fn exchange(&mut self, from_device: &mut VecDeque<u8>, to_device: &mut VecDeque<u8>) {
+    fn exchange(&mut self, host: &mut Host, is_here: bool) -> Traffic {
+        host.set_open(is_here);
+        let Host {
+            from_device,
+            to_device,
+            ..
+        } = host;
+        let before = (from_device.len(), to_device.len());
         if let Some(holder) = self.holder {
             self.endpoints[holder].write(from_device);
             self.endpoints[holder].read(to_device);
         }
+        Traffic {
+            moved: before != (from_device.len(), to_device.len()),
+            waits: !from_device.is_empty(),
+        }
     }
 
-    /// Waits a short time for the client to take more, or for a client to come.
-    pub fn wait(&self) {
+    fn wait(&self) {
         match self
             .holder
             .and_then(|holder| self.endpoints[holder].writable())
@@ -103,7 +142,7 @@ fn nonblocking(descriptor: impl AsFd) -> anyhow::Result<()> {
 }
 
 /// Reads all available bytes. Returns false if the other end is gone.
-fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
+pub(crate) fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
     use nix::errno::Errno;
     let mut buffer = [0; 4096];
     loop {
@@ -118,7 +157,7 @@ fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
 }
 
 /// Writes until the other end takes no more. Returns false if it is gone.
-fn write_all(descriptor: impl AsFd, from: &mut VecDeque<u8>) -> bool {
+pub(crate) fn write_all(descriptor: impl AsFd, from: &mut VecDeque<u8>) -> bool {
     use nix::errno::Errno;
     while !from.is_empty() {
         match nix::unistd::write(&descriptor, from.as_slices().0) {

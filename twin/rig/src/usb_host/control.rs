@@ -6,6 +6,8 @@ use crate::peripherals::otg::{Answer, Core, Packet};
 pub const ADDRESS: u8 = 7;
 /// Name of the transfer that sets the address.
 pub const SET_ADDRESS: &str = "SET_ADDRESS";
+/// Name of the transfer that reads the device descriptor.
+pub const DEVICE: &str = "GET_DESCRIPTOR device";
 /// Name of the transfer that reads the whole configuration.
 pub const CONFIGURATION: &str = "GET_DESCRIPTOR configuration";
 /// Name of a script's own request.
@@ -31,7 +33,26 @@ pub enum Progress {
     /// The transfer is complete, with the bytes that were read.
     Done(Vec<u8>),
     /// The transfer failed.
-    Failed(&'static str),
+    Failed(Failure),
+}
+
+/// The reason why a transfer failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Failure {
+    /// The device refused it.
+    Stalled,
+    /// The device took too long.
+    TimedOut,
+}
+
+impl Failure {
+    /// Returns it for the log.
+    pub fn name(self) -> &'static str {
+        match self {
+            Failure::Stalled => "stalled",
+            Failure::TimedOut => "timed out",
+        }
+    }
 }
 
 /// The endpoints whose next packet is DATA0 after a transfer.
@@ -54,6 +75,8 @@ pub struct Transfer {
     pub name: &'static str,
     setup: [u8; 8],
     data: Vec<u8>,
+    /// Number of its bytes that the device has taken.
+    sent: usize,
     stage: Stage,
     deadline: u64,
 }
@@ -64,6 +87,7 @@ impl Transfer {
             name,
             setup,
             data: Vec::new(),
+            sent: 0,
             stage: Stage::Setup,
             deadline: 0,
         }
@@ -86,6 +110,18 @@ impl Transfer {
                 ..transfer
             },
         }
+    }
+
+    /// Returns a client's request with its data towards the device; `None` if their length is not
+    /// the one in the request.
+    pub fn of_client(setup: [u8; 8], data: &[u8]) -> Option<Self> {
+        let transfer = Self::write(ANY, setup, data);
+        let wanted = if transfer.is_read() {
+            0
+        } else {
+            transfer.wanted()
+        };
+        (data.len() == wanted).then_some(transfer)
     }
 
     /// Returns the transfer's title for the log: its name, or its bytes.
@@ -126,7 +162,7 @@ impl Transfer {
     /// Carries out one transaction.
     pub fn step(&mut self, now: u64, address: u8, device: &mut Core) -> Progress {
         if now >= self.deadline {
-            return Progress::Failed("timed out");
+            return Progress::Failed(Failure::TimedOut);
         }
         match self.stage {
             Stage::Setup => self.send_setup(address, device),
@@ -134,10 +170,7 @@ impl Transfer {
                 Answer::Ack(packet) => self.data_in(&packet.bytes),
                 other => waiting(other),
             },
-            Stage::DataOut => match device.receive(address, 0, &packet(&self.data)) {
-                Answer::Ack(()) => self.go(Stage::StatusIn),
-                other => waiting(other),
-            },
+            Stage::DataOut => self.data_out(address, device),
             Stage::StatusIn => match device.transmit(address, 0) {
                 Answer::Ack(_) => Progress::Done(Vec::new()),
                 other => waiting(other),
@@ -169,6 +202,19 @@ impl Transfer {
         }
     }
 
+    fn data_out(&mut self, address: u8, device: &mut Core) -> Progress {
+        let rest = &self.data[self.sent..];
+        let bytes = &rest[..rest.len().min(PACKET)];
+        match device.receive(address, 0, &packet(bytes)) {
+            Answer::Ack(()) => self.sent += bytes.len(),
+            other => return waiting(other),
+        }
+        match self.sent == self.data.len() {
+            true => self.go(Stage::StatusIn),
+            false => Progress::Going,
+        }
+    }
+
     fn go(&mut self, stage: Stage) -> Progress {
         self.stage = stage;
         Progress::Going
@@ -185,7 +231,7 @@ fn packet(bytes: &[u8]) -> Packet {
 
 fn waiting<T>(answer: Answer<T>) -> Progress {
     if matches!(answer, Answer::Stall) {
-        Progress::Failed("stalled")
+        Progress::Failed(Failure::Stalled)
     } else {
         Progress::Going
     }
@@ -198,8 +244,8 @@ pub fn enumeration() -> Vec<Transfer> {
             "GET_DESCRIPTOR device, first part",
             [0x80, 6, 0, 1, 0, 0, 8, 0],
         ),
-        Transfer::write(SET_ADDRESS, [0, 5, ADDRESS, 0, 0, 0, 0, 0], &[]),
-        Transfer::read("GET_DESCRIPTOR device", [0x80, 6, 0, 1, 0, 0, 18, 0]),
+        set_address(),
+        Transfer::read(DEVICE, [0x80, 6, 0, 1, 0, 0, 18, 0]),
         Transfer::read(
             "GET_DESCRIPTOR configuration, first part",
             [0x80, 6, 0, 2, 0, 0, 9, 0],
@@ -212,6 +258,22 @@ pub fn enumeration() -> Vec<Transfer> {
         Transfer::read("GET_DESCRIPTOR product", [0x80, 6, 2, 3, 9, 4, 0xFF, 0]),
         Transfer::write("SET_CONFIGURATION", [0, 9, 1, 0, 0, 0, 0, 0], &[]),
     ]
+}
+
+/// Returns the request that gives a device its address.
+pub fn set_address() -> Transfer {
+    Transfer::write(SET_ADDRESS, [0, 5, ADDRESS, 0, 0, 0, 0, 0], &[])
+}
+
+/// Returns the host's requests to a new device that a client will use: those up to the whole
+/// configuration.
+pub fn introduction() -> Vec<Transfer> {
+    let mut all = enumeration();
+    let last = all
+        .iter()
+        .position(|transfer| transfer.name == CONFIGURATION);
+    all.truncate(last.map_or(0, |last| last + 1));
+    all
 }
 
 /// Returns the host's requests when a program opens (115200 8N1, DTR and RTS) or closes the port.

@@ -1,5 +1,8 @@
 //! Finds the serial port in a configuration descriptor (USB 2.0 chapter 9, CDC 1.2).
 
+use super::control::Begins;
+use crate::peripherals::otg::ENDPOINTS;
+
 /// The properties of a CDC-ACM function that the host needs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Function {
@@ -13,6 +16,72 @@ pub struct Function {
     pub bulk_out: usize,
 }
 
+/// The parts of a configuration that a host needs for any device.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outline {
+    /// Number of the configuration.
+    pub configuration: u8,
+    /// Class, subclass and protocol of each interface.
+    pub interfaces: Vec<[u8; 3]>,
+    /// Interface, address and largest packet of each endpoint but 0.
+    endpoints: Vec<(u8, u8, usize)>,
+}
+
+impl Outline {
+    /// Reads a configuration descriptor and the descriptors that follow it, up to the first one
+    /// that is not whole.
+    pub fn of(configuration: &[u8]) -> Self {
+        let mut outline = Self::default();
+        let mut interface = 0;
+        let mut rest = configuration;
+        while let [length, kind, ..] = *rest {
+            let Some((descriptor, tail)) = rest.split_at_checked(length.max(2).into()) else {
+                break;
+            };
+            rest = tail;
+            match (kind, descriptor) {
+                (CONFIGURATION, [_, _, _, _, _, number, ..]) => outline.configuration = *number,
+                (INTERFACE, [_, _, number, 0, _, class, subclass, protocol, ..]) => {
+                    interface = *number;
+                    outline.interfaces.push([*class, *subclass, *protocol]);
+                }
+                (ENDPOINT, [_, _, address, _, low, high, ..])
+                    if usize::from(address & 15) < ENDPOINTS =>
+                {
+                    let size = u16::from_le_bytes([*low, high & 7]);
+                    (outline.endpoints).push((interface, *address, size.into()));
+                }
+                _ => {}
+            }
+        }
+        outline
+    }
+
+    /// Returns the largest packet of an endpoint; `None` if there is no such endpoint.
+    pub fn packet_size(&self, address: u8) -> Option<usize> {
+        let found = self
+            .endpoints
+            .iter()
+            .find(|(_, other, _)| *other == address);
+        found.map(|(_, _, size)| *size)
+    }
+
+    /// Returns the endpoints whose next packet is DATA0.
+    pub fn begun_anew(&self, which: Begins) -> Vec<u8> {
+        let begins = |interface: u8, address: u8| match which {
+            Begins::None => false,
+            Begins::Endpoint(number) => number == address,
+            Begins::Interface(number) => number == interface,
+            Begins::All => true,
+        };
+        let all = self.endpoints.iter();
+        all.filter(|(interface, address, _)| begins(*interface, *address))
+            .map(|(_, address, _)| *address)
+            .collect()
+    }
+}
+
+const CONFIGURATION: u8 = 2;
 const INTERFACE: u8 = 4;
 const ENDPOINT: u8 = 5;
 const BULK: u8 = 2;
@@ -97,6 +166,29 @@ mod tests {
             bulk_out: 1,
         };
         assert_eq!(Function::parse(&configuration), Ok(function));
+    }
+
+    #[test]
+    fn an_outline_has_interfaces_and_endpoints() {
+        let configuration = [
+            &[9, 2, 0, 0, 2, 1, 0, 0x80, 50][..],
+            &CONTROL,
+            &[7, 5, 0x81, 3, 8, 0, 255],
+            &DATA_INTERFACE,
+            &IN,
+            &OUT,
+            &[9, 4],
+        ]
+        .concat();
+        let outline = Outline::of(&configuration);
+        assert_eq!(outline.configuration, 1);
+        assert_eq!(outline.interfaces, [[2, 2, 1], [10, 0, 0]]);
+        let sizes = [0x81, 0x82, 1, 2].map(|address| outline.packet_size(address));
+        assert_eq!(sizes, [Some(8), Some(64), Some(64), None]);
+        assert_eq!(outline.begun_anew(Begins::Interface(4)), [0x82, 1]);
+        assert_eq!(outline.begun_anew(Begins::Endpoint(0x81)), [0x81]);
+        assert_eq!(outline.begun_anew(Begins::All).len(), 3);
+        assert_eq!(Outline::of(&[0, 5, 0]), Outline::default());
     }
 
     #[test]

@@ -6,6 +6,8 @@
 
 mod control;
 mod descriptors;
+mod remote;
+pub mod urbs;
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -15,6 +17,8 @@ use crate::faults::{Faults, Kind};
 use crate::peripherals::otg::{Answer, Core, Packet};
 use control::{Begins, Progress, Transfer};
 use descriptors::Function;
+use remote::Remote;
+pub use remote::{Description, Presence};
 
 /// Duration of one transaction, ns.
 const TRANSACTION_NS: u64 = 1_000_000 / 19;
@@ -46,8 +50,14 @@ pub enum Port {
     Recovery(u64),
     /// Control transfers run.
     Enumerating,
-    /// The serial port exists.
+    /// The serial port exists, or a client's transfers run.
     Configured,
+    /// A client has no transfer: the bus is idle.
+    Quiet(u64),
+    /// The bus has been idle for long enough.
+    Suspended,
+    /// The bus resumes for a client's transfer.
+    Resuming(u64),
     /// The host gave up the device.
     Failed,
 }
@@ -68,6 +78,10 @@ pub struct Counters {
     /// Bulk packets from the device that were dropped for their toggle: it marks them as packets
     /// that the host already has.
     pub repeated_packets: u64,
+    /// Resets of the port that a client made.
+    pub port_resets: u64,
+    /// Suspends of a client's port.
+    pub suspends: u64,
 }
 
 /// The host.
@@ -85,6 +99,8 @@ pub struct Host {
     transfer: Option<Transfer>,
     queue: VecDeque<Transfer>,
     function: Option<Function>,
+    /// The port of a client that makes all transfers itself.
+    remote: Option<Remote>,
     /// Whether a program has the serial port open.
     open: bool,
     /// Whether the device knows that it is open.
@@ -135,6 +151,7 @@ impl Host {
             transfer: None,
             queue: VecDeque::new(),
             function: None,
+            remote: None,
             open: false,
             told_open: false,
             reading: true,
@@ -207,8 +224,8 @@ impl Host {
     /// Carries out the next transaction, or the port's next state change. Returns the time of the
     /// next call, ns.
     pub fn tick(&mut self, now: u64, device: &mut Core) -> u64 {
-        let plugged = self.cable && !self.faults.on(Kind::CablePulled, now);
-        if !plugged || !device.attached() {
+        let is_pulled = !self.cable || self.was_pulled() || self.faults.on(Kind::CablePulled, now);
+        if is_pulled || !device.attached() {
             return self.disconnected(now, device);
         }
         self.idle_since = None;
@@ -239,6 +256,7 @@ impl Host {
         }
         match self.port {
             Port::Enumerating | Port::Configured => now + TRANSACTION_NS,
+            Port::Quiet(_) | Port::Suspended | Port::Resuming(_) => self.rest(now, device),
             _ => now + IDLE_NS,
         }
     }
@@ -269,6 +287,9 @@ impl Host {
         self.function = None;
         self.told_open = false;
         self.to_device.clear();
+        if let Some(remote) = &mut self.remote {
+            remote.forget();
+        }
     }
 
     fn start_of_frame(&mut self, now: u64, device: &mut Core) {
@@ -286,7 +307,8 @@ impl Host {
     }
 
     fn enumerate(&mut self, now: u64) {
-        self.queue = control::enumeration().into();
+        let requests = self.remote.as_ref().map(Remote::requests);
+        self.queue = requests.unwrap_or_else(control::enumeration).into();
         self.transfer = None;
         self.port = Port::Enumerating;
         self.next_transfer(now);
@@ -313,7 +335,7 @@ impl Host {
                 self.transferred(now, name, &data);
             }
             Progress::Failed(why) => {
-                let message = format!("{}: {why}", transfer.title());
+                let message = format!("{}: {}", transfer.title(), why.name());
                 self.note(now, &message);
                 self.counters.failed_transfers += 1;
                 self.transfer_failed(now, device);
@@ -337,9 +359,12 @@ impl Host {
     }
 
     fn transferred(&mut self, now: u64, name: &str, data: &[u8]) {
+        if let Some(remote) = &mut self.remote {
+            remote.has_read(name, data);
+        }
         match name {
             control::SET_ADDRESS => self.address = control::ADDRESS,
-            control::CONFIGURATION => match Function::parse(data) {
+            control::CONFIGURATION if self.remote.is_none() => match Function::parse(data) {
                 Ok(function) => self.function = Some(function),
                 Err(why) => {
                     self.note(now, &format!("not a CDC-ACM device: {why}"));
@@ -354,6 +379,9 @@ impl Host {
             self.note(now, "configured");
             self.counters.enumerations += 1;
             self.port = Port::Configured;
+            if let Some(remote) = &mut self.remote {
+                remote.begin(now);
+            }
         }
     }
 
@@ -370,6 +398,9 @@ impl Host {
 
     /// Serves a configured device: control transfers first, then bulk data in turn.
     fn work(&mut self, now: u64, device: &mut Core) {
+        if self.remote.is_some() {
+            return self.serve_client(now, device);
+        }
         if self.transfer.is_none() && self.open != self.told_open {
             self.tell_open(now);
         }

@@ -1,0 +1,235 @@
+//! The device itself, for a USB host on another system, by USB/IP: the host's own drivers use it.
+//!
+//! One client at a time imports the device; others may ask for the list meanwhile. The cable is
+//! plugged in while a client has the device or waits for it. When the client's connection ends, the
+//! cable is pulled; when the device leaves the bus, the connection ends.
+
+pub mod wire;
+
+use std::collections::VecDeque;
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::os::fd::AsFd;
+use std::thread;
+use std::time::Duration;
+
+use anyhow::Context;
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+
+use crate::link::{Plug, Traffic, read_all, write_all};
+use crate::usb_host::{Host, Presence};
+use wire::{Command, Refusal, Request};
+
+/// The longest duration of one check for a client, ms.
+const LOOK: u8 = 20;
+/// The most connections at a time.
+const MOST: usize = 16;
+
+/// A server for one device.
+#[derive(Debug)]
+pub struct Server {
+    listener: TcpListener,
+    visitors: Vec<Visitor>,
+}
+
+/// The state of a connection.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum State {
+    /// Its request is not complete.
+    Asks,
+    /// It waits for the answer.
+    Waits(Request),
+    /// It has the device.
+    Has,
+    /// It ends once the last bytes have gone.
+    Leaves,
+    /// It has ended.
+    Gone,
+}
+
+/// A connection.
+#[derive(Debug)]
+struct Visitor {
+    stream: TcpStream,
+    input: VecDeque<u8>,
+    output: VecDeque<u8>,
+    state: State,
+}
+
+impl Server {
+    /// Listens on 127.0.0.1; port 0 takes a free one.
+    ///
+    /// # Errors
+    /// If the port is taken.
+    pub fn listen(port: u16) -> anyhow::Result<Self> {
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+            .with_context(|| format!("--usbip {port}"))?;
+        listener.set_nonblocking(true)?;
+        Ok(Self {
+            listener,
+            visitors: Vec::new(),
+        })
+    }
+
+    /// Returns the port's number.
+    ///
+    /// # Errors
+    /// If the system does not report it.
+    pub fn port(&self) -> anyhow::Result<u16> {
+        Ok(self.listener.local_addr()?.port())
+    }
+
+    fn accept(&mut self) {
+        while self.visitors.len() < MOST
+            && let Ok((stream, _)) = self.listener.accept()
+        {
+            // A client that cannot be set up does not count.
+            if stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok() {
+                self.visitors.push(Visitor {
+                    stream,
+                    input: VecDeque::new(),
+                    output: VecDeque::new(),
+                    state: State::Asks,
+                });
+            }
+        }
+    }
+
+    /// Returns whether a visitor has the device.
+    fn has_device(&self) -> bool {
+        let has = |visitor: &Visitor| visitor.state == State::Has;
+        self.visitors.iter().any(has)
+    }
+
+    /// Answers a visitor that waits, if the device is ready.
+    fn answer(&mut self, nth: usize, host: &mut Host) {
+        let is_busy = self.has_device();
+        let State::Waits(request) = self.visitors[nth].state.clone() else {
+            return;
+        };
+        let presence = host.presence();
+        let (bytes, state) = match (request, &presence) {
+            (Request::Import(name), _) if name != wire::NAME => {
+                (wire::refused(Refusal::Unknown), State::Leaves)
+            }
+            (Request::Import(_), _) if is_busy => (wire::refused(Refusal::Busy), State::Leaves),
+            (_, Presence::None) => return,
+            (Request::List, Presence::Ready(device)) => (wire::list(Some(device)), State::Leaves),
+            (Request::List, Presence::Failed) => (wire::list(None), State::Leaves),
+            (Request::Import(_), Presence::Ready(device)) => (wire::imported(device), State::Has),
+            (Request::Import(_), Presence::Failed) => {
+                (wire::refused(Refusal::Failed), State::Leaves)
+            }
+        };
+        self.visitors[nth].output.extend(bytes);
+        self.visitors[nth].state = state;
+    }
+}
+
+impl Plug for Server {
+    fn is_host(&self) -> bool {
+        true
+    }
+
+    fn connected(&mut self) -> bool {
+        self.accept();
+        !self.visitors.is_empty()
+    }
+
+    fn exchange(&mut self, host: &mut Host, _is_here: bool) -> Traffic {
+        let (mut moved, had_device) = (false, self.has_device());
+        for nth in 0..self.visitors.len() {
+            moved |= self.visitors[nth].read();
+            let refused = self.visitors[nth].serve(host);
+            if let Err(why) = refused {
+                eprintln!("hivtac-rig: a client of USB/IP was sent away: {why:#}");
+                self.visitors[nth].state = State::Gone;
+            }
+            self.answer(nth, host);
+            moved |= self.visitors[nth].write();
+        }
+        self.visitors.retain(|visitor| visitor.state != State::Gone);
+        let needs = |visitor: &Visitor| matches!(visitor.state, State::Has | State::Waits(_));
+        let has_left = had_device && !self.has_device();
+        host.set_client(!has_left && self.visitors.iter().any(needs));
+        Traffic {
+            moved,
+            waits: self
+                .visitors
+                .iter()
+                .any(|visitor| !visitor.output.is_empty()),
+        }
+    }
+
+    fn wait(&self) {
+        let behind = self
+            .visitors
+            .iter()
+            .filter(|visitor| !visitor.output.is_empty());
+        let mut descriptors: Vec<PollFd<'_>> = behind
+            .map(|visitor| PollFd::new(visitor.stream.as_fd(), PollFlags::POLLOUT))
+            .collect();
+        if descriptors.is_empty() {
+            return thread::sleep(Duration::from_millis(LOOK.into()));
+        }
+        // After an error or an interruption the caller checks again.
+        let _ = poll(&mut descriptors, PollTimeout::from(LOOK));
+    }
+}
+
+impl Visitor {
+    /// Reads what has come. Returns whether anything has.
+    fn read(&mut self) -> bool {
+        let before = self.input.len();
+        if !read_all(&self.stream, &mut self.input) {
+            self.state = State::Gone;
+        }
+        self.input.len() > before
+    }
+
+    /// Handles its requests and commands.
+    fn serve(&mut self, host: &mut Host) -> anyhow::Result<()> {
+        if self.state == State::Asks
+            && let Some(request) = wire::request(&mut self.input)?
+        {
+            self.state = State::Waits(request);
+        }
+        if self.state != State::Has {
+            return Ok(());
+        }
+        if host.has_lost_device() {
+            self.state = State::Gone;
+            return Ok(());
+        }
+        while let Some(command) = wire::command(&mut self.input)? {
+            match command {
+                Command::Submit(urb) => host.submit(urb)?,
+                Command::Unlink { number, target } => {
+                    // The end of a transfer that has ended before comes first.
+                    self.take_done(host);
+                    let status = host.unlink(target);
+                    self.output.extend(wire::unlinked(number, status));
+                }
+            }
+        }
+        self.take_done(host);
+        Ok(())
+    }
+
+    fn take_done(&mut self, host: &mut Host) {
+        while let Some(done) = host.next_done() {
+            self.output.extend(wire::submitted(&done));
+        }
+    }
+
+    /// Writes what is to go. Returns whether anything went.
+    fn write(&mut self) -> bool {
+        let before = self.output.len();
+        if self.state != State::Gone && !write_all(&self.stream, &mut self.output) {
+            self.state = State::Gone;
+        }
+        if self.state == State::Leaves && self.output.is_empty() {
+            self.state = State::Gone;
+        }
+        self.output.len() < before
+    }
+}
