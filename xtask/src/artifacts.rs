@@ -63,6 +63,11 @@ impl Programs {
         Ok(Programs { firmware, others })
     }
 
+    /// The firmware as it is flashed.
+    pub fn firmware(&self) -> &Path {
+        &self.firmware
+    }
+
     /// Sets the environment variables by which a test runner finds the programs.
     pub fn name_to(&self, command: &mut Command) {
         command.env("HIVTAC_ELF", &self.firmware);

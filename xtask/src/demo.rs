@@ -2,16 +2,15 @@
 //! forces.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
 
 use crate::artifacts::{self, Board};
+use crate::rig::Rig;
 use crate::{process, toolchain};
 
 /// Options of `cargo xtask demo`.
@@ -161,56 +160,6 @@ fn send_model([firmware, rig, tool]: &[PathBuf; 3], flash: &Path, log: &Path) ->
     let update = ["update", "model", EIGHT_DOTS, "--timeout", "120"];
     process::run(Command::new(tool).args(update).args(["--port", &rig.port]))?;
     rig.ended()
-}
-
-/// A running rig, which is killed when this value is dropped.
-struct Rig {
-    process: Child,
-    /// The pseudo-terminal of its serial port.
-    port: String,
-}
-
-impl Rig {
-    /// Starts the rig and waits for its serial port. Its messages go to the log.
-    fn start(command: &mut Command, log: &Path) -> Result<Rig> {
-        process::say(&format!("+ {command:?}"));
-        let file = File::create(log).with_context(|| format!("creating {}", log.display()))?;
-        command.stdin(Stdio::null()).stdout(Stdio::piped());
-        let process = command.stderr(file).spawn().context("starting the rig")?;
-        let port = String::new();
-        let mut rig = Rig { process, port };
-        let stdout = rig.process.stdout.take().context("the rig's output")?;
-        let mut line = String::new();
-        BufReader::new(stdout).read_line(&mut line)?;
-        // `ready … pty=PATH`
-        let path = line.trim_end().split_once("pty=").map(|(_, path)| path);
-        let path = path.with_context(|| format!("the rig did not get ready: `{line}`"))?;
-        rig.port = path.to_owned();
-        Ok(rig)
-    }
-
-    /// Makes the rig end, and waits for that.
-    fn finish(self) -> Result<()> {
-        let id = self.process.id().to_string();
-        let told = process::succeeds(Command::new("kill").args(["-TERM", &id]));
-        ensure!(told, "the rig is gone");
-        self.ended()
-    }
-
-    /// Waits for its end.
-    fn ended(mut self) -> Result<()> {
-        let status = self.process.wait()?;
-        ensure!(status.success(), "the rig failed ({status})");
-        Ok(())
-    }
-}
-
-impl Drop for Rig {
-    fn drop(&mut self) {
-        // Fails only if it has ended already.
-        let _ = self.process.kill();
-        let _ = self.process.wait();
-    }
 }
 
 /// A time for each frame.

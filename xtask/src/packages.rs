@@ -1,6 +1,7 @@
 //! Installs missing Debian packages if allowed, or else names them.
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
@@ -32,6 +33,46 @@ pub fn install(packages: &str, why: &str) -> Result<()> {
     // The list of packages may be missing or out of date, as in a new container.
     let installed = apt_get("update").and_then(|()| apt_get(&install));
     installed.with_context(|| format!("{why}, and installing {packages} failed"))
+}
+
+/// Whether apt knows a Debian package; if not, its list of packages is renewed where allowed.
+pub fn are_known(package: &str) -> bool {
+    let knows = || process::succeeds(command("apt-cache show").arg(package));
+    knows() || process::succeeds(&mut command("apt-get update")) && knows()
+}
+
+/// Unpacks a Debian package into a folder of its name below `folder`, without installing it; one
+/// that is there already is kept.
+pub fn unpacked(package: &str, folder: &Path) -> Result<PathBuf> {
+    let unpacked = folder.join(package);
+    if unpacked.is_dir() {
+        return Ok(unpacked);
+    }
+    let fresh = folder.join("fresh");
+    if fresh.exists() {
+        fs::remove_dir_all(&fresh).with_context(|| format!("removing {}", fresh.display()))?;
+    }
+    fs::create_dir_all(&fresh).with_context(|| format!("creating {}", fresh.display()))?;
+    let mut download = command("apt-get download");
+    process::run(download.arg(package).current_dir(&fresh))?;
+    let mut files = fs::read_dir(&fresh)?;
+    let file = files.next().context("apt-get downloaded nothing")??.path();
+    process::run(
+        command("dpkg-deb --extract")
+            .arg(&file)
+            .arg(fresh.join("files")),
+    )?;
+    fs::rename(fresh.join("files"), &unpacked)
+        .with_context(|| format!("renaming to {}", unpacked.display()))?;
+    Ok(unpacked)
+}
+
+/// Installs QEMU's PC, if missing.
+pub fn ensure_qemu_pc() -> Result<()> {
+    if process::find_program("qemu-system-x86_64").is_none() {
+        install("qemu-system-x86", "the emulator of a PC is missing")?;
+    }
+    Ok(())
 }
 
 /// Installs QEMU's Cortex-M machines for tests and benchmark, if missing.

@@ -22,7 +22,7 @@ impl Tally {
     /// Adds a test runner's line; returns whether it sums up others. Rust's is `test result: ok. 6
     /// passed; 0 failed; …`. Python's unittest prints `NAME ... ok` for each test, and `Ran 6 tests
     /// in 1.2s` at the end.
-    fn add_line(&mut self, line: &str) -> bool {
+    pub fn add_line(&mut self, line: &str) -> bool {
         if let Some((_, summary)) = line.split_once("test result: ") {
             let before = |word: &str| -> u64 {
                 let words = summary

@@ -12,7 +12,7 @@ use clap::Args;
 use crate::artifacts::{self, Programs};
 use crate::report::{Report, Tally, run_tests};
 use crate::toolchain::{self, cargo};
-use crate::{bench, fuzz, packages, process, python, web};
+use crate::{bench, fuzz, linux_host, packages, process, python, web};
 
 /// Options of `cargo xtask test`.
 #[derive(Args)]
@@ -32,7 +32,7 @@ type Work = fn(&Shared, &mut Tally) -> Result<()>;
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
 /// the microcontroller come first, in their own folder, while the lints hold the common one. Long
 /// steps follow; those after them fill the time until both threads end.
-static STEPS: [Step; 19] = [
+static STEPS: [Step; 20] = [
     ("format", |_, _| format(), None),
     (
         "lints: microcontroller",
@@ -45,6 +45,11 @@ static STEPS: [Step; 19] = [
     ("tests: host", host_tests, None),
     ("tests: across rooms", cross_room_tests, None),
     ("attacks", |_, _| fuzz::run(), Some(fuzz::obstacle)),
+    (
+        "tests: linux host",
+        |shared, tally| shared.linux_host(tally),
+        Some(linux_host::obstacle),
+    ),
     (
         "tests: rig at half speed",
         rig_tests_at_half_speed,
@@ -92,7 +97,11 @@ static STEPS: [Step; 19] = [
 
 /// The build, which also runs if a chosen step needs it.
 const BUILD: &str = "build: firmware";
-const NEED_BUILD: [&str; 2] = ["tests: rig at half speed", "tests: across rooms"];
+const NEED_BUILD: [&str; 3] = [
+    "tests: rig at half speed",
+    "tests: across rooms",
+    "tests: linux host",
+];
 
 /// The project's workspaces, as folders.
 const WORKSPACES: [&str; 2] = ["", "tests/qemu"];
@@ -178,10 +187,19 @@ impl Shared {
         problem.map_or(Ok(()), Err)
     }
 
+    /// The programs, once they are built.
+    fn built(&self) -> Result<&Programs> {
+        let programs = self.programs.wait().as_ref();
+        programs.context("not run: the firmware could not be built")
+    }
+
+    fn linux_host(&self, tally: &mut Tally) -> Result<()> {
+        linux_host::test(self.built()?.firmware(), tally)
+    }
+
     /// The cargo command of tests with these programs, once they are built.
     fn tests(&self, which: [&str; 2]) -> Result<Command> {
-        let programs = self.programs.wait().as_ref();
-        let programs = programs.context("not run: the firmware could not be built")?;
+        let programs = self.built()?;
         let mut command = artifacts::test(&which);
         programs.name_to(&mut command);
         Ok(command)

@@ -12,7 +12,7 @@ use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
 use hivtac_wire::message::DeviceMessage;
 
 /// Longest wall time of a test's wait.
-const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 fn rig() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_hivtac-rig"));
@@ -21,7 +21,7 @@ fn rig() -> Command {
 }
 
 /// Starts a rig and reads its ready line. Returns the words after `ready`.
-fn start(arguments: &[&str]) -> (Child, Vec<String>) {
+pub fn start(arguments: &[&str]) -> (Child, Vec<String>) {
     let mut child = rig().arg(firmware()).args(arguments).spawn().unwrap();
     let mut line = String::new();
     BufReader::new(child.stdout.as_mut().unwrap())
@@ -33,7 +33,7 @@ fn start(arguments: &[&str]) -> (Child, Vec<String>) {
 }
 
 /// Waits for the end. Returns the exit code and the standard error.
-fn end(mut child: Child) -> (Option<i32>, String) {
+pub fn end(mut child: Child) -> (Option<i32>, String) {
     let began = Instant::now();
     while child.try_wait().unwrap().is_none() {
         if began.elapsed() > PATIENCE {

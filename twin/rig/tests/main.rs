@@ -30,3 +30,4 @@ mod tare;
 mod threshold;
 mod usb;
 mod usb_dead;
+mod usbip;

@@ -9,7 +9,7 @@ use crate::peripherals::otg::Core;
 
 /// Time without a transfer after which the port is suspended, ns. A client does not tell when it
 /// suspends its port, but has no transfer then.
-const QUIET_NS: u64 = 200_000_000;
+const QUIET_NS: u64 = 50_000_000;
 /// Duration of a resume and of the recovery after it, ns (USB 2.0, section 7.1.7.7).
 const RESUME_NS: u64 = 30_000_000;
 

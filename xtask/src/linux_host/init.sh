@@ -1,0 +1,85 @@
+#!/bin/busybox sh
+# What Linux does with the sensor: it attaches the rig's device by USB/IP, reads forces, and goes on
+# reading after everything that it can do to a port. /parameters sets PORT, FORCES and TIMES.
+/bin/busybox --install -s /bin
+export PATH=/bin
+mount -t proc none /proc
+mount -t sysfs none /sys
+mount -t devtmpfs none /dev
+mkdir -p /var/run /tmp
+. /parameters
+for module in $MODULES; do insmod "/modules/$module.ko" || echo "module $module ... FAIL"; done
+ip link set lo up
+ip addr add 10.0.2.15/24 dev eth0
+ip link set eth0 up
+# What is judged begins here.
+dmesg -c > /dev/null
+
+DEVICE=/sys/bus/usb/devices/1-1
+TTY=/dev/ttyACM0
+
+# Waits up to 60 s for a command to succeed.
+until_so() {
+    for _ in $(seq 600); do
+        "$@" > /dev/null 2>&1 && return 0
+        sleep 0.1
+    done
+    return 1
+}
+
+is_suspended() { grep -q suspended "$DEVICE/power/runtime_status"; }
+has_lines() { [ "$(grep -c . /tmp/pulled)" -ge 5 ]; }
+
+# Forces come: so many of them, without an error.
+forces() {
+    until_so test -c "$TTY" || { echo "no $TTY"; return 1; }
+    timeout 900 hivtac monitor --port "$TTY" --timeout 60 --frames "$1" > /tmp/forces 2>&1 ||
+        { tail -n 5 /tmp/forces; return 1; }
+}
+
+attach() { usbip --tcp-port "$PORT" attach -r 10.0.2.2 -b 1-1 2> /tmp/usbip || { cat /tmp/usbip; return 1; }; }
+
+enumerates() { attach && grep -q "HiVTac" "$DEVICE/product" && forces "$FORCES"; }
+
+listed() { usbip --tcp-port "$PORT" list -r 10.0.2.2 2>&1 | grep -q "1-1: .*1209:0001"; }
+
+reset() { usbreset 1209:0001 | grep -q "ok" && forces 5; }
+
+configured() { echo 1 > "$DEVICE/bConfigurationValue" && forces 5; }
+
+suspended() {
+    echo 100 > "$DEVICE/power/autosuspend_delay_ms"
+    echo auto > "$DEVICE/power/control"
+    until_so is_suspended || { echo "not suspended"; return 1; }
+    # Three seconds without a transfer: the rig has suspended its bus, too.
+    sleep 3
+    echo on > "$DEVICE/power/control"
+    grep -q active "$DEVICE/power/runtime_status" && forces 5
+}
+
+# The cable is pulled while forces come; the tool ends by itself.
+pulled() {
+    : > /tmp/pulled
+    timeout 120 hivtac monitor --port "$TTY" --timeout 60 > /tmp/pulled 2>&1 &
+    until_so has_lines || { cat /tmp/pulled; return 1; }
+    usbip detach -p 0 > /tmp/usbip 2>&1 || { cat /tmp/usbip; return 1; }
+    wait $!
+    [ $? = 5 ] || { echo "the tool did not end as after a pulled cable"; tail -n 3 /tmp/pulled; return 1; }
+    until_so test ! -e "$DEVICE" && attach && forces 5
+}
+
+check() {
+    what=$1
+    shift
+    if "$@"; then echo "$what ... ok"; else echo "$what ... FAIL"; fi
+}
+
+check "listed by usbip" listed
+check "enumerated, $FORCES forces" enumerates
+for action in reset configured suspended pulled; do
+    for n in $(seq "$TIMES"); do check "$action, time $n of $TIMES" "$action"; done
+done
+echo "log begins"
+dmesg -r
+echo "log ends"
+poweroff -f
