@@ -37,9 +37,15 @@ forces() {
         { tail -n 5 /tmp/forces; return 1; }
 }
 
-attach() { usbip --tcp-port "$PORT" attach -r 10.0.2.2 -b 1-1 2> /tmp/usbip || { cat /tmp/usbip; return 1; }; }
+attach() {
+    usbip --tcp-port "$PORT" attach -r 10.0.2.2 -b 1-1 > /tmp/usbip 2>&1 ||
+        { cat /tmp/usbip; return 1; }
+}
 
-enumerates() { attach && grep -q "HiVTac" "$DEVICE/product" && forces "$FORCES"; }
+enumerates() {
+    attach && until_so grep -q "HiVTac" "$DEVICE/product" && forces "$FORCES" &&
+        grep "received" /tmp/forces
+}
 
 listed() { usbip --tcp-port "$PORT" list -r 10.0.2.2 2>&1 | grep -q "1-1: .*1209:0001"; }
 
@@ -64,7 +70,8 @@ pulled() {
     until_so has_lines || { cat /tmp/pulled; return 1; }
     usbip detach -p 0 > /tmp/usbip 2>&1 || { cat /tmp/usbip; return 1; }
     wait $!
-    [ $? = 5 ] || { echo "the tool did not end as after a pulled cable"; tail -n 3 /tmp/pulled; return 1; }
+    # hivtac ends so when it lost its connection.
+    [ $? = 5 ] || { tail -n 3 /tmp/pulled; return 1; }
     until_so test ! -e "$DEVICE" && attach && forces 5
 }
 

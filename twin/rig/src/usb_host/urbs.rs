@@ -386,3 +386,89 @@ fn short(urb: &Urb, moved: usize) -> i32 {
 fn place(endpoint: u8) -> usize {
     usize::from(endpoint & 15) + if endpoint & 0x80 != 0 { 16 } else { 0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn urb(number: u32, endpoint: u8, setup: [u8; 8]) -> Urb {
+        Urb {
+            number,
+            packets: 0,
+            endpoint,
+            setup,
+            data: Vec::new(),
+            length: 8,
+            interval_ms: 0,
+            refuses_short: false,
+            ends_with_empty: false,
+        }
+    }
+
+    fn outline() -> Outline {
+        Outline::of(&[9, 4, 0, 0, 1, 2, 2, 1, 0, 7, 5, 0x81, 3, 8, 0, 10])
+    }
+
+    /// Makes so many transactions with a core that is off; returns the ends: number and status.
+    fn ends(urbs: &mut Urbs, steps: u64) -> Vec<(u32, i32)> {
+        for now in 0..steps {
+            urbs.step(now, 7, &outline(), &mut Core::default());
+        }
+        let done = urbs.done.drain(..);
+        done.map(|done| (done.number, done.status)).collect()
+    }
+
+    #[test]
+    fn what_cannot_be_carried_out_ends_with_its_reason() {
+        let mut urbs = Urbs::default();
+        // Seven bytes are announced and none given; there is no endpoint 2; none answers.
+        let coding = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
+        for (number, endpoint, setup) in [(1, 0, coding), (2, 0x82, [0; 8]), (3, 0x81, [0; 8])] {
+            urbs.submit(urb(number, endpoint, setup)).unwrap();
+        }
+        let expected = [
+            (1, status::INVALID),
+            (2, status::SILENT),
+            (3, status::SILENT),
+        ];
+        let mut found = ends(&mut urbs, 10);
+        found.sort_unstable();
+        assert_eq!(found, expected);
+        assert_eq!(urbs.waiting(), 0);
+    }
+
+    #[test]
+    fn a_transfer_is_taken_back_once() {
+        let mut urbs = Urbs::default();
+        for number in 1..=3 {
+            urbs.submit(urb(number, 0x81, [0; 8])).unwrap();
+        }
+        urbs.submit(urb(4, 0x80, [0x80, 0, 0, 0, 0, 0, 2, 0]))
+            .unwrap();
+        for number in [4, 2] {
+            assert_eq!(urbs.unlink(number), status::UNLINKED);
+            assert_eq!(urbs.unlink(number), status::OK);
+        }
+        assert_eq!(ends(&mut urbs, 20).len(), 2);
+        let many = (0..=MOST as u32).map(|number| urbs.submit(urb(number, 0x81, [0; 8])));
+        assert_eq!(many.filter(Result::is_err).count(), 1);
+    }
+
+    #[test]
+    fn the_first_request_after_a_reset_of_the_port_resets_it() {
+        let mut urbs = Urbs::default();
+        let step = |urbs: &mut Urbs| urbs.step(0, 0, &outline(), &mut Core::default());
+        urbs.submit(urb(1, 0x80, FIRST_AFTER_RESET)).unwrap();
+        assert_eq!(step(&mut urbs), Turn::PortReset);
+        urbs.restart();
+        assert_eq!(step(&mut urbs), Turn::Over([0; 2]));
+        urbs.unlink(1);
+        // Any other length is a question like any other.
+        urbs.submit(urb(2, 0x80, [0x80, 6, 0, 1, 0, 0, 18, 0]))
+            .unwrap();
+        assert_eq!(step(&mut urbs), Turn::Over([0; 2]));
+        urbs.unlink(2);
+        urbs.submit(urb(3, 0x80, FIRST_AFTER_RESET)).unwrap();
+        assert_eq!(step(&mut urbs), Turn::PortReset);
+    }
+}
