@@ -28,7 +28,7 @@ until_so() {
 }
 
 is_suspended() { grep -q suspended "$DEVICE/power/runtime_status"; }
-has_lines() { [ "$(grep -c . /tmp/pulled)" -ge 5 ]; }
+has_lines() { [ "$(grep -c . /tmp/amid)" -ge 5 ]; }
 
 # Forces come: so many of them, without an error.
 forces() {
@@ -49,9 +49,31 @@ enumerates() {
 
 listed() { usbip --tcp-port "$PORT" list -r 10.0.2.2 2>&1 | grep -q "1-1: .*1209:0001"; }
 
-reset() { usbreset 1209:0001 | grep -q "ok" && forces 5; }
+# Does something while forces come, after which the tool ends as one that lost its connection.
+amid() {
+    : > /tmp/amid
+    timeout 120 hivtac monitor --port "$TTY" --timeout 60 > /tmp/amid 2>&1 &
+    until_so has_lines || { cat /tmp/amid; return 1; }
+    "$@" > /tmp/done 2>&1 || { cat /tmp/done; return 1; }
+    wait $!
+    [ $? = 5 ] || { tail -n 3 /tmp/amid; return 1; }
+}
 
-configured() { echo 1 > "$DEVICE/bConfigurationValue" && forces 5; }
+# Does something, every second time while forces come.
+at_times() {
+    time=$1
+    shift
+    case $((time % 2)) in
+        0) amid "$@" ;;
+        *) "$@" > /tmp/done 2>&1 || { cat /tmp/done; return 1; } ;;
+    esac
+}
+
+set_configuration() { echo 1 > "$DEVICE/bConfigurationValue"; }
+
+reset() { at_times "$1" usbreset 1209:0001 && forces 5; }
+
+configured() { at_times "$1" set_configuration && forces 5; }
 
 suspended() {
     echo 100 > "$DEVICE/power/autosuspend_delay_ms"
@@ -63,17 +85,7 @@ suspended() {
     grep -q active "$DEVICE/power/runtime_status" && forces 5
 }
 
-# The cable is pulled while forces come; the tool ends by itself.
-pulled() {
-    : > /tmp/pulled
-    timeout 120 hivtac monitor --port "$TTY" --timeout 60 > /tmp/pulled 2>&1 &
-    until_so has_lines || { cat /tmp/pulled; return 1; }
-    usbip detach -p 0 > /tmp/usbip 2>&1 || { cat /tmp/usbip; return 1; }
-    wait $!
-    # hivtac ends so when it lost its connection.
-    [ $? = 5 ] || { tail -n 3 /tmp/pulled; return 1; }
-    until_so test ! -e "$DEVICE" && attach && forces 5
-}
+pulled() { amid usbip detach -p 0 && until_so test ! -e "$DEVICE" && attach && forces 5; }
 
 check() {
     what=$1
@@ -84,7 +96,7 @@ check() {
 check "listed by usbip" listed
 check "enumerated, $FORCES forces" enumerates
 for action in reset configured suspended pulled; do
-    for n in $(seq "$TIMES"); do check "$action, time $n of $TIMES" "$action"; done
+    for n in $(seq "$TIMES"); do check "$action, time $n of $TIMES" "$action" "$n"; done
 done
 echo "log begins"
 dmesg -r
