@@ -26,9 +26,10 @@ use crate::usbip::Server;
 
 /// Runs the firmware on an emulated STM32H743 with a simulated camera and a USB host.
 ///
-/// Prints `ready tcp=ADDRESS pty=PATH`, or `ready usbip=ADDRESS`, once the port is there. Ends at a limit, on SIGTERM
-/// or Ctrl-C, or, with --exit-on-hangup, when the client leaves. Exit code 0 when the run ended so,
-/// 1 when it could not be done or the firmware broke a rule of the chip, 2 for wrong arguments.
+/// Prints `ready tcp=ADDRESS pty=PATH`, or `ready usbip=ADDRESS`, once the port is there. Ends at a
+/// limit, on SIGTERM or Ctrl-C, or, with --exit-on-hangup, when the client leaves. Exit code 0 when
+/// the run ended so, 1 when it could not be done or the firmware broke a rule of the chip, 2 for
+/// wrong arguments.
 #[derive(Parser, Debug)]
 #[command(name = "hivtac-rig", version)]
 pub struct Arguments {
