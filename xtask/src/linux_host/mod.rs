@@ -26,9 +26,10 @@ const LIMIT: Duration = Duration::from_secs(45 * 60);
 const KERNEL: &str = "linux-image-amd64";
 
 /// Why Linux cannot be run here.
-pub fn obstacle() -> Option<&'static str> {
+pub fn obstacle() -> Option<String> {
     let is_possible = cfg!(target_arch = "x86_64") && packages::are_known(KERNEL);
-    (!is_possible).then_some("it boots Debian's kernel: x86-64 with Debian's packages is needed")
+    let why = "it boots Debian's kernel: x86-64 with Debian's packages is needed";
+    (!is_possible).then(|| why.to_owned())
 }
 
 /// Runs the firmware in the rig, and Linux in QEMU as its host.
