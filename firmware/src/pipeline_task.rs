@@ -307,6 +307,7 @@ impl PipelineTask {
         if self.taring.is_none() {
             self.look_again(&mut measurement, delivery);
         }
+        (self.sensor).follow_two_contacts(&mut measurement, answer::STEPS_A_FRAME);
         self.newest = delivery.edge.number;
         let followed = self.sensor.follow(moment(delivery), &measurement);
         output::set(followed.output);

@@ -4,12 +4,11 @@ use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
 use hivtac_host::marker_fields::MarkerJson;
 use hivtac_host::shown::to_json;
-use hivtac_sensor::force::TwoContacts;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::rules::{Finder, Unlike};
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
-use hivtac_terms::force::Force;
+use hivtac_terms::force::{self, Force};
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
@@ -30,9 +29,8 @@ pub struct Finding<'a> {
     markers: Option<Vec<MarkerJson>>,
     features: Option<Vec<f64>>,
     force: Option<ForceJson>,
+    contacts: Vec<ForceJson>,
     contact: Option<bool>,
-    /// Two contacts that explain a frame which one does not.
-    two_contacts: Option<TwoContactsJson>,
     status: Vec<&'static str>,
     #[serde(skip)]
     focal_px: f64,
@@ -41,15 +39,6 @@ pub struct Finding<'a> {
     /// Median of the picture's value or luma if nothing passes the threshold.
     #[serde(skip)]
     brightness: Option<u8>,
-}
-
-/// Two contacts, their sum first.
-#[derive(Serialize)]
-struct TwoContactsJson {
-    sum: ForceJson,
-    /// Each; `None` if they are not told apart.
-    each: Option<[ForceJson; 2]>,
-    status: Vec<&'static str>,
 }
 
 #[derive(Serialize)]
@@ -106,7 +95,6 @@ impl<'a> Finding<'a> {
         settings: &Settings,
         blobs: &[Blob],
         measurement: Measurement,
-        two_contacts: Option<TwoContacts>,
         brightness: u8,
     ) -> Finding<'a> {
         let markers = measurement.markers.as_deref().map(|markers| {
@@ -120,6 +108,10 @@ impl<'a> Finding<'a> {
             .features
             .filter(|features| features.centroids.len() == CORNERS.len())
             .map(|features| features.to_array().map(|number| number.to_f64()).to_vec());
+        let Measurement {
+            status, contacts, ..
+        } = &measurement;
+        let each = force::contacts(*status, measurement.force.as_ref(), contacts);
         Finding {
             image,
             width: settings.geometry.width,
@@ -131,14 +123,10 @@ impl<'a> Finding<'a> {
             markers,
             features,
             force: measurement.force.map(ForceJson),
+            contacts: each.iter().copied().map(ForceJson).collect(),
             contact: measurement
                 .force
                 .map(|_| measurement.status.contains(Status::CONTACT)),
-            two_contacts: two_contacts.map(|two| TwoContactsJson {
-                sum: ForceJson(two.sum),
-                each: two.each.map(|each| each.map(ForceJson)),
-                status: two.status.names().collect(),
-            }),
             status: measurement.status.names().collect(),
             focal_px: settings.geometry.focal.to_f64(),
             overflow: measurement.status.contains(Status::BLOB_OVERFLOW),
@@ -167,11 +155,13 @@ impl<'a> Finding<'a> {
         lines.extend(self.marker_lines());
         lines.extend(self.feature_line());
         if let Some(ForceJson(force)) = &self.force {
-            lines.push(force_line("force", force));
-            lines.push(place_line("place", force));
-        }
-        lines.extend(self.two_contacts_lines());
-        if self.force.is_some() {
+            let [name, at] = match self.is_of_two() {
+                true => ["sum of 2", "middle"],
+                false => ["force", "place"],
+            };
+            lines.push(force_line(name, force));
+            lines.push(place_line(at, force));
+            lines.extend(self.parts_lines());
             lines.push(format!("  contact   {}", contact_text(self.contact)));
         }
         lines.push(format!(
@@ -253,29 +243,26 @@ impl<'a> Finding<'a> {
         Some(format!("  features  {}", numbers.join(" ")))
     }
 
-    /// The lines of two contacts.
-    fn two_contacts_lines(&self) -> Vec<String> {
-        let Some(two) = &self.two_contacts else {
+    /// Whether two contacts press.
+    fn is_of_two(&self) -> bool {
+        self.status.contains(&"two_contacts")
+    }
+
+    /// The lines of each of two contacts.
+    fn parts_lines(&self) -> Vec<String> {
+        if !self.is_of_two() {
             return Vec::new();
-        };
-        let ForceJson(sum) = &two.sum;
-        let mut lines = vec![force_line("sum of 2", sum), place_line("middle", sum)];
-        match &two.each {
-            Some(each) => {
-                for (number, ForceJson(force)) in (1..).zip(each) {
-                    lines.push(force_line(&format!("contact {number}"), force));
-                    lines.push(place_line("place", force));
-                }
-            }
-            None => lines.push(
-                "            each is not known: they are near, or two others fit as well"
-                    .to_owned(),
-            ),
         }
-        if !two.status.is_empty() {
-            lines.push(format!("            the sum is {}", two.status.join(" ")));
+        if self.contacts.is_empty() {
+            let why = "each is not known: they are near, or two others fit as well";
+            return vec![format!("            {why}")];
         }
-        lines
+        let parts = (1..).zip(&self.contacts);
+        let lines = parts.flat_map(|(number, ForceJson(force))| {
+            let name = format!("contact {number}");
+            [force_line(&name, force), place_line("place", force)]
+        });
+        lines.collect()
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::decimal::Decimal;
 use Quantity::{Angle, Length, Newtons};
-use hivtac_terms::force::{Force, Place};
+use hivtac_terms::force::{Force, MOST_CONTACTS, Place};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 /// What a field measures. The wire counts it in thousandths of a degree, in µN or in µm.
@@ -107,6 +107,20 @@ impl<T> Field<T> {
             Newtons | Length => integer / 1e6,
         }
     }
+}
+
+/// The names of all fields of each contact, the first contact's first: `contact1_…`.
+pub fn contact_names() -> Vec<String> {
+    let of_one = || {
+        FORCE
+            .map(|it| it.name)
+            .into_iter()
+            .chain(PLACE.map(|it| it.name))
+    };
+    let numbers = 1..=MOST_CONTACTS;
+    let names =
+        numbers.flat_map(|number| of_one().map(move |name| format!("contact{number}_{name}")));
+    names.collect()
 }
 
 /// A force as a JSON object of all fields; those of an unknown place are `null`.

@@ -182,6 +182,7 @@ impl Collected {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::force::ContactList;
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_terms::threshold::Yuv422;
@@ -207,6 +208,7 @@ mod tests {
             time_us: 0,
             status: Status(0),
             force: None,
+            contacts: ContactList::default(),
             markers: MarkerList::default(),
         }
     }

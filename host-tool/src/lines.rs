@@ -1,10 +1,10 @@
 //! Formats one line for each sample: for people, as JSON, or as CSV.
 
 use hivtac_host::decimal::Decimal;
-use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE};
+use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE, contact_names};
 use hivtac_host::shown::to_json;
 use hivtac_host::truth::Truth;
-use hivtac_terms::force::Force;
+use hivtac_terms::force::{Force, MOST_CONTACTS};
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
 use serde::Serialize;
@@ -109,7 +109,24 @@ fn human_row(row: &Row) -> String {
         line += &human_truth(truth);
     }
     let status = status_text(&names(*status), force.is_some());
-    format!("{line}  {status}")
+    format!("{line}  {status}{}", human_parts(row.sample))
+}
+
+/// The sizes and places of two contacts; empty unless they are told apart.
+fn human_parts(sample: &Sample) -> String {
+    let part = |force: &Force| {
+        let size = FORCE[2].shown(force);
+        let place = force.place.as_ref().map_or_else(String::new, |place| {
+            let [x, y, _] = PLACE.map(|field| field.shown(place));
+            format!(" at ({x}, {y}) mm")
+        });
+        format!("{size} mN{place}")
+    };
+    let parts: Vec<_> = sample.contacts.iter().map(part).collect();
+    match parts.is_empty() {
+        true => String::new(),
+        false => format!(": {}", parts.join(", ")),
+    }
 }
 
 /// Names of status bits for a person. Without contact and slip, which have columns of their own.
@@ -167,6 +184,7 @@ struct SampleJson {
     frame: u32,
     time_us: u64,
     force: Option<ForceJson>,
+    contacts: Vec<ForceJson>,
     contact: Option<bool>,
     slip: Option<bool>,
     status: Vec<&'static str>,
@@ -181,6 +199,12 @@ fn json_row(row: &Row) -> String {
         frame: sample.frame,
         time_us: sample.time_us,
         force: sample.force.map(ForceJson),
+        contacts: sample
+            .each_contact()
+            .iter()
+            .copied()
+            .map(ForceJson)
+            .collect(),
         contact: told(sample, Status::CONTACT),
         slip: told(sample, Status::SLIP),
         status: names(sample.status),
@@ -197,6 +221,7 @@ fn csv_header(truth: bool) -> String {
     let mut names = [&["seq", "frame", "time_us"], &force[..], &place[..]].concat();
     names.extend(["contact", "slip", "status"]);
     let mut header = names.join(",");
+    header.extend(contact_names().iter().map(|name| format!(",{name}")));
     if truth {
         // The true force has no uncertainties.
         let names = force[..6].iter().chain(&place[..2]);
@@ -218,6 +243,8 @@ fn csv_row(row: &Row) -> String {
         fields.push(field(told(sample, bit)));
     }
     fields.push(names(sample.status).join("|"));
+    let contacts = sample.each_contact();
+    fields.extend((0..MOST_CONTACTS).flat_map(|number| csv_force(contacts.get(number))));
     if let Some(truth) = row.truth {
         fields.extend(csv_truth(truth));
     }
@@ -249,7 +276,7 @@ fn csv_truth(truth: Option<Truth>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_terms::force::Place;
+    use hivtac_terms::force::{ContactList, Place};
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::units::{
         MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
@@ -263,6 +290,7 @@ mod tests {
             time_us: 1_400_000,
             status,
             force,
+            contacts: ContactList::default(),
             markers: MarkerList::default(),
         }
     }
@@ -363,6 +391,10 @@ mod tests {
                 r#""beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"#,
                 r#""z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"#,
                 r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085},"#,
+                r#""contacts":[{"alpha_deg":-5.000,"#,
+                r#""beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"#,
+                r#""z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"#,
+                r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085}],"#,
                 r#""contact":true,"slip":false,"status":["not_calibrated","contact"]}"#
             )
         );
@@ -370,8 +402,8 @@ mod tests {
         assert_eq!(
             row(Format::Json, &without, Some(None)),
             concat!(
-                r#"{"seq":41,"frame":42,"time_us":1400000,"force":null,"contact":null,"#,
-                r#""slip":null,"status":["image_dark"],"truth":null}"#
+                r#"{"seq":41,"frame":42,"time_us":1400000,"force":null,"contacts":[],"#,
+                r#""contact":null,"slip":null,"status":["image_dark"],"truth":null}"#
             )
         );
     }
@@ -381,11 +413,36 @@ mod tests {
         let sample = sample(Some(force(None)), Status::default());
         let line = row(Format::Json, &sample, Some(Some(truth())));
         let end = concat!(
-            r#""place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null},"contact":false,"#,
-            r#""slip":false,"status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"#,
+            r#""place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null},"contacts":[],"#,
+            r#""contact":false,"slip":false,"status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"#,
             r#""x_n":-0.01,"y_n":0.004,"z_n":-0.1,"place_x_mm":null,"place_y_mm":null}}"#
         );
         assert!(line.ends_with(end), "{line}");
+    }
+
+    /// The force is the sum, the contacts are told beside it.
+    #[test]
+    fn two_contacts_are_told_each() {
+        let mut two = with_place();
+        two.status |= Status::TWO_CONTACTS;
+        let one = force(Some(PLACE));
+        let other = Force {
+            magnitude: MicroNewtons(20_000),
+            ..force(None)
+        };
+        two.contacts = ContactList::from([one, other]);
+        let line = row(Format::Human, &two, None);
+        let end = "not_calibrated two_contacts: 100.000 mN at (1.250, -0.007) mm, 20.000 mN";
+        assert!(line.ends_with(end), "{line}");
+        let line = row(Format::Json, &two, None);
+        let json: serde_json::Value = serde_json::from_str(&line).unwrap();
+        assert_eq!(json["contacts"][0], json["force"]);
+        assert_eq!(json["contacts"][1]["magnitude_n"], 0.02);
+        let line = row(Format::Csv, &two, None);
+        assert!(
+            line.ends_with(",0.020000,-0.008707,0.004362,-0.099525,0.480,0.000900,,,"),
+            "{line}"
+        );
     }
 
     #[test]
@@ -407,25 +464,28 @@ mod tests {
 
     #[test]
     fn csv_fields_that_are_not_there_are_empty() {
-        let force_of_all =
-            "41,42,1400000,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900";
+        let contact = "-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900";
+        let force_of_all = format!("41,42,1400000,{contact}");
+        let none = ",".repeat(10);
         assert_eq!(
             row(Format::Csv, &with_place(), Some(Some(truth_with_place()))),
             format!(
                 "{force_of_all},1.250,-0.007,0.085,true,false,not_calibrated|contact,\
-                 -5.25,2.5,0.1015,-0.01,0.004,-0.1,1.2504,-0.5"
+                 {contact},1.250,-0.007,0.085,{none},-5.25,2.5,0.1015,-0.01,0.004,-0.1,1.2504,-0.5"
             )
         );
         let without_place = sample(Some(force(None)), Status::default());
         assert_eq!(
             row(Format::Csv, &without_place, None),
-            format!("{force_of_all},,,,false,false,")
+            format!("{force_of_all},,,,false,false,,{none},{none}")
         );
         let without = sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED);
         assert_eq!(
             row(Format::Csv, &without, Some(Some(truth()))),
-            "41,42,1400000,,,,,,,,,,,,,,markers_missing|frame_dropped,\
-             -5.25,2.5,0.1015,-0.01,0.004,-0.1,,"
+            format!(
+                "41,42,1400000,,,,,,,,,,,,,,markers_missing|frame_dropped,{none},{none},\
+                 -5.25,2.5,0.1015,-0.01,0.004,-0.1,,"
+            )
         );
     }
 }

@@ -318,6 +318,7 @@ fn is_patience(error: &io::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::force::ContactList;
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_wire::frame::MAX_DEVICE_FRAME;
@@ -399,6 +400,7 @@ mod tests {
             time_us: 1,
             status: Status::OK,
             force: None,
+            contacts: ContactList::default(),
             markers: MarkerList::default(),
         });
         let mut buffer = [0; MAX_DEVICE_FRAME];

@@ -182,11 +182,13 @@ impl<'a> Bench<'a> {
             }
             sensor.set_tare(Some(tare.rest), Drift::UNSEEN);
         }
-        let (blobs, measurement) = measure(&mut sensor, &picture.pixels);
+        let (blobs, mut measurement) = measure(&mut sensor, &picture.pixels);
         let brightness = picture.brightness();
-        let two = sensor.two_contacts(&measurement);
+        if let Some(two) = sensor.two_contacts(&measurement) {
+            measurement.tell(&two);
+        }
         let settings = sensor.settings();
-        let finding = Finding::new(path, settings, &blobs, measurement, two, brightness);
+        let finding = Finding::new(path, settings, &blobs, measurement, brightness);
         Ok(if self.arguments.json {
             finding.json()
         } else {

@@ -7,7 +7,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
-use hivtac_terms::force::{Force, Place};
+use hivtac_terms::force::{ContactList, Force, Place};
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Creep, Filter, Output, Rezero, TemporalSettings};
@@ -133,6 +133,7 @@ fn sample_of(status: Status, place: Option<Place>, markers: MarkerList) -> Devic
         time_us: 1_400_000,
         status,
         force: Some(force),
+        contacts: ContactList::default(),
         markers,
     })
 }
@@ -143,6 +144,35 @@ const PLACE: Place = Place {
     sigma: Micrometres(85),
 };
 
+/// A sample of two contacts; `are_apart` if each is known.
+fn sample_of_two(are_apart: bool) -> DeviceMessage {
+    let contact = |size, vector: [i32; 3], sigmas: [u32; 2], [x, y]: [i32; 2], around| Force {
+        alpha: MilliDegrees(-5000),
+        beta: MilliDegrees(2500),
+        magnitude: MicroNewtons(size),
+        cartesian: vector.map(MicroNewtons),
+        direction_sigma: UnsignedMilliDegrees(sigmas[0]),
+        magnitude_sigma: UnsignedMicroNewtons(sigmas[1]),
+        place: Some(Place {
+            x: SignedMicrometres(x),
+            y: SignedMicrometres(y),
+            sigma: Micrometres(around),
+        }),
+    };
+    let status = Status::NOT_CALIBRATED | Status::CONTACT | Status::TWO_CONTACTS;
+    let mut message = sample(status, Some(PLACE));
+    if let DeviceMessage::Sample(sample) = &mut message
+        && are_apart
+    {
+        let (one, other) = ([-3483, 1745, -39_810], [-5224, 2617, -59_715]);
+        sample.contacts = ContactList::from([
+            contact(40_000, one, [2900, 1800], [3250, -730], 110),
+            contact(60_000, other, [2600, 1900], [-83, -730], 95),
+        ]);
+    }
+    message
+}
+
 fn sample_without_force(frame: u32, status: Status) -> DeviceMessage {
     DeviceMessage::Sample(Sample {
         sequence: 300,
@@ -150,6 +180,7 @@ fn sample_without_force(frame: u32, status: Status) -> DeviceMessage {
         time_us: 10_000_000,
         status,
         force: None,
+        contacts: ContactList::default(),
         markers: MarkerList::default(),
     })
 }
@@ -166,6 +197,7 @@ fn sample_with_markers() -> DeviceMessage {
         time_us: 300_000,
         status: Status::MODEL_MISSING,
         force: None,
+        contacts: ContactList::default(),
         markers: MarkerList::from([
             marker(6_553_600, 3_932_160, 190),
             marker(14_417_921, 3_932_159, 191),
@@ -454,6 +486,8 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
             "sample-without-force",
             sample_without_force(305, Status::MARKERS_MISSING | Status::FRAME_DROPPED),
         ),
+        ("sample-two-contacts", sample_of_two(true)),
+        ("sample-sum-of-two", sample_of_two(false)),
         ("sample-with-markers", sample_with_markers()),
         (
             "sample-with-eight-markers",

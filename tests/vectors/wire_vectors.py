@@ -12,7 +12,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0x85E90EFCFE048F4F
+SCHEMA = 0xB2E554BDE685E40D
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -226,7 +226,30 @@ PLACE = [
 ]
 NO_PLACE = [raw("place: None", [0])]
 NO_FORCE = [raw("force: None", [0])]
+NO_CONTACTS = [raw("contacts: 0", [0])]
 NO_MARKERS = [raw("markers: 0", [0])]
+
+
+def contact(number, angles, size, vector, sigmas, place):
+    return [
+        signed(f"contact {number}: alpha_mdeg", angles[0]),
+        signed("beta_mdeg", angles[1]),
+        signed("magnitude_un", size),
+        *(signed(f"cartesian_un: {axis}", part) for axis, part in zip("xyz", vector)),
+        unsigned("direction_sigma_mdeg", sigmas[0]),
+        unsigned("magnitude_sigma_un", sigmas[1]),
+        raw("place: Some", [1]),
+        signed("x_um", place[0]),
+        signed("y_um", place[1]),
+        unsigned("sigma_um", place[2]),
+    ]
+
+
+TWO_CONTACTS = [
+    raw("contacts: 2", [2]),
+    *contact(0, (-5000, 2500), 40_000, (-3483, 1745, -39_810), (2900, 1800), (3250, -730, 110)),
+    *contact(1, (-5000, 2500), 60_000, (-5224, 2617, -59_715), (2600, 1900), (-83, -730, 95)),
+]
 
 
 def markers(seen):
@@ -273,21 +296,28 @@ DEVICE = {
     "device-hello-without-model": HELLO + [raw("model: None", [0])] + hello_end(RED)
     + [string("name", "")] + NO_FILTER,
     "sample-force": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact") + ANGLES
-    + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
+    + CARTESIAN + SIGMAS + PLACE + NO_CONTACTS + NO_MARKERS,
     "sample-slip": sample(41, 42, 1_400_000, 0x32000, "not_calibrated, contact, slip")
-    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_CONTACTS + NO_MARKERS,
     "sample-rezeroed": sample(41, 42, 1_400_000, 0x210000, "contact, rezeroed")
-    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_MARKERS,
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_CONTACTS + NO_MARKERS,
     "sample-without-place": sample(41, 42, 1_400_000, 0x50010,
                                    "magnitude_out_of_range, contact, direction_out_of_range")
-    + ANGLES + CARTESIAN + SIGMAS + NO_PLACE + NO_MARKERS,
+    + ANGLES + CARTESIAN + SIGMAS + NO_PLACE + NO_CONTACTS + NO_MARKERS,
     "sample-unexplained": sample(300, 301, 10_000_000, 0x100000, "unexplained")
-    + NO_FORCE + NO_MARKERS,
+    + NO_FORCE + NO_CONTACTS + NO_MARKERS,
     "sample-without-force": sample(300, 305, 10_000_000, 0x201, "markers_missing, frame_dropped")
-    + NO_FORCE + NO_MARKERS,
-    "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing") + NO_FORCE + FOUR,
+    + NO_FORCE + NO_CONTACTS + NO_MARKERS,
+    "sample-two-contacts": sample(41, 42, 1_400_000, 0x1001_2000,
+                                  "not_calibrated, contact, two_contacts")
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + TWO_CONTACTS + NO_MARKERS,
+    "sample-sum-of-two": sample(41, 42, 1_400_000, 0x1001_2000,
+                                "not_calibrated, contact, two_contacts")
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_CONTACTS + NO_MARKERS,
+    "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing")
+    + NO_FORCE + NO_CONTACTS + FOUR,
     "sample-with-eight-markers": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact")
-    + ANGLES + CARTESIAN + SIGMAS + PLACE + EIGHT,
+    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_CONTACTS + EIGHT,
     "stats": [raw("Stats", [2])] + [unsigned(name, value) for name, value in STATS],
     "log": [
         raw("Log", [3]),

@@ -43,6 +43,7 @@ fn try_to(levels: &[u8], width: u16, height: u16) -> Result<Vec<u8>, String> {
         time_us: 0,
         status: measurement.status,
         force: measurement.force,
+        contacts: measurement.contacts,
         markers: measurement.markers.unwrap_or_default(),
     };
     let told = json!({

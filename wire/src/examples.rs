@@ -11,7 +11,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
-use hivtac_terms::force::{Force, Place};
+use hivtac_terms::force::{ContactList, Force, MOST_CONTACTS, Place};
 use hivtac_terms::marker::{MOST_MARKERS, Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{
@@ -157,19 +157,8 @@ pub fn longest_sample() -> Sample {
         frame: u32::MAX,
         time_us: u64::MAX,
         status: Status(u32::MAX),
-        force: Some(Force {
-            alpha: MilliDegrees(i32::MIN),
-            beta: MilliDegrees(i32::MIN),
-            magnitude: MicroNewtons(i32::MIN),
-            cartesian: [MicroNewtons(i32::MIN); 3],
-            direction_sigma: UnsignedMilliDegrees(u32::MAX),
-            magnitude_sigma: UnsignedMicroNewtons(u32::MAX),
-            place: Some(Place {
-                x: SignedMicrometres(i32::MIN),
-                y: SignedMicrometres(i32::MIN),
-                sigma: Micrometres(u32::MAX),
-            }),
-        }),
+        force: Some(LONGEST_FORCE),
+        contacts: ContactList::filled(MOST_CONTACTS, LONGEST_FORCE),
         markers: MarkerList::filled(
             MOST_MARKERS,
             Marker {
@@ -180,6 +169,21 @@ pub fn longest_sample() -> Sample {
         ),
     }
 }
+
+/// A force, each number with its longest encoding.
+const LONGEST_FORCE: Force = Force {
+    alpha: MilliDegrees(i32::MIN),
+    beta: MilliDegrees(i32::MIN),
+    magnitude: MicroNewtons(i32::MIN),
+    cartesian: [MicroNewtons(i32::MIN); 3],
+    direction_sigma: UnsignedMilliDegrees(u32::MAX),
+    magnitude_sigma: UnsignedMicroNewtons(u32::MAX),
+    place: Some(Place {
+        x: SignedMicrometres(i32::MIN),
+        y: SignedMicrometres(i32::MIN),
+        sigma: Micrometres(u32::MAX),
+    }),
+};
 
 /// A rest position, each number with its longest encoding.
 pub fn longest_rest() -> RestPosition {
@@ -448,13 +452,16 @@ fn any_hello() -> impl Strategy<Value = DeviceHello> {
 
 fn any_sample() -> impl Strategy<Value = Sample> {
     let force = proptest::option::of(any_force());
-    (any::<(u32, u32, u64, u32)>(), force, any_markers()).prop_map(
-        |((sequence, frame, time_us, status), force, markers)| Sample {
+    let contacts = proptest::collection::vec(any_force(), 0..=MOST_CONTACTS);
+    let head = any::<(u32, u32, u64, u32)>();
+    (head, force, contacts, any_markers()).prop_map(
+        |((sequence, frame, time_us, status), force, contacts, markers)| Sample {
             sequence,
             frame,
             time_us,
             status: Status(status),
             force,
+            contacts: ContactList::of(contacts),
             markers,
         },
     )

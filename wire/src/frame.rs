@@ -15,8 +15,8 @@ pub(crate) const CRC_BYTES: usize = 4;
 /// longest encoding.
 pub const MAX_DEVICE_BODY: usize = 467;
 
-/// Longest body of a sample in this protocol version: one with force, place and markers.
-pub const MAX_SAMPLE_BODY: usize = 324;
+/// Longest body of a sample in this protocol version: one with force, two contacts and markers.
+pub const MAX_SAMPLE_BODY: usize = 437;
 
 /// Longest body of a host in this protocol version: a rest position.
 pub const MAX_HOST_BODY: usize = 280;

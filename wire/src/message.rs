@@ -8,7 +8,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
-use hivtac_terms::force::Force;
+use hivtac_terms::force::{self, ContactList, Force};
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalSettings};
@@ -150,12 +150,20 @@ pub struct Sample {
     pub status: Status,
     /// The force; `None` exactly if `status` has a bit that means "no force".
     pub force: Option<Force>,
+    /// The two contacts whose sum `force` is, if the status has [`Status::TWO_CONTACTS`] and they
+    /// are told apart; otherwise empty ([`Sample::each_contact`]).
+    pub contacts: ContactList,
     /// The markers, if they were requested ([`Request::StartWithMarkers`]) and all were found;
     /// otherwise empty.
     pub markers: MarkerList,
 }
 
 impl Sample {
+    /// Each contact: one, two, or none if nothing touches the film or two are not told apart.
+    pub fn each_contact(&self) -> &[Force] {
+        force::contacts(self.status, self.force.as_ref(), &self.contacts)
+    }
+
     /// The markers; `None` if they were not requested, or not all found.
     pub fn found(&self) -> Option<&[Marker]> {
         Some(&self.markers[..]).filter(|markers| !markers.is_empty())

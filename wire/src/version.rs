@@ -68,7 +68,7 @@ mod tests {
     /// vectors.
     #[test]
     fn the_schema_hash_is_that_of_docs_wire_md() {
-        assert_eq!(SCHEMA_HASH, 0x85e9_0efc_fe04_8f4f, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0xb2e5_54bd_e685_e40d, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]

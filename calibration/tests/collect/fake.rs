@@ -1,6 +1,6 @@
 //! A fake sensor whose film is a formula, and a hand that presses it.
 
-use hivtac_terms::force::{Force, Place};
+use hivtac_terms::force::{ContactList, Force, Place};
 use hivtac_terms::units::{
     MicroNewtons, MilliDegrees, Px, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
@@ -221,6 +221,7 @@ fn sample(frame: u32, time_s: f64, pose: [f64; 2]) -> Sample {
             (true, false) => Status::MODEL_MISSING,
         },
         force: None,
+        contacts: ContactList::default(),
         markers: if found {
             seen.into()
         } else {
@@ -251,6 +252,7 @@ pub fn pressed(
             magnitude_sigma: UnsignedMicroNewtons(20_000),
             place,
         }),
+        contacts: ContactList::default(),
         markers: markers(force_n(size_n, [0.0; 2])).into(),
     }
 }

@@ -7,7 +7,7 @@ use hivtac_calibration::data::collect::simulated::SimulatedGauge;
 use hivtac_calibration::data::dataset::{MarkerDetector, Recipe, Sensing};
 use hivtac_calibration::data::rest::features_from_q16;
 use hivtac_sensor::force::model::Model;
-use hivtac_terms::force::Force;
+use hivtac_terms::force::{ContactList, Force};
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
@@ -90,6 +90,7 @@ fn film(pressed: Pressed) -> Film {
             time_us: (time_s * 1e6) as u64,
             status: Status::NOT_CALIBRATED,
             force: Some(felt(force_n)),
+            contacts: ContactList::default(),
             markers: [0, 1, 2, 3].map(marker).into(),
         }
     })

@@ -36,6 +36,16 @@ enum {
     HIVTAC_ERROR_INTERNAL = -100   /* a mistake of this library */
 };
 
+/* A contact on the film. Numbers that are not known are NaN. */
+typedef struct hivtac_contact {
+    double force_n[3];           /* its force on the film, N */
+    double magnitude_n;          /* size of the force, N */
+    double magnitude_sigma_n;    /* standard uncertainty of the size, N */
+    double direction_sigma_rad;  /* standard uncertainty of the direction, rad */
+    double place_m[2];           /* where it touches, from the film's middle, m */
+    double place_sigma_m;        /* standard uncertainty of each coordinate, m */
+} hivtac_contact;
+
 /* A frame's force, or the reason why it is missing. Numbers that are not known are NaN. */
 typedef struct hivtac_sample {
     uint64_t time_us;            /* device time of the middle of the exposure, us */
@@ -55,6 +65,9 @@ typedef struct hivtac_sample {
     double force_covariance[9];  /* of force_n, row by row, N^2 */
     double place_m[2];           /* where it touches, from the film's middle, m */
     double place_sigma_m;        /* standard uncertainty of each coordinate, m */
+    uint64_t contact_count;      /* how many contacts are told: 0, 1 or 2; with bit 28 of status,
+                                    0 means two that are too near to be told apart */
+    hivtac_contact contacts[2];  /* each contact; force_n is their sum */
 } hivtac_sample;
 
 /* Connects to a sensor, and asks it for samples: to a port (a serial port's name, or

@@ -3,8 +3,20 @@
 use hivtac_host::force_fields::{FORCE, PLACE};
 use hivtac_host::grip::matrix::covariance;
 use hivtac_host::reader::Arrived;
-use hivtac_terms::force::Force;
+use hivtac_terms::force::{Force, MOST_CONTACTS};
 use hivtac_terms::status::Status;
+
+/// `hivtac_contact` of `include/hivtac.h`, field by field.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct CContact {
+    force_n: [f64; 3],
+    magnitude_n: f64,
+    magnitude_sigma_n: f64,
+    direction_sigma_rad: f64,
+    place_m: [f64; 2],
+    place_sigma_m: f64,
+}
 
 /// `hivtac_sample` of `include/hivtac.h`, field by field.
 #[repr(C)]
@@ -27,6 +39,8 @@ pub struct CSample {
     force_covariance: [f64; 9],
     place_m: [f64; 2],
     place_sigma_m: f64,
+    contact_count: u64,
+    contacts: [CContact; MOST_CONTACTS],
 }
 
 impl From<&Arrived> for CSample {
@@ -45,6 +59,11 @@ impl From<&Arrived> for CSample {
         };
         if let Some(force) = &sample.force {
             told.set(force);
+        }
+        let contacts = sample.each_contact();
+        told.contact_count = contacts.len() as u64;
+        for (place, contact) in told.contacts.iter_mut().zip(contacts) {
+            *place = CContact::from(contact);
         }
         told
     }
@@ -69,7 +88,35 @@ const UNKNOWN: CSample = CSample {
     force_covariance: [f64::NAN; 9],
     place_m: [f64::NAN; 2],
     place_sigma_m: f64::NAN,
+    contact_count: 0,
+    contacts: [CContact {
+        force_n: [f64::NAN; 3],
+        magnitude_n: f64::NAN,
+        magnitude_sigma_n: f64::NAN,
+        direction_sigma_rad: f64::NAN,
+        place_m: [f64::NAN; 2],
+        place_sigma_m: f64::NAN,
+    }; MOST_CONTACTS],
 };
+
+impl From<&Force> for CContact {
+    fn from(force: &Force) -> CContact {
+        let [_, _, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
+        let place = force
+            .place
+            .as_ref()
+            .map(|place| PLACE.map(|it| it.si(place)));
+        let [right, down, sigma] = place.unwrap_or([f64::NAN; 3]);
+        CContact {
+            force_n: [x, y, z],
+            magnitude_n: size,
+            magnitude_sigma_n: size_sigma,
+            direction_sigma_rad: angle_sigma,
+            place_m: [right, down],
+            place_sigma_m: sigma,
+        }
+    }
+}
 
 impl CSample {
     fn set(&mut self, force: &Force) {

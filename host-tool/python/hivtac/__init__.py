@@ -41,6 +41,7 @@ from hivtac._hivtac import (
 )
 
 __all__ = [
+    "Contact",
     "Device",
     "Error",
     "Grip",
@@ -87,6 +88,28 @@ class Device:
 
 
 @dataclass(frozen=True, eq=False)
+class Contact:
+    """A contact on the film."""
+
+    force: Floats
+    """(3,): its force on the film, N."""
+    alpha: float
+    """Direction α, rad, as of a sample."""
+    beta: float
+    """Direction β, rad."""
+    magnitude: float
+    """Size of the force, N."""
+    direction_sigma: float
+    """Standard uncertainty of the direction, rad."""
+    magnitude_sigma: float
+    """Standard uncertainty of the magnitude, N."""
+    place: Floats | None
+    """(2,): where it touches, m from the film's middle; `None` if unknown."""
+    place_sigma: float | None
+    """Standard uncertainty of each coordinate of the place, m."""
+
+
+@dataclass(frozen=True, eq=False)
 class Sample:
     """One frame's force, or the reason why it is missing."""
 
@@ -121,6 +144,9 @@ class Sample:
     """(2,): place where the tip touches, m from the film's middle; `None` if unknown."""
     place_sigma: float | None
     """Standard uncertainty of each coordinate of the place, m."""
+    contacts: tuple[Contact, ...]
+    """Each contact: one, two, or none if nothing touches the film. `force` is their sum. None, too,
+    if `status` has `two_contacts` and the two are too near to be told apart."""
     markers: Floats | None
     """(N, 2): column and row of each marker, px; `None` if not all were found."""
     marker_areas: npt.NDArray[np.int64] | None
@@ -482,6 +508,27 @@ def _moved(
     return Moved(farthest, np.array(shift), turn, larger, beside)
 
 
+def _contact(
+    vector: list[float],
+    angles: list[float],
+    magnitude: float,
+    direction_sigma: float,
+    magnitude_sigma: float,
+    place: tuple[list[float], float] | None,
+) -> Contact:
+    alpha, beta = angles
+    return Contact(
+        force=np.array(vector),
+        alpha=alpha,
+        beta=beta,
+        magnitude=magnitude,
+        direction_sigma=direction_sigma,
+        magnitude_sigma=magnitude_sigma,
+        place=np.array(place[0]) if place else None,
+        place_sigma=place[1] if place else None,
+    )
+
+
 def _sample(
     sequence: int,
     frame: int,
@@ -491,6 +538,7 @@ def _sample(
     bits: int,
     names: list[str],
     force: Any,
+    contacts: list[Any],
     markers: list[tuple[float, float, int]] | None,
 ) -> Sample:
     vector, (alpha, beta), magnitude, direction_sigma, magnitude_sigma, place = force or (
@@ -517,6 +565,7 @@ def _sample(
         magnitude_sigma=magnitude_sigma,
         place=np.array(place[0]) if place else None,
         place_sigma=place[1] if place else None,
+        contacts=tuple(_contact(*numbers) for numbers in contacts),
         markers=np.array([marker[:2] for marker in markers]) if markers else None,
         marker_areas=np.array([marker[2] for marker in markers]) if markers else None,
     )

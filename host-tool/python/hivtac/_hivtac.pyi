@@ -19,6 +19,7 @@ _Sample = tuple[
     int,
     list[str],
     Optional[_Force],
+    list[_Force],
     Optional[list[tuple[float, float, int]]],
 ]
 

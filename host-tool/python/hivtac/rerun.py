@@ -77,17 +77,22 @@ def log_sample(sample: hivtac.Sample, name: str = "hivtac") -> None:
     rr.log(f"{name}/place", rr.Scalars(place))
     rr.log(f"{name}/touch", rr.Scalars([float(sample.contact), float(sample.slip)]))
     rr.log(f"{name}/status", rr.TextDocument("\n".join(sample.status)))
-    rr.log(f"{name}/film/force", _arrow(sample))
+    rr.log(f"{name}/film/force", _arrows(sample))
 
 
-def _arrow(sample: hivtac.Sample) -> rr.Arrows3D:
-    if sample.force is None:
-        return rr.Arrows3D(vectors=[], origins=[])
-    tip = np.zeros(3)
-    if sample.place is not None:
-        tip[:2] = sample.place * 1e3
-    vector = sample.force * MM_PER_N
-    return rr.Arrows3D(vectors=[vector], origins=[tip - vector])
+def _arrows(sample: hivtac.Sample) -> rr.Arrows3D:
+    """An arrow of the force, or one of each of two contacts."""
+    each = sample.contacts if len(sample.contacts) > 1 else [sample]
+    vectors, origins = [], []
+    for one in each:
+        if one.force is None:
+            continue
+        tip = np.zeros(3)
+        if one.place is not None:
+            tip[:2] = one.place * 1e3
+        vectors.append(one.force * MM_PER_N)
+        origins.append(tip - vectors[-1])
+    return rr.Arrows3D(vectors=vectors, origins=origins)
 
 
 def log_picture(picture: hivtac.Picture, name: str = "hivtac") -> None:

@@ -15,7 +15,7 @@ use pyo3::types::PyDict;
 type ForceNumbers = ([f64; 3], [f64; 2], f64, f64, f64, Option<([f64; 2], f64)>);
 
 /// Sequence, frame, device time, s, host times of arrival and exposure, s, status bits, names of
-/// these, force, and column, row and area of each marker, px.
+/// these, force, each contact, and column, row and area of each marker, px.
 pub type SampleNumbers = (
     u32,
     u32,
@@ -25,6 +25,7 @@ pub type SampleNumbers = (
     u32,
     Vec<&'static str>,
     Option<ForceNumbers>,
+    Vec<ForceNumbers>,
     Option<Vec<MarkerNumbers>>,
 );
 
@@ -42,6 +43,7 @@ pub fn sample(sample: &Sample, came_ns: u64, exposed_ns: u64) -> SampleNumbers {
         sample.status.0,
         sample.status.names().collect(),
         sample.force.as_ref().map(force),
+        sample.each_contact().iter().map(force).collect(),
         markers(sample),
     )
 }

@@ -4,6 +4,7 @@ use super::report::{Report, Step};
 use super::{camera, clocks, colours, noise, press};
 use hivtac_host::frame::Frame;
 use hivtac_terms::fixed::Q;
+use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
@@ -94,6 +95,7 @@ fn samples(frame_us: u64) -> Vec<Sample> {
         time_us: 1_000_000 + u64::from(frame) * frame_us,
         status: Status::MARKERS_MISSING,
         force: None,
+        contacts: ContactList::default(),
         markers: MarkerList::default(),
     };
     (0..100).map(sample).collect()

@@ -257,10 +257,11 @@ impl Device {
         }
         self.sensor.set_down(self.down);
         self.sensor.set_contact_shape(self.contact_shape);
-        let measurement = match self.taring.is_none() {
+        let mut measurement = match self.taring.is_none() {
             true => self.sensor.measure_frame_closely(&frame.words),
             false => self.sensor.measure_frame(&frame.words),
         };
+        (self.sensor).follow_two_contacts(&mut measurement, answer::STEPS_A_FRAME);
         let time_us = frame
             .begun_us
             .saturating_add_signed(frame.camera.middle_us().into());

@@ -136,6 +136,7 @@ impl Feed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use hivtac_terms::force::ContactList;
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
 
@@ -146,6 +147,7 @@ mod tests {
             time_us,
             status: Status::OK,
             force: None,
+            contacts: ContactList::default(),
             markers: MarkerList::default(),
         }
     }

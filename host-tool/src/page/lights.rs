@@ -55,7 +55,7 @@ pub fn of(status: Status) -> Vec<Light> {
 fn level(bit: Status) -> Level {
     match bit {
         _ if Status::NO_FORCE.contains(bit) => Level::Bad,
-        Status::CONTACT => Level::Good,
+        Status::CONTACT | Status::TWO_CONTACTS => Level::Good,
         _ => Level::Warning,
     }
 }
@@ -120,6 +120,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
         ),
         Status::CONTACT => ("something touches the film", ""),
         Status::SLIP => ("what touches the film slips", ""),
+        Status::TWO_CONTACTS => ("two contacts press: the force is their sum", ""),
         Status::DIRECTION_OUT_OF_RANGE => (
             "more force along the film than the model knows",
             "press more steeply",

@@ -62,9 +62,10 @@ struct Samples {
     samples: Vec<Row>,
 }
 
-/// A sample: sequence number, frame, device time (µs), status; then its force or `null`.
+/// A sample: sequence number, frame, device time (µs), status; then its force or `null`, and the
+/// two contacts that the force is the sum of, if they are told apart.
 #[derive(Serialize)]
-struct Row(u32, u32, u64, u32, Option<Value>);
+struct Row(u32, u32, u64, u32, Option<Value>, Vec<Value>);
 
 /// A sample as the page reads it.
 pub fn row(sample: &Sample) -> impl Serialize + use<> {
@@ -79,6 +80,7 @@ impl From<&Sample> for Row {
             sample.time_us,
             sample.status.0,
             sample.force.as_ref().map(force_row),
+            sample.contacts.iter().map(force_row).collect(),
         )
     }
 }

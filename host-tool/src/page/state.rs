@@ -125,6 +125,7 @@ impl State {
 mod tests {
     use super::*;
     use hivtac_terms::conditions::CentroidEstimator;
+    use hivtac_terms::force::ContactList;
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_terms::threshold::HsvBox;
@@ -156,6 +157,7 @@ mod tests {
             time_us,
             status: Status::OK,
             force: None,
+            contacts: ContactList::default(),
             markers: MarkerList::default(),
         })
     }

@@ -1,6 +1,6 @@
 //! Converts a sample to messages of ROS 2: the channels of a sensor, and the message of each.
 
-use super::{Definition, bool, number, point, polygon, string, wrench, wrench_of};
+use super::{Definition, bool, contacts, number, point, polygon, string, wrench, wrench_of};
 use crate::grip::{Grip, lines};
 use hivtac_terms::status::Status;
 use hivtac_wire::message::Sample;
@@ -12,6 +12,8 @@ pub enum Channel {
     Wrench,
     /// The place where the tip touches.
     Place,
+    /// Each contact, with its force and place.
+    Contacts,
     /// The markers.
     Markers,
     /// Whether something touches the film.
@@ -24,9 +26,10 @@ pub enum Channel {
 
 impl Channel {
     /// All channels, in the order of their numbers.
-    pub const ALL: [Channel; 6] = [
+    pub const ALL: [Channel; 7] = [
         Channel::Wrench,
         Channel::Place,
+        Channel::Contacts,
         Channel::Markers,
         Channel::Contact,
         Channel::Slip,
@@ -38,6 +41,7 @@ impl Channel {
         match self {
             Channel::Wrench => "wrench",
             Channel::Place => "place",
+            Channel::Contacts => "contacts",
             Channel::Markers => "markers",
             Channel::Contact => "contact",
             Channel::Slip => "slip",
@@ -50,6 +54,7 @@ impl Channel {
         match self {
             Channel::Wrench => &super::WRENCH,
             Channel::Place => &super::POINT,
+            Channel::Contacts => &super::CONTACTS,
             Channel::Markers => &super::POLYGON,
             Channel::Contact | Channel::Slip => &super::BOOL,
             Channel::Status => &super::STRING,
@@ -164,7 +169,7 @@ impl Frames {
 }
 
 /// The messages of a sample, each as CDR. `stamp_ns` is the time of the frame's exposure, ns since
-/// 1970. Wrench, contact and slip need a force; place and markers must be known.
+/// 1970. Wrench, contacts, contact and slip need a force; place and markers must be known.
 pub fn messages(sample: &Sample, stamp_ns: u64, frames: &Frames) -> Vec<(Channel, Vec<u8>)> {
     let Sample { force, status, .. } = sample;
     let mut messages = Vec::with_capacity(Channel::ALL.len());
@@ -172,6 +177,8 @@ pub fn messages(sample: &Sample, stamp_ns: u64, frames: &Frames) -> Vec<(Channel
         messages.push((Channel::Wrench, wrench(stamp_ns, &frames.film, force)));
         let place = point(stamp_ns, &frames.film, force);
         messages.extend(place.map(|place| (Channel::Place, place)));
+        let each = contacts(stamp_ns, &frames.film, sample.each_contact());
+        messages.push((Channel::Contacts, each));
         for (channel, bit) in [
             (Channel::Contact, Status::CONTACT),
             (Channel::Slip, Status::SLIP),

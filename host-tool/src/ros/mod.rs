@@ -2,6 +2,7 @@
 
 pub mod channel;
 
+use crate::force_fields::{FORCE, PLACE};
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 
@@ -89,6 +90,42 @@ MSG: geometry_msgs/Point32
 float32 x
 float32 y
 float32 z
+"
+    ),
+};
+
+/// Each contact: its place as x and y, m, its force, N, and their standard uncertainties, m, N and
+/// rad.
+pub const CONTACTS: Definition = Definition {
+    name: "sensor_msgs/msg/PointCloud2",
+    text: concat!(
+        "\
+std_msgs/Header header
+uint32 height
+uint32 width
+sensor_msgs/PointField[] fields
+bool is_bigendian
+uint32 point_step
+uint32 row_step
+uint8[] data
+bool is_dense
+================================================================================
+",
+        header!(),
+        "\
+MSG: sensor_msgs/PointField
+uint8 INT8=1
+uint8 UINT8=2
+uint8 INT16=3
+uint8 UINT16=4
+uint8 INT32=5
+uint8 UINT32=6
+uint8 FLOAT32=7
+uint8 FLOAT64=8
+string name
+uint32 offset
+uint8 datatype
+uint32 count
 "
     ),
 };
@@ -273,6 +310,60 @@ pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker]) -> Vec<u8> {
     cdr.0
 }
 
+/// The fields of a contact in [`CONTACTS`].
+const CONTACT_FIELDS: [&str; 10] = [
+    "x",
+    "y",
+    "z",
+    "force_x",
+    "force_y",
+    "force_z",
+    "magnitude",
+    "place_sigma",
+    "magnitude_sigma",
+    "direction_sigma",
+];
+
+/// [`CONTACTS`]. An unknown place is NaN.
+pub fn contacts(stamp_ns: u64, frame: &str, contacts: &[Force]) -> Vec<u8> {
+    const FLOAT32: u8 = 7;
+    let number = |cdr: &mut Cdr, number: usize| cdr.number((number as u32).to_le_bytes());
+    let step = size_of::<f32>() * CONTACT_FIELDS.len();
+    let mut cdr = Cdr::new();
+    cdr.header(stamp_ns, frame);
+    number(&mut cdr, 1);
+    number(&mut cdr, contacts.len());
+    number(&mut cdr, CONTACT_FIELDS.len());
+    for (nth, name) in CONTACT_FIELDS.into_iter().enumerate() {
+        cdr.string(name);
+        number(&mut cdr, size_of::<f32>() * nth);
+        cdr.number([FLOAT32]);
+        number(&mut cdr, 1);
+    }
+    cdr.number([0]);
+    number(&mut cdr, step);
+    number(&mut cdr, step * contacts.len());
+    number(&mut cdr, step * contacts.len());
+    for contact in contacts {
+        cdr.0
+            .extend(contact_numbers(contact).map(f32::to_le_bytes).concat());
+    }
+    let are_placed = contacts.iter().all(|contact| contact.place.is_some());
+    cdr.number([u8::from(are_placed)]);
+    cdr.0
+}
+
+/// The numbers of a contact in the order of [`CONTACT_FIELDS`].
+fn contact_numbers(force: &Force) -> [f32; CONTACT_FIELDS.len()] {
+    let [_, _, size, fx, fy, fz, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
+    let place = force
+        .place
+        .as_ref()
+        .map(|place| PLACE.map(|it| it.si(place)));
+    let [x, y, sigma] = place.unwrap_or([f64::NAN; 3]);
+    [x, y, 0.0, fx, fy, fz, size, sigma, size_sigma, angle_sigma].map(|number| number as f32)
+}
+
 /// The frame and the vector of a `geometry_msgs/msg/Vector3Stamped`, from CDR behind its encoding.
 /// `None` for other bytes. Little-endian, as on all platforms of ROS 2.
 #[cfg(any(test, feature = "ros2"))]
@@ -349,7 +440,7 @@ pub fn bytes(bytes: &[u8]) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::recording::BEFORE_BYTES;
-    use hivtac_terms::units::Px;
+    use hivtac_terms::units::{MicroNewtons, Px, SignedMicrometres};
 
     /// Behind the header: the number of points, then column, row and area of each.
     #[test]
@@ -393,6 +484,32 @@ mod tests {
             }
         }
         assert_eq!(vector_stamped(&[0xff; 64]), None);
+    }
+
+    /// Behind the fields: endianness, sizes, numbers of each contact, and whether all are known.
+    #[test]
+    fn contacts_have_their_numbers_one_after_the_other() {
+        let force = |size: i32| Force {
+            magnitude: MicroNewtons(size),
+            cartesian: [0, 0, -size].map(MicroNewtons),
+            place: Some(Place {
+                x: SignedMicrometres(size / 10),
+                ..Place::default()
+            }),
+            ..Force::default()
+        };
+        let both = contacts(0, "film", &[force(50_000), force(20_000)]);
+        let second = [2e-3_f32, 0.0, 0.0, 0.0, 0.0, -0.02, 0.02, 0.0, 0.0, 0.0];
+        let end = [second.map(f32::to_le_bytes).concat(), vec![1]].concat();
+        assert!(both.ends_with(&end), "{both:?}");
+        let sizes = [40_u32, 80, 80].map(u32::to_le_bytes).concat();
+        let numbers = both.len() - 1 - 80;
+        assert_eq!(both[numbers - 12..numbers], sizes);
+        let none = contacts(0, "film", &[]);
+        assert_eq!(none.len(), both.len() - 80);
+        let mut unplaced = force(50_000);
+        unplaced.place = None;
+        assert_eq!(contacts(0, "film", &[unplaced]).last(), Some(&0));
     }
 
     #[test]

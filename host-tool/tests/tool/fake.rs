@@ -5,7 +5,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
 use hivtac_terms::fixed::Q;
-use hivtac_terms::force::{Force, Place};
+use hivtac_terms::force::{ContactList, Force, Place};
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalSettings};
@@ -323,6 +323,7 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
                 sigma: Micrometres(85),
             }),
         }),
+        contacts: ContactList::default(),
         markers: MarkerList::default(),
     })
 }

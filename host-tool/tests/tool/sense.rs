@@ -120,8 +120,7 @@ fn every_blob_is_measured() {
     let expected = json!({
         "image": path, "width": 320, "height": 240,
         "blobs": [{"no_marker": null, "area": 168, "cx": 24.5, "cy": 45.5, "x0": 19, "y0": 39, "x1": 30, "y1": 52}],
-        "markers": null, "features": null, "force": null, "contact": null,
-        "two_contacts": null,
+        "markers": null, "features": null, "force": null, "contact": null, "contacts": [],
         "status": ["markers_missing", "tare_missing", "not_calibrated"],
     });
     assert_eq!(found, expected);

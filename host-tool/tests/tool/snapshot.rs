@@ -2,6 +2,7 @@
 
 use crate::fake::*;
 use crate::run::*;
+use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Threshold, Yuv422};
@@ -80,6 +81,7 @@ fn sample_with_markers(frame: u32) -> DeviceMessage {
         time_us: 332_135,
         status: Status::TARE_MISSING,
         force: None,
+        contacts: ContactList::default(),
         markers: at_rest().into(),
     })
 }

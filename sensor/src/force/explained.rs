@@ -1,7 +1,6 @@
 //! Computes the force that explains the markers best, with the film run forwards.
 
 use super::{Force, FrameNoise, Place, Polar, trust};
-use crate::force::forward::pair::{PairEstimate, Part};
 use crate::force::forward::{
     Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
     Sigma, Start, Turned, centre_mm,
@@ -18,31 +17,19 @@ use hivtac_terms::units::{
     MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
-/// Two contacts that explain a frame together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub struct TwoContacts {
-    /// The sum of both forces. Its place is the mean of both places by the forces' sizes.
-    pub sum: Force,
-    /// Each of them; `None` if they are too near to each other for that, or if two others explain
-    /// the frame nearly as well.
-    pub each: Option<[Force; 2]>,
-    /// How far the sum can be trusted: range, reliability and contact.
-    pub status: Status,
-}
-
 /// Where a unit's markers rest, and what follows from that before the first frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resting {
-    mounting: Mounting,
+    pub(super) mounting: Mounting,
     /// True for the unit that the model was made on.
-    is_own: bool,
+    pub(super) is_own: bool,
     px: Markers,
     areas: List<f32, MOST_DOTS>,
     /// How far the film may rest from this; `None` if there is no difference.
     drift: Option<Drift>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     hanging: Option<Hanging>,
-    shape: ContactShape,
+    pub(super) shape: ContactShape,
 }
 
 /// Largest usual residual of markers that are known less well, relative to its variance. Their
@@ -200,7 +187,7 @@ impl Resting {
 
     /// How the markers moved from rest. Compiled once, because the near memory is scarce.
     #[inline(never)]
-    fn observed<'a>(
+    pub(super) fn observed<'a>(
         &'a self,
         forward: &Forward<'a>,
         markers: &[Marker],
@@ -302,41 +289,6 @@ impl Resting {
         )
     }
 
-    /// Returns the two contacts that explain the markers, and their sum; `None` if one contact
-    /// explains them, two do not, or what presses is not known to be a needle.
-    pub fn two_contacts(
-        &self,
-        forward: &Forward<'_>,
-        range: &CalibratedRange,
-        markers: &[Marker],
-        noise: FrameNoise,
-    ) -> Option<TwoContacts> {
-        if self.shape != ContactShape::Needle {
-            return None;
-        }
-        let observed = self.observed(forward, markers, noise);
-        let (mounting, unknown) = (&self.mounting, forward.unknown(self.is_own));
-        let one = forward.estimate(&observed, mounting, unknown, Start::Anywhere);
-        if one.is_explained() {
-            return None;
-        }
-        let found = forward.estimate_pair(&observed, mounting, unknown, &one.pose);
-        let found = found.filter(PairEstimate::is_explained)?;
-        let strength = forward.strength(self.is_own);
-        let of_part = |part: Part| {
-            let cartesian = part.force_n.map(|part| MicroNewtons(rounded(1e6 * part)));
-            of_vector(cartesian, part.place_mm, part.sigma)
-        };
-        let (sum, by_noise) = of_part(found.sum(&strength));
-        let each = || found.contacts(&strength).map(|part| of_part(part).0);
-        let in_tables = found.size < forward.limits.size;
-        in_tables.then(|| TwoContacts {
-            status: trust(&sum, by_noise, range),
-            sum,
-            each: found.are_apart(&strength).then(each),
-        })
-    }
-
     /// Returns whether a force that one contact explains badly may be given. The contact must not
     /// be known to be a needle: what a needle leaves over is a fault. And the uncertainties,
     /// widened by what is left over, must be of use.
@@ -436,7 +388,7 @@ fn force(
 
 /// Returns the force of a vector at a place, mm, and the standard uncertainty of |F| by noise.
 #[inline(always)]
-fn of_vector(
+pub(super) fn of_vector(
     cartesian: [MicroNewtons; 3],
     place_mm: [f32; 2],
     sigma: Option<Sigma>,
@@ -483,6 +435,6 @@ fn stated(sigma: Option<Sigma>) -> [u32; 4] {
 }
 
 /// Rounds to nearest; saturates at the limits of 32 bits.
-fn rounded(value: f32) -> i32 {
+pub(super) fn rounded(value: f32) -> i32 {
     (value + 0.5f32.copysign(value)) as i32
 }

@@ -42,11 +42,13 @@ mod place;
 mod rescale;
 #[cfg(test)]
 mod tests;
+mod two;
 
 pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT, is_contact, is_force};
-pub use explained::{Resting, TwoContacts};
+pub use explained::Resting;
 pub use hivtac_terms::force::{Force, Place};
 pub use noise::{FrameNoise, NoiseLevel};
+pub use two::{Pairs, TwoContacts};
 
 use crate::force::model::{CalibratedRange, Model, OutputKind};
 use crate::force::network::Output;

@@ -18,7 +18,7 @@ use crate::force::forward::Drift;
 use crate::force::model::Model;
 use crate::force::network::Network;
 use crate::force::rest::Rest;
-use crate::force::{self, Force, NoiseLevel, Resting};
+use crate::force::{self, Force, NoiseLevel, Pairs, Resting};
 use crate::known_answer::{self, Answer};
 use crate::markers::blob::Blob;
 use crate::markers::formats::Formats;
@@ -36,11 +36,13 @@ use ahead::Ahead;
 use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
+use hivtac_terms::force::ContactList;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold, ThresholdError};
 use hivtac_terms::units::Px;
+pub use two::Work;
 
 /// The result of one frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -57,6 +59,9 @@ pub struct Measurement {
     pub features: Option<Features>,
     /// The force; `None` exactly if `status` has a bit of [`Status::NO_FORCE`].
     pub force: Option<Force>,
+    /// The two contacts whose sum it is, if two press and are told apart; otherwise empty
+    /// ([`Sensor::follow_two_contacts`]).
+    pub contacts: ContactList,
 }
 
 /// A frame is saturated if more than one pixel in this many is set: four dots set far fewer.
@@ -87,6 +92,7 @@ pub struct Sensor<'m, const BLOBS: usize = 64, T = ByteTable> {
     noise: NoiseLevel,
     look: Look,
     temporal: Temporal,
+    pairs: Pairs,
 }
 
 /// Everything that follows from settings, model and tare before there is a frame.
@@ -130,6 +136,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             noise: NoiseLevel::AS_MODELLED,
             look: Look::First,
             temporal: Temporal::new(),
+            pairs: Pairs::NONE,
         }
     }
 
@@ -229,6 +236,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// them.
     fn begin_anew(&mut self) {
         self.temporal.begin_anew();
+        self.pairs = Pairs::NONE;
         if let Some(tare) = &mut self.tare {
             tare.begin_anew();
         }
@@ -412,6 +420,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             lost: Lost::NONE,
             features,
             force,
+            contacts: ContactList::default(),
         }
     }
 

@@ -14,6 +14,7 @@ use crate::force::{Force, FrameNoise, Resting};
 use crate::markers::lost::Lost;
 use crate::markers::rules::Placed;
 use crate::markers::tables::Table;
+use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
@@ -119,6 +120,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             lost: placed.lost,
             features: is_whole.then(|| Features::of_markers(&still.markers)),
             force,
+            contacts: ContactList::default(),
         }
     }
 

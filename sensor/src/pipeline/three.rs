@@ -13,6 +13,7 @@
 use super::{Measurement, Sensor};
 use crate::markers::lost::Lost;
 use crate::markers::tables::Table;
+use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::MarkerList;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
@@ -73,6 +74,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             lost: Lost::NONE,
             features: None,
             force: Some(force),
+            contacts: ContactList::default(),
         })
     }
 }

@@ -1,11 +1,13 @@
 //! Tells two contacts in a frame that one does not explain.
 //!
-//! This takes many times as long as a force: programs ask for it where they have the time. A frame
-//! of two contacts stays [`Status::UNEXPLAINED`] for who does not ask.
+//! To find them takes many times as long as a force. A device does it in parts: it looks for them
+//! over some frames, and then follows them with one step a frame.
 
 use super::{Measurement, Sensor};
-use crate::force::TwoContacts;
+pub use crate::force::forward::pair::Work;
+use crate::force::{Pairs, TwoContacts};
 use crate::markers::tables::Table;
+use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
@@ -15,8 +17,32 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// [`Status::UNEXPLAINED`]. Returns `None` if two do not explain it either; if a marker is
     /// lost; if [what presses](Self::set_contact_shape) is not known to be a needle; or if two
     /// contacts on this layout are not known. Known is the layout `8v`.
-    #[inline(never)]
     pub fn two_contacts(&self, measurement: &Measurement) -> Option<TwoContacts> {
+        let mut pairs = Pairs::NONE;
+        self.two_contacts_by(measurement, (&mut pairs, Work::ALL))
+    }
+
+    /// Call after each frame, before [`follow`](Self::follow). Makes the measurement that of
+    /// [two contacts](Self::two_contacts), if two explain it. They are followed from those of the
+    /// frame before. Until they are found, for some 45 steps, the measurement stays as it is.
+    pub fn follow_two_contacts(&mut self, measurement: &mut Measurement, work: Work) {
+        let mut pairs = self.pairs;
+        if measurement.status.contains(Status::UNEXPLAINED) {
+            if let Some(two) = self.two_contacts_by(measurement, (&mut pairs, work)) {
+                measurement.tell(&two);
+            }
+        } else {
+            pairs.miss();
+        }
+        self.pairs = pairs;
+    }
+
+    #[inline(never)]
+    fn two_contacts_by(
+        &self,
+        measurement: &Measurement,
+        by: (&mut Pairs, Work),
+    ) -> Option<TwoContacts> {
         let is_asked =
             measurement.status.contains(Status::UNEXPLAINED) && measurement.lost.count() == 0;
         let features = measurement.features.filter(|_| is_asked)?;
@@ -30,6 +56,18 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             area: seen.area,
         }));
         let noise = self.noise.of_frame(Px(0));
-        resting.two_contacts(model.forward.as_ref()?, &model.range, &markers, noise)
+        resting.follow_two_contacts(model.forward.as_ref()?, &model.range, &markers, noise, by)
+    }
+}
+
+impl Measurement {
+    /// Makes this the measurement of two contacts.
+    pub fn tell(&mut self, two: &TwoContacts) {
+        let others = Status(self.status.0 & !Status::UNEXPLAINED.0);
+        self.status = others | two.status | Status::TWO_CONTACTS;
+        self.force = Some(two.sum);
+        self.contacts = two
+            .each
+            .map_or_else(ContactList::default, ContactList::from);
     }
 }

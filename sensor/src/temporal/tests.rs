@@ -41,6 +41,7 @@ use crate::force::features::Features;
 use crate::force::rest::Rest;
 use crate::markers::lost::Lost;
 use crate::pipeline::Measurement;
+use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Filter, TemporalError, TemporalSettings};
@@ -55,6 +56,7 @@ pub fn frame(force: Option<Force>, right: Px) -> Measurement {
         lost: Lost::NONE,
         features: Some(Features::of_markers(&markers)),
         force,
+        contacts: ContactList::default(),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Defines the result of a frame: a force on the film, and where it touches.
 
+use crate::list::List;
+use crate::status::Status;
 use crate::units::{
     MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
     UnsignedMilliDegrees,
@@ -8,7 +10,7 @@ use crate::units::{
 /// A force with its standard uncertainty. Film frame, right-handed: x right and y down in the
 /// image, z = x × y out of the film, away from the camera. F = |F| · (sin α cos β, sin β, −cos α
 /// cos β): a press has F_z < 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
@@ -32,9 +34,30 @@ pub struct Force {
     pub place: Option<Place>,
 }
 
+/// Most contacts that are told apart.
+pub const MOST_CONTACTS: usize = 2;
+
+/// The contacts that a frame's force is the sum of, if there are several.
+pub type ContactList = List<Force, MOST_CONTACTS>;
+
+/// Returns each contact of a frame with this status, each with its force and place. Two are the
+/// `parts` of the frame's force, one is that force itself. There is none without a force or a
+/// contact, or if two contacts are not told apart.
+pub fn contacts<'a>(
+    status: Status,
+    force: Option<&'a Force>,
+    parts: &'a ContactList,
+) -> &'a [Force] {
+    if status.contains(Status::TWO_CONTACTS) {
+        return parts;
+    }
+    let one = force.filter(|_| status.contains(Status::CONTACT));
+    one.map_or(&[], core::slice::from_ref)
+}
+
 /// The point of the film under the tip, named by its position at rest in the film frame; (0, 0) is
 /// the film's middle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
     derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
@@ -48,4 +71,24 @@ pub struct Place {
     /// If the covariance is the same in all directions, 95 of 100 true places are within 2.448
     /// times this distance of the one found.
     pub sigma: Micrometres,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_contact_is_named_once() {
+        let [sum, a, b] = [5, 2, 3].map(|size| Force {
+            magnitude: MicroNewtons(size),
+            ..Force::default()
+        });
+        let (none, both) = (ContactList::default(), ContactList::from([a, b]));
+        let two = Status::CONTACT | Status::TWO_CONTACTS;
+        assert_eq!(contacts(Status::CONTACT, Some(&sum), &none), [sum]);
+        assert_eq!(contacts(Status::OK, Some(&sum), &none), []);
+        assert_eq!(contacts(Status::CONTACT, None, &none), []);
+        assert_eq!(contacts(two, Some(&sum), &both), [a, b]);
+        assert_eq!(contacts(two, Some(&sum), &none), []);
+    }
 }

@@ -87,6 +87,9 @@ bits! {
     /// With too few or ambiguous markers: the picture shows as many whole dots as a film of another
     /// layout than the model's.
     ANOTHER_LAYOUT = 27, "another_layout";
+    /// Two contacts press: the force is their sum, its place their mean by their forces. Each is
+    /// known if they are told apart.
+    TWO_CONTACTS = 28, "two_contacts";
 }
 
 impl Status {

@@ -38,6 +38,7 @@ fn measured(sample: &Sample) -> Measurement {
         lost: Lost::NONE,
         features: None,
         force: sample.force,
+        contacts: sample.contacts,
     }
 }
 

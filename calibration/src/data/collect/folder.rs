@@ -570,6 +570,7 @@ pub fn done(folder: &Path) -> Result<Vec<Pose>> {
 mod tests {
     use super::*;
     use hivtac_terms::conditions::CentroidEstimator;
+    use hivtac_terms::force::ContactList;
     use hivtac_terms::threshold::PixelFormat;
     use hivtac_terms::threshold::Yuv422;
     use hivtac_terms::threshold::{HsvBox, Threshold};
@@ -603,6 +604,7 @@ mod tests {
                 Status::MARKERS_MISSING | Status::TARE_MISSING
             },
             force: None,
+            contacts: ContactList::default(),
             markers: MarkerList::of((1..5).filter(|_| found).map(marker)),
         }
     }

@@ -189,7 +189,7 @@ impl FreeTake {
 
 #[cfg(test)]
 mod tests {
-    use hivtac_terms::force::{Force, Place};
+    use hivtac_terms::force::{ContactList, Force, Place};
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_terms::units::{
@@ -220,6 +220,7 @@ mod tests {
             time_us: (time_s * 1e6) as u64,
             status: Status::NOT_CALIBRATED,
             force: Some(force),
+            contacts: ContactList::default(),
             markers: MarkerList::default(),
         }
     }

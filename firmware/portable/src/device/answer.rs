@@ -5,7 +5,7 @@ use core::fmt::{self, Write};
 use heapless::String;
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::markers::settings::Settings;
-use hivtac_sensor::pipeline::Measurement;
+use hivtac_sensor::pipeline::{Measurement, Work};
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_sensor::temporal::{Followed, Moment};
 use hivtac_terms::geometry::{Geometry, Preset};
@@ -15,6 +15,9 @@ use hivtac_terms::threshold::ByteOrder;
 use hivtac_wire::message::{DeviceHello, Outcome, Sample};
 use hivtac_wire::settings::Name;
 use hivtac_wire::version::HelloPrefix;
+
+/// Steps to two contacts in a frame that one does not explain: the time of a frame allows one.
+pub const STEPS_A_FRAME: Work = Work(1);
 
 /// What identifies a device to a host.
 pub struct Identity<'a> {
@@ -116,6 +119,7 @@ pub fn sample(
         time_us: moment.time_us,
         status: followed.status | on_the_way,
         force: followed.force,
+        contacts: measurement.contacts,
         markers: (measurement.markers)
             .filter(|_| with_markers && measurement.lost == Lost::NONE)
             .unwrap_or_default(),

@@ -1,4 +1,4 @@
-// Draws the force as an arrow on the film, seen from the tip's side, with the sensor's x, y and z.
+// Draws the force, or each of two contacts, as an arrow on the film, seen from the tip's side, with the sensor's x, y and z.
 
 /** Half the side of the drawn film, and the distance of its markers along x and y, mm. */
 const FILM_MM = 5;
@@ -64,8 +64,11 @@ export class Arrow {
     this.colour = (name) => style.getPropertyValue(`--${name}`);
   }
 
-  /** `force`: mN, or null. `largest`: largest |F| of the last half minute; it sets the scale. */
-  draw(force, largest, frame) {
+  /**
+   * `force`: mN, or null. `parts`: the two contacts that it is the sum of, or none. `largest`:
+   * largest |F| of the last half minute; it sets the scale.
+   */
+  draw(force, parts, largest, frame) {
     this.fit();
     this.drawFilm();
     const scale = SCALES.find((scale) => scale >= largest) ?? SCALES.at(-1);
@@ -76,6 +79,15 @@ export class Arrow {
       canvas.ariaLabel = "no force";
       return;
     }
+    const each = parts.length > 0 ? parts : [force];
+    const arrows = each.map((one) => ({ vector: one.vector, ...this.drawForce(one, scale) }));
+    canvas.dataset.shown = JSON.stringify({ frame, ...arrows[0], others: arrows.slice(1) });
+    canvas.ariaLabel = each.map((one) => `force ${one.magnitude.toFixed(0)} mN, ` +
+      `α ${one.alpha.toFixed(0)}°, β ${one.beta.toFixed(0)}°`).join("; ");
+  }
+
+  /** Draws an arrow with its uncertainties; returns its ends on the canvas. */
+  drawForce(force, scale) {
     const perMn = LONGEST_MM / scale;
     const { x = 0, y = 0, sigma = 0 } = force.place ?? {};
     const tail = [x, y, 0].map((at, axis) => at - force.vector[axis] * perMn);
@@ -84,9 +96,7 @@ export class Arrow {
     this.drawRound([x, y, 0], sigma);
     const [from, to] = [tail, [x, y, 0]].map((point) => this.project(point));
     this.drawArrow(from, to);
-    canvas.dataset.shown = JSON.stringify({ frame, vector: force.vector, from, to });
-    canvas.ariaLabel = `force ${force.magnitude.toFixed(0)} mN, α ${force.alpha.toFixed(0)}°, ` +
-      `β ${force.beta.toFixed(0)}°`;
+    return { from, to };
   }
 
   line(points, colour, width = 1) {

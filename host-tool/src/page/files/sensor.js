@@ -14,6 +14,7 @@ import { Threshold } from "./threshold.js";
 const LIGHT_MS = 1500;
 const CONTACT = 1 << 16;
 const SLIP = 1 << 17;
+const TWO_CONTACTS = 1 << 28;
 /** The direction's uncertainty is that of an angle in a plane: √2 times that along one axis. */
 const ONE_AXIS = Math.SQRT1_2;
 
@@ -153,7 +154,8 @@ export class SensorView {
     this.hand?.draw();
     this.size.draw(this.end);
     this.components.draw(this.end);
-    this.arrow.draw(force, this.size.largest(), this.newest?.frame);
+    const parts = force ? this.newest.parts : [];
+    this.arrow.draw(force, parts, this.size.largest(), this.newest?.frame);
   }
 
   drawLights(now) {
@@ -192,7 +194,7 @@ export class SensorView {
     show("place-x", force?.place?.x, force?.place?.sigma, 3);
     show("place-y", force?.place?.y, force?.place?.sigma, 3);
     const has = (bit) => this.newest !== null && (this.newest.status & bit) !== 0;
-    const touches = has(SLIP) ? "slips" : has(CONTACT) ? "yes" : "no";
+    const touches = has(SLIP) ? "slips" : has(TWO_CONTACTS) ? "two" : has(CONTACT) ? "yes" : "no";
     this.say("contact", force ? touches : "–");
     this.part("numbers").dataset.frame = force ? this.newest.frame : "";
   }

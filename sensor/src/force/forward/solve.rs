@@ -92,6 +92,15 @@ pub fn solve<const MOST: usize, const COUNT: usize>(
     columns: &mut [List<f32, MOST>; COUNT],
     side: &mut [f32],
 ) -> Option<Solved<COUNT>> {
+    solve_here(columns, side)
+}
+
+/// [`solve`] as a part of its caller: on the chip it lies in the caller's memory.
+#[inline(always)]
+pub(super) fn solve_here<const MOST: usize, const COUNT: usize>(
+    columns: &mut [List<f32, MOST>; COUNT],
+    side: &mut [f32],
+) -> Option<Solved<COUNT>> {
     let whole = columns.each_ref().map(|column| norm(column));
     let mut upper = [[0.0; COUNT]; COUNT];
     let mut along = [0.0; COUNT];
@@ -133,6 +142,7 @@ pub fn solve<const MOST: usize, const COUNT: usize>(
 }
 
 /// The inverse of an upper triangular matrix whose diagonal is not near zero.
+#[inline(always)]
 fn inverse<const COUNT: usize>(upper: &[[f32; COUNT]; COUNT]) -> [[f32; COUNT]; COUNT] {
     let mut inverse = [[0.0; COUNT]; COUNT];
     for column in 0..COUNT {

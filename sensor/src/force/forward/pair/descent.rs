@@ -6,13 +6,13 @@ use super::{Pair, PairEstimate};
 use crate::force::forward::Forward;
 use crate::force::forward::covariance::{Covariance, Unknown, Whitening};
 use crate::force::forward::descent::{LIKELY, unlikely, within};
-use crate::force::forward::estimate::Observed;
+use crate::force::forward::estimate::{Estimate, Observed, Start};
 use crate::force::forward::mounting::Mounting;
 use crate::force::forward::pose::Pose;
-use crate::force::forward::solve::{Column, PRIOR, Rows, Solved, solve, square};
+use crate::force::forward::solve::{Column, PRIOR, Rows, Solved, solve_here, square};
 
 /// Most steps of a descent, and how often one step is halved.
-const STEPS: usize = 12;
+pub(super) const STEPS: usize = 12;
 const HALVINGS: usize = 4;
 /// The steps have converged if the next one would explain at most this.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
@@ -23,11 +23,16 @@ const LARGEST_CHANGE: f32 = 0.25;
 
 /// What the markers of a frame show, and what is known of the unit.
 #[derive(Clone, Copy)]
-pub(super) struct Problem<'a> {
+pub struct Problem<'a> {
+    /// The film.
     pub forward: &'a Forward<'a>,
+    /// What two contacts do together.
     pub interaction: &'a Interaction<'a>,
+    /// The markers.
     pub observed: &'a Observed<'a>,
+    /// How this unit's markers are glued and seen.
     pub mounting: &'a Mounting,
+    /// What is unknown of the unit.
     pub unknown: Unknown<'a>,
 }
 
@@ -39,48 +44,82 @@ struct Point {
     left: Column,
 }
 
+/// Two contacts, and where one step leads from there.
+pub(super) struct Stepped {
+    /// The contacts where the step begins.
+    pub here: PairEstimate,
+    /// The contacts after it, with their squared residual relative to the covariance at its begin;
+    /// `None` if no step explains more.
+    pub next: Option<(Pair, f32)>,
+}
+
 impl Problem<'_> {
-    /// Returns the contacts to which steps lead from a start.
-    pub fn descend(&self, start: Pair) -> PairEstimate {
-        let mut points = [Point::new(), Point::new()];
-        let [mut here, mut there] = points.each_mut();
+    /// Returns the one contact that explains the markers best.
+    pub fn one(&self, start: Start) -> Estimate {
+        (self.forward).estimate(self.observed, self.mounting, self.unknown, start)
+    }
+
+    /// Takes a step from two contacts.
+    #[inline(never)]
+    pub(super) fn step(&self, pair: Pair) -> Stepped {
+        let here = Point::new(self, pair);
         let mut whitening = Whitening::EMPTY;
-        here.put(self, start);
-        let mut found = self.solved(here, &mut whitening);
-        for _ in 0..STEPS {
-            let Some(solved) = found.solved.filter(|own| own.explained > LEFT_TO_EXPLAIN) else {
-                break;
-            };
-            let before = here.square(&whitening);
-            let mut part = self.longest(&solved);
-            let is_lower = (0..HALVINGS).any(|_| {
-                there.put(self, self.after(&here.both, &solved, part));
-                part *= 0.5;
-                there.square(&whitening) < before
-            });
-            if !is_lower {
-                break;
+        let found = self.solved(&here, &mut whitening);
+        let step = found.solved.filter(|own| own.explained > LEFT_TO_EXPLAIN);
+        let next = step.and_then(|step| self.lower(&here, &step, &whitening));
+        Stepped { here: found, next }
+    }
+
+    /// Returns the contacts after a part of a step that explains more; `None` if no part does.
+    fn lower(
+        &self,
+        here: &Point,
+        step: &Solved<INPUTS>,
+        whitening: &Whitening,
+    ) -> Option<(Pair, f32)> {
+        let squares = |pair: &Pair, left: &Column| {
+            let mut left = *left;
+            whitening.whiten(&mut left);
+            let unlikely = pair.iter().map(|pose| square(&unlikely(pose)));
+            (square(&left), unlikely.sum::<f32>())
+        };
+        let (explained, likely) = squares(&here.both.poses, &here.left);
+        let mut part = self.longest(step);
+        for _ in 0..HALVINGS {
+            let pair = self.after(&here.both, step, part);
+            let mut left = self.moved(&pair);
+            for (left, seen) in left.iter_mut().zip(self.observed.moved.iter()) {
+                *left = seen - *left;
             }
-            core::mem::swap(&mut here, &mut there);
-            found = self.solved(here, &mut whitening);
+            let (there, unlikely) = squares(&pair, &left);
+            if there + unlikely < explained + likely {
+                return Some((pair, there));
+            }
+            part *= 0.5;
         }
-        found
+        None
     }
 
     /// The square of the motion, focal lengths, that two contacts do not explain.
-    pub fn left(&self, pair: &Pair) -> f32 {
+    pub(super) fn left(&self, pair: &Pair) -> f32 {
+        let moved = self.moved(pair);
+        let pairs = moved.iter().zip(self.observed.moved.iter());
+        pairs.fold(0.0, |sum, (told, seen)| sum + (seen - told) * (seen - told))
+    }
+
+    /// The motion of the images under two contacts, focal lengths.
+    fn moved(&self, pair: &Pair) -> Column {
         let both = Both::new(*pair, self.forward);
-        let mut left = self.interaction.moved(&both);
+        let mut moved = self.interaction.moved(&both);
         for (part, pose) in both.alone() {
             let beside_mm = &self.mounting.beside_mm;
             let limits = &self.forward.limits;
             let alone = self.forward.tables.predict(&pose, limits, beside_mm);
-            for (sum, alone) in left.iter_mut().zip(alone.moved.iter()) {
+            for (sum, alone) in moved.iter_mut().zip(alone.moved.iter()) {
                 *sum += part * alone;
             }
         }
-        let pairs = left.iter().zip(self.observed.moved.iter());
-        pairs.fold(0.0, |sum, (told, seen)| sum + (seen - told) * (seen - told))
+        moved
     }
 
     fn solved(&self, here: &Point, whitening: &mut Whitening) -> PairEstimate {
@@ -100,7 +139,7 @@ impl Problem<'_> {
         let (mut columns, mut side) = here.equations(whitening);
         let markers = side.get(..here.left.len());
         estimate.unexplained = square(markers.unwrap_or_default());
-        estimate.solved = solve(&mut columns, &mut side);
+        estimate.solved = solve_here(&mut columns, &mut side);
         estimate
     }
 
@@ -136,16 +175,8 @@ impl Problem<'_> {
 }
 
 impl Point {
-    fn new() -> Point {
-        Point {
-            both: Both::NOTHING,
-            prediction: PairPrediction::default(),
-            left: Column::default(),
-        }
-    }
-
-    /// Makes this the point of two contacts.
-    fn put(&mut self, problem: &Problem<'_>, pair: Pair) {
+    /// The point of two contacts.
+    fn new(problem: &Problem<'_>, pair: Pair) -> Point {
         let Problem {
             forward,
             interaction,
@@ -153,18 +184,22 @@ impl Point {
             mounting,
             ..
         } = problem;
-        self.both = Both::new(pair, forward);
+        let mut point = Point {
+            both: Both::new(pair, forward),
+            prediction: PairPrediction::default(),
+            left: Column::defaults(observed.moved.len()),
+        };
         let Point {
             both,
             prediction,
             left,
-        } = self;
+        } = &mut point;
         prediction.put(both, forward, interaction, &mounting.beside_mm);
-        left.reset(observed.moved.len(), 0.0);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());
         for (left, (seen, told)) in left.iter_mut().zip(pairs) {
             *left = seen - told;
         }
+        point
     }
 
     /// Puts the covariance of noise, of the tables' errors, and of what the network leaves.
@@ -214,13 +249,5 @@ impl Point {
             }
         }
         (columns, side)
-    }
-
-    /// The square that a step must lower.
-    fn square(&self, whitening: &Whitening) -> f32 {
-        let mut left = self.left;
-        whitening.whiten(&mut left);
-        let unlikely = self.both.poses.iter().map(|pose| square(&unlikely(pose)));
-        square(&left) + unlikely.sum::<f32>()
     }
 }

@@ -32,19 +32,6 @@ pub struct PairPrediction {
 }
 
 impl Both {
-    /// Two contacts without a force.
-    pub(super) const NOTHING: Both = Both {
-        poses: [Pose {
-            size: 0.0,
-            tilt: [0.0; 2],
-            place_mm: [0.0; 2],
-            width: 0.0,
-        }; 2],
-        size: 0.0,
-        part: 0.0,
-        by_sizes: [[0.0; 2]; 2],
-    };
-
     /// Two contacts on a film.
     pub fn new(poses: [Pose; 2], forward: &Forward<'_>) -> Both {
         let stiffness = &forward.stiffness;

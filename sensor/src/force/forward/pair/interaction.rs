@@ -48,6 +48,9 @@ struct Layer<'a> {
     bytes: &'a [u8],
 }
 
+/// Bias, step and weights of an output.
+type Row<'a> = (f32, f32, &'a [[u8; 2]]);
+
 /// Values of a layer, and their slopes by the inputs.
 type Values = [[f32; 1 + INPUTS]; MOST_WIDTH];
 
@@ -156,36 +159,34 @@ impl<'a> Interaction<'a> {
     /// Adds that motion to a prediction, and its slopes by the inputs to `slopes`.
     #[inline(never)]
     pub fn add_to(&self, both: &Both, moved: &mut Column, slopes: &mut [Column; INPUTS]) {
-        let mut values = [[[0.0; 1 + INPUTS]; MOST_WIDTH]; 2];
-        let [mut now, mut next]: [&mut Values; 2] = values.each_mut();
-        for (nth, (value, input)) in now.iter_mut().zip(self.scaled(both)).enumerate() {
+        let [first, second, last] = &self.layers;
+        let mut inputs = [[0.0; 1 + INPUTS]; INPUTS];
+        for (nth, (value, input)) in inputs.iter_mut().zip(self.scaled(both)).enumerate() {
             value[0] = input;
             if let Some(slope) = value.get_mut(1 + nth) {
                 [_, *slope] = self.scale(nth);
             }
         }
-        for (nth, layer) in self.layers.iter().enumerate() {
-            for (value, (bias, step, weights)) in next.iter_mut().zip(layer.rows()) {
-                let mut sums = [0.0; 1 + INPUTS];
-                for (weight, values) in weights.iter().zip(&*now) {
-                    let weight = f32::from(i16::from_le_bytes(*weight));
-                    for (sum, value) in sums.iter_mut().zip(values) {
-                        *sum += weight * value;
-                    }
-                }
-                let mut sums = sums.map(|sum| step * sum);
-                sums[0] += bias;
-                if nth + 1 < LAYERS {
-                    let [bent, slope] = bent(sums[0]);
-                    sums = sums.map(|sum| slope * sum);
-                    sums[0] = bent;
-                }
-                *value = sums;
+        let mut hidden: Values = [[0.0; 1 + INPUTS]; MOST_WIDTH];
+        for (value, row) in hidden.iter_mut().zip(first.rows()) {
+            *value = neuron(row, &inputs);
+        }
+        // A value of the second layer is used at once: there is no room for two layers' values.
+        let mut outputs = [[0.0; 1 + INPUTS]; COORDINATES];
+        for (nth, row) in second.rows().enumerate() {
+            let value = neuron(row, &hidden);
+            for (output, (_, _, weights)) in outputs.iter_mut().zip(last.rows()) {
+                let weight = weights.get(nth).copied().unwrap_or_default();
+                add(output, weight, &value);
             }
-            core::mem::swap(&mut now, &mut next);
+        }
+        for (output, (bias, step, _)) in outputs.iter_mut().zip(last.rows()) {
+            *output = output.map(|sum| step * sum);
+            output[0] += bias;
         }
         let [factor, by_inputs @ ..] = self.factor(both);
-        for (nth, (moved, [output, of_output @ ..])) in moved.iter_mut().zip(&*now).enumerate() {
+        let values = moved.iter_mut().zip(&outputs);
+        for (nth, (moved, [output, of_output @ ..])) in values.enumerate() {
             *moved += factor * output;
             let parts = by_inputs.iter().zip(of_output);
             for (slope, (by_input, of_output)) in slopes.iter_mut().zip(parts) {
@@ -217,7 +218,7 @@ impl<'a> Interaction<'a> {
 
 impl<'a> Layer<'a> {
     /// Bias, step and weights of each output.
-    fn rows(&self) -> impl Iterator<Item = (f32, f32, &'a [[u8; 2]])> {
+    fn rows(&self) -> impl Iterator<Item = Row<'a>> {
         let rows = self.bytes.chunks_exact(row(self.inputs).max(1));
         rows.filter_map(|row| {
             let ([bias, step], _) = row.as_chunks::<4>().0.split_first_chunk()?;
@@ -229,6 +230,28 @@ impl<'a> Layer<'a> {
             ))
         })
     }
+}
+
+/// Adds a weighted value with its slopes.
+#[inline]
+fn add(sums: &mut [f32; 1 + INPUTS], weight: [u8; 2], values: &[f32; 1 + INPUTS]) {
+    let weight = f32::from(i16::from_le_bytes(weight));
+    for (sum, value) in sums.iter_mut().zip(values) {
+        *sum += weight * value;
+    }
+}
+
+/// The value of a hidden neuron with its slopes, from those of the layer before.
+fn neuron((bias, step, weights): Row<'_>, values: &[[f32; 1 + INPUTS]]) -> [f32; 1 + INPUTS] {
+    let mut sums = [0.0; 1 + INPUTS];
+    for (weight, values) in weights.iter().zip(values) {
+        add(&mut sums, *weight, values);
+    }
+    let mut sums = sums.map(|sum| step * sum);
+    let [bent, slope] = bent(sums[0] + bias);
+    sums = sums.map(|sum| slope * sum);
+    sums[0] = bent;
+    sums
 }
 
 /// Bytes of an output of a layer.

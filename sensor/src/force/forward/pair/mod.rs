@@ -9,14 +9,17 @@
 //! | `interaction` | the network |
 //! | `film` | the positions of all images, with slopes |
 //! | `descent` | steps downhill from a start |
+//! | `search` | where steps begin; both in parts, for a device with little time |
 
 mod descent;
 mod film;
 mod interaction;
+mod search;
 
-use descent::Problem;
+pub use descent::Problem;
 pub use film::{Both, PairPrediction};
 pub use interaction::{INPUTS as PAIR_UNKNOWNS, Interaction};
+pub use search::{PairOfFrame, Search, Work, follow};
 
 use super::covariance::Unknown;
 use super::estimate::{Observed, Sigma, stated};
@@ -90,60 +93,29 @@ pub struct Part {
     pub sigma: Option<Sigma>,
 }
 
+/// Returns what `of` makes of the markers that two needles may explain. Returns `None` if the
+/// network of this layout is not known, a marker is lost, the film hangs, or what presses is no
+/// needle.
+pub fn find<T>(
+    forward: &Forward<'_>,
+    observed: &Observed<'_>,
+    mounting: &Mounting,
+    unknown: Unknown<'_>,
+    of: impl FnOnce(&Problem<'_>) -> T,
+) -> Option<T> {
+    let is_known =
+        observed.lost == Lost::NONE && observed.hanging.is_none() && observed.pressing.is_none();
+    let interaction = Interaction::of_layout(&forward.rest_image).filter(|_| is_known)?;
+    Some(of(&Problem {
+        forward,
+        interaction: &interaction,
+        observed,
+        mounting,
+        unknown,
+    }))
+}
+
 impl Forward<'_> {
-    /// Returns the two needles that explain markers best that the contact `one` does not explain.
-    /// Returns `None` if the network of this layout is not known, a marker is lost, the film hangs,
-    /// or what presses is no needle.
-    #[inline(never)]
-    pub fn estimate_pair(
-        &self,
-        observed: &Observed<'_>,
-        mounting: &Mounting,
-        unknown: Unknown<'_>,
-        one: &Pose,
-    ) -> Option<PairEstimate> {
-        let is_known = observed.lost == Lost::NONE
-            && observed.hanging.is_none()
-            && observed.pressing.is_none();
-        let interaction = Interaction::of_layout(&self.rest_image).filter(|_| is_known)?;
-        let problem = Problem {
-            forward: self,
-            interaction: &interaction,
-            observed,
-            mounting,
-            unknown,
-        };
-        let starts = self.nearest_pairs(&problem, one);
-        let all = starts.map(|start| problem.descend(start));
-        let mut best = *all.first()?;
-        for found in &all {
-            if found.unexplained < best.unexplained {
-                best = *found;
-            }
-        }
-        best.is_only = !all.iter().any(|found| found.rivals(&best));
-        Some(best)
-    }
-
-    /// The starts around a contact that explain the markers best, the best first.
-    fn nearest_pairs(&self, problem: &Problem<'_>, one: &Pose) -> [Pair; DESCENTS] {
-        let mut nearest = [(f32::INFINITY, [*one; 2]); DESCENTS];
-        for along in ALONG {
-            for apart_mm in APART_MM {
-                for part in PARTS {
-                    let pair = self.around(one, along, apart_mm, part);
-                    let mut next = (problem.left(&pair), pair);
-                    for kept in &mut nearest {
-                        if next.0 < kept.0 {
-                            core::mem::swap(kept, &mut next);
-                        }
-                    }
-                }
-            }
-        }
-        nearest.map(|(_, pair)| pair)
-    }
-
     /// Two contacts with the force and the middle of one.
     fn around(&self, one: &Pose, along: [f32; 2], apart_mm: f32, part: f32) -> Pair {
         let all_n = self.stiffness.magnitude_n(one.size);
@@ -174,13 +146,13 @@ impl PairEstimate {
         self.is_only && apart_mm > LEAST_APART_MM && sigmas.into_iter().all(is_apart)
     }
 
-    /// Returns whether this explains the markers nearly as well as `best`, by other contacts.
-    fn rivals(&self, best: &PairEstimate) -> bool {
-        let ([a, b], [c, d]) = (&self.pair, &best.pair);
+    /// Returns whether other contacts, with this residual, explain the markers nearly as well.
+    fn has_rival(&self, unexplained: f32, other: &Pair) -> bool {
+        let ([a, b], [c, d]) = (other, &self.pair);
         let same_order = far_mm(a, c).max(far_mm(b, d));
         let other_order = far_mm(a, d).max(far_mm(b, c));
-        self.is_explained()
-            && self.unexplained - best.unexplained < RIVAL
+        (0.0..=UNEXPLAINED).contains(&unexplained)
+            && unexplained - self.unexplained < RIVAL
             && same_order.min(other_order) > ANOTHER_MM
     }
 
@@ -349,7 +321,11 @@ mod tests {
         let start = super::super::Start::Anywhere;
         let one = forward.estimate(observed, &mounting, unknown, start);
         assert!(!one.is_explained());
-        forward.estimate_pair(observed, &mounting, unknown, &one.pose)
+        find(forward, observed, &mounting, unknown, |problem| {
+            let mut search = Search::new(one.pose);
+            assert!(search.go_on(problem, &mut Work(u32::MAX)));
+            search.best(problem)
+        })?
     }
 
     const PAIR: Pair = [
@@ -409,6 +385,41 @@ mod tests {
             2.0 * sigma.direction < parts[0].sigma.unwrap().direction,
             "{sigma:?}"
         );
+    }
+
+    /// In parts a search finds what it finds at once. Then contacts that move are followed with one
+    /// step a frame.
+    #[test]
+    fn a_pair_is_found_in_parts_and_followed() {
+        let forward = forward();
+        let still = observed(moved(&forward, PAIR));
+        let at_once = found(&forward, &still).unwrap();
+        let (mounting, unknown) = (mounting(&forward), Unknown::Nothing);
+        let one = forward.estimate(&still, &mounting, unknown, super::super::Start::Anywhere);
+        let mut search = Search::new(one.pose);
+        let go_on = |problem: &Problem<'_>| {
+            let parts = (1..).find(|_| search.go_on(problem, &mut Work(1)));
+            (parts.unwrap(), search.best(problem))
+        };
+        let (parts, in_parts) = find(&forward, &still, &mounting, unknown, go_on).unwrap();
+        assert_eq!(in_parts, Some(at_once));
+        assert!((28..80).contains(&parts), "{parts}");
+        let mut known = PairOfFrame {
+            pair: at_once.pair,
+            is_only: at_once.is_only,
+        };
+        let order = usize::from(far_mm(&known.pair[0], &PAIR[0]) > 1.0);
+        let mut pair = PAIR;
+        for _ in 0..50 {
+            pair[0].place_mm[0] += 0.02;
+            pair[1].size *= 1.01;
+            let frame = observed(moved(&forward, pair));
+            let next = |problem: &Problem<'_>| follow(&known, problem, &mut Work(1));
+            let next = find(&forward, &frame, &mounting, unknown, next).unwrap();
+            assert!(next.is_explained() && next.is_only, "{next:?}");
+            known.pair = next.pair;
+            assert!(far_mm(&next.pair[order], &pair[0]) < 0.05, "{next:?}");
+        }
     }
 
     #[test]

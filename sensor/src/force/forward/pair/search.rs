@@ -1,0 +1,146 @@
+//! Looks for two contacts in parts, each about as long as one step, and follows them from frame to
+//! frame.
+
+use super::descent::{Problem, STEPS};
+use super::{ALONG, APART_MM, DESCENTS, PARTS, Pair, PairEstimate};
+use crate::force::forward::pose::Pose;
+
+/// Number of starts, and how many are compared in place of one step.
+const STARTS: usize = ALONG.len() * APART_MM.len() * PARTS.len();
+const AT_ONCE: usize = 4;
+
+/// A number of steps that may be taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work(pub u32);
+
+impl Work {
+    /// As many as are of use: for a computer.
+    pub const ALL: Work = Work(u32::MAX);
+
+    /// Takes one; returns whether there was one.
+    fn take(&mut self) -> bool {
+        let was_there = self.0 > 0;
+        self.0 = self.0.saturating_sub(1);
+        was_there
+    }
+}
+
+/// A search for the two contacts that explain one frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Search {
+    one: Pose,
+    /// The next start to compare; then all are.
+    start: usize,
+    /// The nearest starts, the best first. Later where steps led from there.
+    nearest: [(f32, Pair); DESCENTS],
+    /// The start from which steps are taken, and how many were.
+    descent: usize,
+    steps: usize,
+}
+
+impl Search {
+    /// Begins around the contact that explains the markers best.
+    pub fn new(one: Pose) -> Search {
+        Search {
+            one,
+            start: 0,
+            nearest: [(f32::INFINITY, [one; 2]); DESCENTS],
+            descent: 0,
+            steps: 0,
+        }
+    }
+
+    /// Goes on until it is over, or the work is done. Returns whether it is over.
+    pub fn go_on(&mut self, problem: &Problem<'_>, work: &mut Work) -> bool {
+        while self.descent < DESCENTS && work.take() {
+            match self.start < STARTS {
+                true => self.compare(problem),
+                false => self.step(problem),
+            }
+        }
+        self.descent >= DESCENTS
+    }
+
+    /// Compares the next starts.
+    fn compare(&mut self, problem: &Problem<'_>) {
+        for _ in 0..AT_ONCE {
+            let nth = self.start;
+            let [along, apart_mm, part] = [
+                nth / (APART_MM.len() * PARTS.len()),
+                nth / PARTS.len() % APART_MM.len(),
+                nth % PARTS.len(),
+            ];
+            let start = ALONG.get(along).zip(APART_MM.get(apart_mm));
+            let Some(((along, apart_mm), part)) = start.zip(PARTS.get(part)) else {
+                return;
+            };
+            let pair = problem.forward.around(&self.one, *along, *apart_mm, *part);
+            let mut next = (problem.left(&pair), pair);
+            for kept in &mut self.nearest {
+                if next.0 < kept.0 {
+                    core::mem::swap(kept, &mut next);
+                }
+            }
+            self.start += 1;
+        }
+    }
+
+    /// Takes the next step.
+    fn step(&mut self, problem: &Problem<'_>) {
+        let Some((unexplained, pair)) = self.nearest.get_mut(self.descent) else {
+            return;
+        };
+        let stepped = problem.step(*pair);
+        *unexplained = stepped.here.unexplained;
+        match stepped.next.filter(|_| self.steps < STEPS) {
+            Some((next, _)) => {
+                *pair = next;
+                self.steps += 1;
+            }
+            None => {
+                self.descent += 1;
+                self.steps = 0;
+            }
+        }
+    }
+
+    /// Returns the best of what was found, once the search is over.
+    pub fn best(&self, problem: &Problem<'_>) -> Option<PairEstimate> {
+        let mut best = self.nearest.first()?;
+        for found in &self.nearest {
+            if found.0 < best.0 {
+                best = found;
+            }
+        }
+        let mut estimate = problem.step(best.1).here;
+        let is_rival = |(unexplained, pair): &(f32, Pair)| estimate.has_rival(*unexplained, pair);
+        estimate.is_only = !self.nearest.iter().any(is_rival);
+        Some(estimate)
+    }
+}
+
+/// Returns the contacts of the frame before, taken nearer to this frame's by a step, and by more if
+/// there is work left.
+pub fn follow(before: &PairOfFrame, problem: &Problem<'_>, work: &mut Work) -> PairEstimate {
+    work.take();
+    let mut stepped = problem.step(before.pair);
+    while let Some((next, _)) = stepped.next.filter(|_| work.take()) {
+        stepped = problem.step(next);
+    }
+    let mut estimate = stepped.here;
+    if let Some((next, unexplained)) = stepped.next {
+        // Slopes where the step began are near enough for the uncertainties.
+        (estimate.pair, estimate.unexplained) = (next, unexplained);
+    }
+    estimate.is_only = before.is_only;
+    estimate
+}
+
+/// The contacts of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairOfFrame {
+    /// The contacts.
+    pub pair: Pair,
+    /// Whether no others were found that explain it nearly as well.
+    pub is_only: bool,
+}

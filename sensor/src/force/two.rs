@@ -1,0 +1,194 @@
+//! Tells two contacts in a frame that one does not explain, and follows them from frame to frame.
+
+use super::explained::{Resting, of_vector, rounded};
+use super::{Force, FrameNoise, trust};
+use crate::force::forward::pair::{
+    PairEstimate, PairOfFrame, Part, Problem, Search, Work, find, follow,
+};
+use crate::force::forward::{Forward, Start};
+use crate::force::model::CalibratedRange;
+use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::marker::MarkerList;
+use hivtac_terms::status::Status;
+use hivtac_terms::units::MicroNewtons;
+
+/// Frames after which two contacts that explained none of them are forgotten.
+const FORGOTTEN: u8 = 16;
+/// Frames between two looks for others that explain them as well.
+const LOOK_EVERY: u8 = 64;
+
+/// Two contacts that explain a frame together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct TwoContacts {
+    /// The sum of both forces. Its place is the mean of both places by the forces' sizes.
+    pub sum: Force,
+    /// Each of them; `None` if they are too near to each other for that, or if two others explain
+    /// the frame nearly as well.
+    pub each: Option<[Force; 2]>,
+    /// How far the sum can be trusted: range, reliability and contact.
+    pub status: Status,
+}
+
+/// What frames before tell of two contacts.
+#[derive(Clone, Copy, Debug)]
+pub struct Pairs {
+    known: Option<PairOfFrame>,
+    /// Frames since they explained one, and since others were looked for.
+    missed: u8,
+    looked: u8,
+    /// A search under way, and the markers for which it looks.
+    search: Option<(Search, MarkerList)>,
+    /// Whether the search has this frame's work, where there is not enough for both.
+    searches: bool,
+}
+
+impl Pairs {
+    /// Nothing.
+    pub const NONE: Pairs = Pairs {
+        known: None,
+        missed: 0,
+        looked: 0,
+        search: None,
+        searches: false,
+    };
+
+    /// Takes a frame that one contact explains, or none at all.
+    pub fn miss(&mut self) {
+        self.search = None;
+        self.missed = self.missed.saturating_add(1);
+        if self.missed > FORGOTTEN {
+            self.known = None;
+        }
+    }
+
+    /// Follows the known contacts to a frame; returns those that explain it.
+    fn follow(&mut self, problem: &Problem<'_>, work: &mut Work) -> Option<PairEstimate> {
+        let known = self.known.as_mut()?;
+        self.searches = !self.searches;
+        if self.search.is_some() && self.searches && *work != Work::ALL {
+            return None;
+        }
+        let estimate = follow(known, problem, work);
+        known.pair = estimate.pair;
+        self.looked = self.looked.saturating_add(1);
+        self.missed = match estimate.is_explained() {
+            true => 0,
+            false => self.missed.saturating_add(1),
+        };
+        if self.missed > FORGOTTEN {
+            self.known = None;
+        }
+        Some(estimate).filter(PairEstimate::is_explained)
+    }
+
+    /// Whether contacts must be looked for: none are known, or others may be there as well.
+    fn must_look(&self) -> bool {
+        let is_sure = |known: PairOfFrame| known.is_only || self.looked < LOOK_EVERY;
+        self.search.is_none() && (self.missed > 0 || !self.known.is_some_and(is_sure))
+    }
+
+    /// Takes what a search found.
+    fn take(&mut self, found: Option<PairEstimate>) {
+        self.search = None;
+        self.looked = 0;
+        if let Some(found) = found.filter(PairEstimate::is_explained) {
+            self.missed = 0;
+            self.known = Some(PairOfFrame {
+                pair: found.pair,
+                is_only: found.is_only,
+            });
+        }
+    }
+}
+
+impl Resting {
+    /// Returns the two contacts that explain the markers, and their sum; `None` if one contact
+    /// explains them, two do not, or what presses is not known to be a needle.
+    pub fn two_contacts(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        markers: &MarkerList,
+        noise: FrameNoise,
+    ) -> Option<TwoContacts> {
+        let mut pairs = Pairs::NONE;
+        self.follow_two_contacts(forward, range, markers, noise, (&mut pairs, Work::ALL))
+    }
+
+    /// As [`two_contacts`](Self::two_contacts), beginning with those of the frames before. Where
+    /// the work does not suffice, it goes on with the next frame.
+    #[inline(never)]
+    pub fn follow_two_contacts(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        markers: &MarkerList,
+        noise: FrameNoise,
+        (pairs, mut work): (&mut Pairs, Work),
+    ) -> Option<TwoContacts> {
+        if self.shape != ContactShape::Needle {
+            return None;
+        }
+        let observed = self.observed(forward, markers, noise);
+        let unknown = forward.unknown(self.is_own);
+        let found = find(forward, &observed, &self.mounting, unknown, |problem| {
+            let followed = pairs.follow(problem, &mut work);
+            let searched = self.search(problem, markers, noise, (pairs, &mut work));
+            followed.or(searched)
+        });
+        self.told(forward, range, &found??)
+    }
+
+    /// Goes on with a search, or begins one. Returns the contacts if it ends with this frame's.
+    #[inline(never)]
+    fn search(
+        &self,
+        problem: &Problem<'_>,
+        markers: &MarkerList,
+        noise: FrameNoise,
+        (pairs, work): (&mut Pairs, &mut Work),
+    ) -> Option<PairEstimate> {
+        if pairs.must_look() && *work != Work(0) {
+            let one = problem.one(Start::Anywhere);
+            if one.is_explained() {
+                return None;
+            }
+            pairs.search = Some((Search::new(one.pose), *markers));
+        }
+        let (search, searched) = pairs.search.as_mut()?;
+        let is_now = searched == markers;
+        let observed = self.observed(problem.forward, searched, noise);
+        let problem = Problem {
+            observed: &observed,
+            ..*problem
+        };
+        let found = match search.go_on(&problem, work) {
+            true => search.best(&problem),
+            false => return None,
+        };
+        pairs.take(found);
+        found.filter(|found| is_now && found.is_explained())
+    }
+
+    /// The forces of two contacts; `None` beyond the tables.
+    fn told(
+        &self,
+        forward: &Forward<'_>,
+        range: &CalibratedRange,
+        found: &PairEstimate,
+    ) -> Option<TwoContacts> {
+        let strength = forward.strength(self.is_own);
+        let of_part = |part: Part| {
+            let cartesian = part.force_n.map(|part| MicroNewtons(rounded(1e6 * part)));
+            of_vector(cartesian, part.place_mm, part.sigma)
+        };
+        let (sum, by_noise) = of_part(found.sum(&strength));
+        let each = || found.contacts(&strength).map(|part| of_part(part).0);
+        let in_tables = found.size < forward.limits.size;
+        in_tables.then(|| TwoContacts {
+            status: trust(&sum, by_noise, range),
+            sum,
+            each: found.are_apart(&strength).then(each),
+        })
+    }
+}
