@@ -9,13 +9,16 @@ use hivtac_host::link::Link;
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::{Captured, Device};
 use hivtac_host::port::Address;
+use hivtac_host::live::hand::Touch;
+use hivtac_host::live::pair::PairFilm;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::HsvBox;
 use hivtac_twin::{Layout, Options, Preset, Scene, Shutter};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
+use hivtac_wire::health::Health;
 use hivtac_wire::message::{
-    Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Reply, Request, Sample,
+    Command, DeviceHello, DeviceMessage, HostMessage, Outcome, Reply, Request, Sample, Stats,
 };
 use hivtac_wire::settings::SettingsReport;
 use hivtac_wire::version::HelloPrefix;
@@ -45,7 +48,7 @@ fn eight_dots() -> Layout {
 
 /// Returns what the firmware in a rig says of itself, and the samples of successive frames, from
 /// the first one after what it was told.
-fn from_the_rig(rig: &Rig) -> (DeviceHello, SettingsReport, Vec<Sample>) {
+fn from_the_rig(rig: &Rig, count: usize) -> (DeviceHello, SettingsReport, Vec<Sample>) {
     let address = Address::Tty(rig.port().to_owned());
     let (mut link, hello) = Link::connect(&address, PATIENCE).unwrap();
     let mut report = None;
@@ -59,7 +62,7 @@ fn from_the_rig(rig: &Rig) -> (DeviceHello, SettingsReport, Vec<Sample>) {
         link.request(request, PATIENCE, |_| {}).unwrap();
     }
     let mut samples: Vec<Sample> = Vec::new();
-    while samples.len() < SAMPLES {
+    while samples.len() < count {
         let message = link.receive(Instant::now() + PATIENCE).unwrap();
         if let DeviceMessage::Sample(sample) = message.expect("samples come") {
             let begins = sample.status.contains(Status::FRAME_DROPPED);
@@ -121,8 +124,9 @@ fn bytes(sample: Sample) -> Vec<u8> {
 }
 
 /// Measures the frames of a rig's samples, with its truth, in the twin: the same bytes follow. The
-/// number of the sample counts from the device's start, and is the only difference.
-fn assert_same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>) {
+/// number of the sample counts from the device's start, and is the only difference. Returns how
+/// many had a force.
+fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>) -> usize {
     let lines = rig.truth().unwrap();
     let lines: HashMap<u64, &Value> = lines
         .iter()
@@ -161,14 +165,14 @@ fn assert_same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<S
         // Counters may come, too.
         while twin.0.message().is_some() {}
     }
-    assert!(forces > SAMPLES / 2, "{forces}");
+    forces
 }
 
 #[test]
 fn a_twin_sends_the_bytes_of_the_flashed_program() {
     let seed = SEED.to_string();
     let rig = Rig::start(&["--scene", "demo", "--seed", &seed]).unwrap();
-    let (hello, settings, samples) = from_the_rig(&rig);
+    let (hello, settings, samples) = from_the_rig(&rig, SAMPLES);
     let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
     let mut twin = Twin::new(Layout::default());
     let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
@@ -182,7 +186,16 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
     assert_eq!(same, hello);
     let report = twin.ask(Request::GetSettings);
     assert_eq!(report[0], DeviceMessage::Settings(settings));
-    assert_same_samples(&mut twin, &scene, &rig, samples);
+    let forces = same_samples(&mut twin, &scene, &rig, samples);
+    assert!(forces > SAMPLES / 2, "{forces}");
+    rig.finish().unwrap();
+}
+
+/// Gives a device with this flash the model of eight dots.
+fn give_eight_dots(flash: &str) {
+    let rig = Rig::start(&["--fault", "camera-absent", "--flash", flash]).unwrap();
+    let sent = tool(&rig, "update model", &[EIGHT_DOTS]).unwrap();
+    assert_eq!(sent.code, Some(0), "{sent:?}");
     rig.finish().unwrap();
 }
 
@@ -193,14 +206,11 @@ fn a_twin_of_eight_dots_sends_the_bytes_of_the_flashed_program() {
     let folder = tempfile::tempdir().unwrap();
     let flash = folder.path().join("flash");
     let flash = flash.to_str().unwrap();
-    let rig = Rig::start(&["--fault", "camera-absent", "--flash", flash]).unwrap();
-    let sent = tool(&rig, "update model", &[EIGHT_DOTS]).unwrap();
-    assert_eq!(sent.code, Some(0), "{sent:?}");
-    rig.finish().unwrap();
+    give_eight_dots(flash);
     let seed = SEED.to_string();
     let options = ["--scene", "demo", "--seed", &seed, "--layout", "8v"];
     let rig = Rig::start(&[&options[..], &["--flash", flash]].concat()).unwrap();
-    let (hello, _, samples) = from_the_rig(&rig);
+    let (hello, _, samples) = from_the_rig(&rig, SAMPLES);
     let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
     let options = Options {
         layout: eight_dots(),
@@ -215,6 +225,90 @@ fn a_twin_of_eight_dots_sends_the_bytes_of_the_flashed_program() {
     assert_eq!(crc(hello), crc(own));
     let numbers = samples.windows(2).map(|pair| pair[1].frame - pair[0].frame);
     assert!(numbers.into_iter().all(|step| step == 1), "{samples:?}");
-    assert_same_samples(&mut twin, &scene, &rig, samples);
+    let forces = same_samples(&mut twin, &scene, &rig, samples);
+    assert!(forces > SAMPLES / 2, "{forces}");
     rig.finish().unwrap();
+}
+
+/// Two needles.
+const NEEDLES: [Touch; 2] = [
+    Touch {
+        place_mm: [-2.5, 1.0],
+        force_n: 0.05,
+        angles_deg: [3.0, -2.0],
+    },
+    Touch {
+        place_mm: [1.5, 0.5],
+        force_n: 0.05,
+        angles_deg: [0.0, 4.0],
+    },
+];
+/// Samples until both are found and followed.
+const SAMPLES_OF_TWO: usize = 100;
+
+/// A scene of two needles on a film of eight dots, which move as the sensing's model has it.
+fn scene_of_two() -> String {
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, SEED).unwrap();
+    let options = Options {
+        layout: eight_dots(),
+        ..scene.options().clone()
+    };
+    let scene = scene.with_options(options).unwrap();
+    let model = Kind::Ov7725.model(eight_dots());
+    let film = PairFilm::of(model, eight_dots()).unwrap();
+    let moved = film.displacement(&scene, NEEDLES).unwrap();
+    let moved: Vec<_> = eight_dots().centres_mm().into_iter().map(moved).collect();
+    format!("layout = \"8v\"\n[marks]\nmoved_mm = {moved:?}\n")
+}
+
+/// The flashed program finds them within a second, and tells each in every second frame.
+#[test]
+#[ignore = "slow: boots two devices"]
+fn two_needles_are_two_contacts_on_the_flashed_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let flash = folder.path().join("flash");
+    let flash = flash.to_str().unwrap();
+    give_eight_dots(flash);
+    let file = folder.path().join("two.toml");
+    std::fs::write(&file, scene_of_two()).unwrap();
+    let file = file.to_str().unwrap();
+    let rig = Rig::start(&["--scene", file, "--flash", flash]).unwrap();
+    let (_, _, samples) = from_the_rig(&rig, SAMPLES_OF_TWO);
+    let numbers = samples.windows(2).map(|pair| pair[1].frame - pair[0].frame);
+    assert!(numbers.into_iter().all(|step| step <= 3), "{samples:?}");
+    let told = |sample: &Sample| sample.status.contains(Status::TWO_CONTACTS);
+    let first = samples.iter().position(told).expect("two contacts");
+    assert!((20..60).contains(&first), "{first}");
+    assert!(samples[first..].iter().all(told), "{samples:?}");
+    let last = samples.last().unwrap();
+    let mut each = last.each_contact().to_vec();
+    each.sort_by_key(|contact| contact.place.unwrap().x);
+    assert_eq!(each.len(), 2, "{last:?}");
+    for (contact, needle) in each.iter().zip(NEEDLES) {
+        let place = contact.place.unwrap();
+        let off = |um: i32, mm: f64| (1e-3 * f64::from(um) - mm).abs();
+        assert!(off(place.x.0, needle.place_mm[0]) < 0.3, "{contact:?}");
+        assert!(off(place.y.0, needle.place_mm[1]) < 0.3, "{contact:?}");
+        assert!((contact.magnitude.0 - 50_000).abs() < 4_000, "{contact:?}");
+    }
+    let (health, stats) = health_and_stats(&rig);
+    let free = health.stack_bytes - health.stack_used;
+    assert!(free > 4_000, "{health:?}");
+    assert!(stats.processing_us < 12_800, "{stats:?}");
+    rig.finish().unwrap();
+}
+
+fn health_and_stats(rig: &Rig) -> (Health, Stats) {
+    let address = Address::Tty(rig.port().to_owned());
+    let (mut link, _) = Link::connect(&address, PATIENCE).unwrap();
+    let (mut health, mut stats) = (None, None);
+    for request in [Request::GetHealth, Request::GetInfo] {
+        let ask = link.request(request, PATIENCE, |message| match message {
+            DeviceMessage::Health(told) => health = Some(told),
+            DeviceMessage::Stats(told) => stats = Some(told),
+            _ => {}
+        });
+        ask.unwrap();
+    }
+    (health.unwrap(), stats.unwrap())
 }

@@ -2,7 +2,7 @@
 
 use crate::camera::centre;
 use crate::disc::Outline;
-use crate::film::{Film, Pressed};
+use crate::film::{Dots, Film, Pressed};
 use crate::lens::Discs;
 use crate::{Camera, Disc, FILM_DISTANCE_MM, Lens, Load, MarkerTruth, Mechanics, Shutter};
 
@@ -20,6 +20,8 @@ pub(crate) struct Exposure<'a, L: Fn(f64) -> Load> {
     /// Displacement of the film's points at that time, mm, of a film that `now` describes too
     /// coarsely. Then the shutter takes no time.
     pub(crate) exactly: Option<&'a dyn Fn([f64; 2]) -> [f64; 3]>,
+    /// The motion of each marker, mm, if it is not the film's.
+    pub(crate) moved: Option<&'a Dots<[f64; 3]>>,
 }
 
 /// The image of one disc.
@@ -35,7 +37,8 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
     /// Returns the image of a disc.
     pub(crate) fn image(&self, disc: &Disc) -> Image {
         let now = self.outline(disc, |rest| self.displacement(rest));
-        let still = self.exactly.is_some() || *self.shutter == Shutter::default();
+        let still =
+            self.exactly.is_some() || self.moved.is_some() || *self.shutter == Shutter::default();
         let outlines = match still {
             true => vec![now],
             false => self.smeared(disc, &now),
@@ -62,10 +65,21 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
 
     /// Returns the displacement of a point of the film at the frame's time, mm.
     fn displacement(&self, rest_mm: [f64; 2]) -> [f64; 3] {
-        match self.exactly {
-            Some(exactly) => exactly(rest_mm),
-            None => self.now.displacement(rest_mm),
+        match (self.exactly, self.moved) {
+            (Some(exactly), _) => exactly(rest_mm),
+            (None, Some(moved)) => moved.at(self.nearest(rest_mm)),
+            (None, None) => self.now.displacement(rest_mm),
         }
+    }
+
+    /// Returns the marker that is nearest to a point of the film.
+    fn nearest(&self, [x, y]: [f64; 2]) -> usize {
+        let squares = self.film.markers_mm().into_iter().map(|[to_x, to_y]| {
+            let (x, y) = (to_x - x, to_y - y);
+            x * x + y * y
+        });
+        let nearest = squares.enumerate().min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.map_or(0, |(id, _)| id)
     }
 
     fn outline(&self, disc: &Disc, film: impl Fn([f64; 2]) -> [f64; 3]) -> Outline {

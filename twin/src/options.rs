@@ -44,6 +44,9 @@ pub struct Options {
     pub missing: Dots<bool>,
     /// Each marker's shift from its place (by identity), mm along x and y, −1 to 1 each.
     pub glued_mm: Dots<[f64; 2]>,
+    /// Each marker's motion (by identity), mm along x, y and z, −8 to 8 each, in place of the
+    /// film's; `None` where the film moves them. The shutter then takes no time.
+    pub moved_mm: Option<Dots<[f64; 3]>>,
     /// Round patches on the film, painted over the markers in this order.
     pub patches: Vec<Patch>,
     /// Red specks all over the film, under the markers.
@@ -89,6 +92,7 @@ impl Default for Options {
             markers: Paint::Red,
             missing: [false; 4].into(),
             glued_mm: [[0.0; 2]; 4].into(),
+            moved_mm: None,
             patches: Vec::new(),
             specks: Specks::default(),
             checkerboard_px: 0,
@@ -137,6 +141,9 @@ impl Options {
         )?;
         for place in self.glued_mm {
             all_within("glued_mm", place, [-1.0, 1.0])?;
+        }
+        for way in self.moved_mm.into_iter().flatten() {
+            all_within("moved_mm", way, [-8.0, 8.0])?;
         }
         self.film.creep.check()?;
         self.patches.iter().try_for_each(Patch::check)?;

@@ -186,6 +186,15 @@ impl Scene {
         Ok(self.expose(&exposure, load, number))
     }
 
+    /// Returns the film as it is seen under a load.
+    ///
+    /// # Errors
+    /// If the film cannot take the load.
+    pub fn pressed(&self, load: &Load) -> Result<Pressed, SceneError> {
+        self.options.film.check(&self.film, load)?;
+        Ok(self.options.film.seen(&self.film, load))
+    }
+
     /// Returns a frame of a film whose state comes from elsewhere, such as finite elements. The
     /// number selects its noise; the frame's truth has `load`. The film's markers are those of this
     /// scene.
@@ -255,6 +264,7 @@ impl Scene {
             shutter,
             now: self.options.film.seen(&self.film, &load(0.0)),
             exactly: None,
+            moved: self.options.moved_mm.as_ref(),
             load,
         }
     }

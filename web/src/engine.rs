@@ -266,11 +266,11 @@ impl Engine {
             return self.answer(ticket, false, "the device is not there");
         };
         match order {
-            Order::Press(press) => {
+            Order::Press(fingers) => {
                 let Some(simulated) = &self.simulated else {
                     return self.answer(ticket, false, "only a simulated film can be pressed");
                 };
-                simulated.press(press.map(touch));
+                simulated.press(fingers.map(|press| press.map(touch)));
                 self.answer(ticket, true, "");
             }
             Order::Record => {

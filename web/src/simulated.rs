@@ -3,7 +3,7 @@
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
-use hivtac_host::live::hand::{Hand, Touch};
+use hivtac_host::live::hand::{Fingers, Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, Told, device_id};
 use hivtac_twin::{Layout, Scene};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
@@ -43,9 +43,10 @@ impl Simulated {
         })
     }
 
-    /// Presses the film in this way from now on; `None` releases it.
-    pub fn press(&self, touch: Option<Touch>) {
-        self.hand.set(touch.and_then(Touch::in_range));
+    /// Presses the film in this way from now on.
+    pub fn press(&self, fingers: Fingers) {
+        self.hand
+            .set(fingers.map(|touch| touch.and_then(Touch::in_range)));
     }
 
     /// Takes the frames that are due; returns the truth in each, and the time to the next one, µs.

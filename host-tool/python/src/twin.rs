@@ -75,7 +75,7 @@ impl Twin {
                 "a press out of the sensor's range: up to 0.25 N, within ±4 mm, α and β within ±12°",
             ));
         }
-        self.lock().hand.set(touch);
+        self.lock().hand.set([touch, None]);
         Ok(())
     }
 

@@ -3,8 +3,9 @@
 use super::camera::{Camera, Kind};
 use super::course::Course;
 use super::hand::{Following, Hand};
+use super::pair::{self, PairFilm};
 use hivtac_terms::threshold::PixelFormat;
-use hivtac_twin::{Format, Load, Options, Paint, Patch, Scene, SceneError, Shutter, Truth};
+use hivtac_twin::{Format, Frame, Load, Options, Paint, Patch, Scene, SceneError, Shutter, Truth};
 
 /// The light's reflection under `glare`: on the edge of marker 0, where it cuts a part off.
 const GLARE: Patch = Patch {
@@ -65,7 +66,10 @@ pub struct Eye {
     seen: Seen,
     disturbances: Disturbances,
     presses: Presses,
-    following: Following,
+    /// Two fingers.
+    following: [Following; 2],
+    /// What both do together, where that is known.
+    pair: Option<PairFilm>,
 }
 
 /// What a scene as it is seen depends on.
@@ -139,13 +143,15 @@ impl Eye {
             brightness: 1.0,
             shifted_px: 0.0,
         };
+        let layout = given.options().layout;
         let eye = Eye {
             scene: given.clone(),
             given,
             seen,
             disturbances,
             presses,
-            following: Following::new(hand),
+            following: [0, 1].map(|finger| Following::new(hand.clone(), finger)),
+            pair: PairFilm::of(kind.model(layout), layout),
         };
         // A drift that leaves the range of mountings would end the view later.
         Ok(eye)
@@ -163,29 +169,33 @@ impl Eye {
         let shutter = camera.shutter();
         let scene = &self.scene;
         let number = u64::from(number);
-        let hand = self.following.advance(time_s);
+        let [first, second] = self.following.each_mut();
+        let hand = [first.advance(time_s), second.advance(time_s)];
+        if let Some(frame) = self.both(number) {
+            return taken(frame);
+        }
         let own = |load: &dyn Fn(f64) -> Load| scene.frame_under(&shutter, number, load);
+        let finger = |nth: usize| own(&|after_s| self.following[nth].load(after_s));
         let frame = match (&self.presses, hand) {
-            (_, true) => own(&|after_s| self.following.load(after_s)),
-            (Presses::Scene, false) => Ok(scene.frame_by(&shutter, number, time_s)),
-            (Presses::Course(course), false) => own(&|after_s| course.load(time_s + after_s)),
+            (_, [true, _]) => finger(0),
+            (_, [_, true]) => finger(1),
+            (Presses::Scene, _) => Ok(scene.frame_by(&shutter, number, time_s)),
+            (Presses::Course(course), _) => own(&|after_s| course.load(time_s + after_s)),
         };
         // A load that the film's tables do not have is none.
         let frame = frame.or_else(|_| own(&|_| Load::REST));
         let frame = frame.unwrap_or_else(|_| scene.frame_by(&shutter, number, time_s));
-        let words = match frame.format {
-            // The camera sends the high byte first.
-            Format::Rgb565 => frame
-                .pixels
-                .iter()
-                .map(|pixel| pixel.swap_bytes())
-                .collect(),
-            _ => frame.words().into_owned(),
-        };
-        Shot {
-            words,
-            truth: frame.truth,
-        }
+        taken(frame)
+    }
+
+    /// The frame under two fingers; `None` if they do not press, or the film is not known under
+    /// both: then the first finger presses alone.
+    fn both(&self, number: u64) -> Option<Frame> {
+        let [first, second] = &self.following;
+        let touches = pair::in_range([first.touch()?, second.touch()?]);
+        let moved = (self.pair.as_ref()?).displacement(&self.scene, touches)?;
+        let sum = pair::sum(touches);
+        Some(self.scene.render_film(moved, &sum, number))
     }
 
     /// Makes the scene that the camera sees now, if it is another one.
@@ -215,5 +225,22 @@ impl Eye {
         if let Ok(scene) = self.given.clone().with_options(options) {
             self.scene = scene;
         }
+    }
+}
+
+/// A frame as it lies in the device's memory.
+fn taken(frame: Frame) -> Shot {
+    let words = match frame.format {
+        // The camera sends the high byte first.
+        Format::Rgb565 => frame
+            .pixels
+            .iter()
+            .map(|pixel| pixel.swap_bytes())
+            .collect(),
+        _ => frame.words().into_owned(),
+    };
+    Shot {
+        words,
+        truth: frame.truth,
     }
 }

@@ -42,10 +42,13 @@ impl Touch {
     }
 }
 
+/// What each of two fingers does; `None` releases the film.
+pub type Fingers = [Option<Touch>; 2];
+
 /// A hand that another thread moves.
 #[derive(Clone, Debug, Default)]
 pub struct Hand {
-    wanted: Arc<Mutex<Option<Touch>>>,
+    wanted: Arc<Mutex<Fingers>>,
     is_at_once: bool,
 }
 
@@ -58,13 +61,13 @@ impl Hand {
         }
     }
 
-    /// Presses in this way from now on; `None` releases the film.
-    pub fn set(&self, touch: Option<Touch>) {
-        *self.wanted.lock().unwrap_or_else(PoisonError::into_inner) = touch;
+    /// Presses in this way from now on.
+    pub fn set(&self, fingers: Fingers) {
+        *self.wanted.lock().unwrap_or_else(PoisonError::into_inner) = fingers;
     }
 
-    fn wants(&self) -> Option<Touch> {
-        *self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
+    fn wants(&self, finger: usize) -> Option<Touch> {
+        self.wanted.lock().unwrap_or_else(PoisonError::into_inner)[finger]
     }
 
     /// The part of the way to what is wanted that a press goes in this time.
@@ -76,10 +79,11 @@ impl Hand {
     }
 }
 
-/// The press that follows a hand.
+/// The press that follows a finger of a hand.
 #[derive(Clone, Debug)]
 pub struct Following {
     hand: Hand,
+    finger: usize,
     at_s: f64,
     /// The press at that time and at the time before it.
     now: Option<Touch>,
@@ -88,10 +92,11 @@ pub struct Following {
 }
 
 impl Following {
-    /// Follows a hand, which touches nothing at time 0.
-    pub fn new(hand: Hand) -> Self {
+    /// Follows a finger, 0 or 1, which touches nothing at time 0.
+    pub fn new(hand: Hand, finger: usize) -> Self {
         Self {
             hand,
+            finger,
             at_s: 0.0,
             now: None,
             before: None,
@@ -106,7 +111,7 @@ impl Following {
         self.before = self.now;
         let part = self.hand.part(self.step_s);
         let toward = |from: f64, to: f64| from + (to - from) * part;
-        self.now = match (self.now, self.hand.wants()) {
+        self.now = match (self.now, self.hand.wants(self.finger)) {
             // A new touch begins where the hand is, from no force.
             (None, Some(wanted)) => Some(Touch {
                 force_n: toward(0.0, wanted.force_n),
@@ -125,6 +130,11 @@ impl Following {
             (None, None) => None,
         };
         self.now.is_some()
+    }
+
+    /// What the finger does now; `None` if it presses nothing.
+    pub fn touch(&self) -> Option<Touch> {
+        self.now
     }
 
     /// Returns the load at a time in seconds from the one that it was moved on to.
@@ -163,9 +173,9 @@ mod tests {
     #[test]
     fn a_press_follows_the_hand_and_ends_with_it() {
         let hand = Hand::default();
-        let mut following = Following::new(hand.clone());
+        let mut following = Following::new(hand.clone(), 0);
         assert!(!following.advance(0.01));
-        hand.set(Some(TOUCH));
+        hand.set([Some(TOUCH), None]);
         let mut last_n = 0.0;
         for step in 2..60 {
             assert!(following.advance(0.01 * f64::from(step)));
@@ -175,7 +185,7 @@ mod tests {
         }
         assert!((last_n - 0.1).abs() < 1e-6, "{last_n}");
         assert_eq!(following.load(0.0).offset_mm(), [1.0, -2.0]);
-        hand.set(None);
+        hand.set([None; 2]);
         let steps = 60..400;
         let pressed = steps.filter(|step| following.advance(0.01 * f64::from(*step)));
         assert!((5..30).contains(&pressed.count()));
@@ -185,13 +195,13 @@ mod tests {
     #[test]
     fn a_press_at_once_is_there_with_the_next_frame_and_gone_with_it() {
         let hand = Hand::at_once();
-        let mut following = Following::new(hand.clone());
-        hand.set(Some(TOUCH));
+        let mut following = Following::new(hand.clone(), 0);
+        hand.set([Some(TOUCH), None]);
         assert!(following.advance(0.01));
         assert!((following.load(0.0).magnitude_n() - 0.1).abs() < 1e-9);
         // Half a frame earlier it was half there.
         assert!((following.load(-0.005).magnitude_n() - 0.05).abs() < 1e-9);
-        hand.set(None);
+        hand.set([None; 2]);
         assert!(!following.advance(0.02));
     }
 

@@ -14,7 +14,8 @@
 //! | [`camera`] | the camera: its settings, the light that it needs, its times |
 //! | [`device`] | frames and a host's bytes in, messages out |
 //! | [`eye`] | what the camera sees: the scene, its disturbances, and what presses |
-//! | [`hand`] | a press of a person |
+//! | [`hand`] | what one or two fingers of a person press |
+//! | [`pair`] | two presses at once, on a film of eight dots |
 //! | [`course`] | a recorded course of forces |
 //! | [`run`] | the clock: one frame after the other, in real time |
 //! | [`line`] | bytes to and from a host |
@@ -26,4 +27,5 @@ pub mod eye;
 pub mod hand;
 pub mod line;
 mod outbox;
+pub mod pair;
 pub mod run;

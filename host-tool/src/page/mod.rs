@@ -25,7 +25,7 @@ mod unstalled;
 
 pub use feed::{Cursor, Feed, News};
 pub use order::{Answer, Asked, Order, Posted, parse as parse_order};
-pub use press::{Hand, Press, Truth};
+pub use press::{Fingers, Hand, Press, Truth};
 #[cfg(not(target_family = "wasm"))]
 pub use server::{Sensor, Server};
 pub use state::State;

@@ -1,6 +1,6 @@
 //! Orders from the page to a device: read from JSON, passed to the device's thread, and answered.
 
-use super::press::Press;
+use super::press::{Fingers, Press};
 use crate::contact_shape;
 use crate::failure::{Failure, Kind};
 use crate::reply::{CAMERA_PATIENCE, KEEP_PATIENCE};
@@ -35,7 +35,7 @@ pub enum Order {
     /// Keep the settings in use through restarts.
     Keep,
     /// Press the film of a simulated sensor, or release it.
-    Press(Option<Press>),
+    Press(Fingers),
 }
 
 /// What an order asks of a device.
@@ -132,6 +132,8 @@ struct Written {
     format: Option<String>,
     limits: Option<[u8; 6]>,
     press: Option<[f64; 5]>,
+    /// A second finger's press.
+    other: Option<[f64; 5]>,
     contact: Option<String>,
 }
 
@@ -147,8 +149,8 @@ pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
         "model_threshold" => Order::ModelThreshold,
         "record" => Order::Record,
         "stop_recording" => Order::StopRecording,
-        "press" => Order::Press(Some(press(&written)?)),
-        "release" => Order::Press(None),
+        "press" => Order::Press(fingers(&written)?),
+        "release" => Order::Press([None; 2]),
         "threshold" => Order::Threshold(threshold(&written)?),
         "contact" => {
             let shape = written.contact.as_deref().unwrap_or("");
@@ -160,14 +162,15 @@ pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
     Ok((written.sensor, order))
 }
 
-fn press(written: &Written) -> Result<Press, String> {
+fn fingers(written: &Written) -> Result<Fingers, String> {
     let needed = "a press has a place (mm), a force (N) and two angles (degrees)";
-    let [x, y, force_n, alpha, beta] = written.press.ok_or(needed)?;
-    Ok(Press {
+    let first = written.press.ok_or(needed)?;
+    let press = |[x, y, force_n, alpha, beta]: [f64; 5]| Press {
         place_mm: [x, y],
         force_n,
         angles_deg: [alpha, beta],
-    })
+    };
+    Ok([Some(press(first)), written.other.map(press)])
 }
 
 fn threshold(written: &Written) -> Result<Threshold, String> {
@@ -207,9 +210,15 @@ mod tests {
             force_n: 0.1,
             angles_deg: [4.0, 0.0],
         };
-        assert_eq!(parse(press), Ok((0, Order::Press(Some(expected)))));
+        assert_eq!(parse(press), Ok((0, Order::Press([Some(expected), None]))));
+        let both =
+            br#"{"sensor":0,"order":"press","press":[0,0,0.1,0,0],"other":[1.5,-2,0.1,4,0]}"#;
+        let Ok((0, Order::Press([Some(_), second]))) = parse(both) else {
+            panic!("two fingers press");
+        };
+        assert_eq!(second, Some(expected));
         let release = parse(br#"{"sensor":0,"order":"release"}"#);
-        assert_eq!(release, Ok((0, Order::Press(None))));
+        assert_eq!(release, Ok((0, Order::Press([None; 2]))));
     }
 
     #[test]
@@ -223,6 +232,7 @@ mod tests {
             r#"{"sensor":0,"order":"threshold"}"#,
             r#"{"sensor":0,"order":"press"}"#,
             r#"{"sensor":0,"order":"press","press":[0,0,1]}"#,
+            r#"{"sensor":0,"order":"press","other":[0,0,1,0,0]}"#,
             r#"{"sensor":0,"order":"press","press":[0,0,1e999,0,0]}"#,
             r#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[180,0,0,0,0,0]}"#,
             r#"{"sensor":0,"order":"threshold","format":"rgb565","limits":[300,0,0,0,0,0]}"#,

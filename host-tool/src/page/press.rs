@@ -13,8 +13,11 @@ pub struct Press {
     pub angles_deg: [f64; 2],
 }
 
-/// Presses a simulated film; `None` releases it.
-pub type Hand = Box<dyn Fn(Option<Press>) + Send + Sync>;
+/// What each of two fingers presses; `None` releases the film.
+pub type Fingers = [Option<Press>; 2];
+
+/// Presses a simulated film.
+pub type Hand = Box<dyn Fn(Fingers) + Send + Sync>;
 
 /// The true press in a frame: number of the frame; then Fx, Fy, Fz and |F|, µN; α and β,
 /// thousandths of a degree; and the place, µm along x and y, or `None` without a press.

@@ -6,7 +6,7 @@ use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::live::hand::{Hand, Touch};
 use hivtac_host::live::run::Told;
-use hivtac_host::page::{Feed, Press, Sensor, Truth};
+use hivtac_host::page::{Feed, Fingers, Press, Sensor, Truth};
 use hivtac_host::port::Address;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_wire::message::Request;
@@ -37,8 +37,8 @@ pub fn open_twin(arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure>
         _ => {}
     }
     let (mut sensor, opened) = open(&address, (link, hello), feed, arguments);
-    sensor.hand = Some(Box::new(move |press| {
-        hand.set(press.and_then(|press| touch(press).in_range()));
+    sensor.hand = Some(Box::new(move |fingers: Fingers| {
+        hand.set(fingers.map(|press| press.and_then(|press| touch(press).in_range())));
     }));
     Ok((sensor, opened))
 }

@@ -107,6 +107,7 @@ struct MarksSection {
     paint: Option<Paint>,
     missing: Vec<u8>,
     glued_mm: Option<Vec<[f64; 2]>>,
+    moved_mm: Option<Vec<[f64; 3]>>,
     patch: Vec<Patch>,
     specks: u32,
     speck_radius_mm: f64,
@@ -183,6 +184,7 @@ impl SceneFile {
             },
             missing: self.marks.missing(self.layout.count())?,
             glued_mm: self.marks.glued_mm(self.layout.count())?,
+            moved_mm: self.marks.moved_mm(self.layout.count())?,
             layout: self.layout,
             patches: self.marks.patch.clone(),
             specks: Specks {
@@ -235,6 +237,17 @@ impl MarksSection {
             Some(id) => Err(SceneError::Key {
                 key: "missing",
                 why: format!("there is no marker {id}: use 0 to {}", count - 1),
+            }),
+        }
+    }
+
+    fn moved_mm(&self, count: usize) -> Result<Option<Dots<[f64; 3]>>, SceneError> {
+        match &self.moved_mm {
+            None => Ok(None),
+            Some(ways) if ways.len() == count => Ok(Some(Dots::of(ways.iter().copied()))),
+            Some(ways) => Err(SceneError::Key {
+                key: "moved_mm",
+                why: format!("{} motions: use one for each of {count} dots", ways.len()),
             }),
         }
     }
@@ -340,6 +353,7 @@ impl Default for MarksSection {
             paint: None,
             missing: Vec::new(),
             glued_mm: None,
+            moved_mm: None,
             patch: Vec::new(),
             specks: usual.specks.count,
             speck_radius_mm: usual.specks.radius_mm,

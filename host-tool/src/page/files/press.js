@@ -31,6 +31,9 @@ export class Press {
     this.force = FIRST_MN;
     this.angles = [0, 0];
     this.pressed = false;
+    /** The pointer that presses first, and the place of a second one. */
+    this.first = null;
+    this.second = null;
     this.truths = new Map();
     this.compared = null;
     this.listen();
@@ -40,12 +43,13 @@ export class Press {
     const { canvas } = this;
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
+      if (!this.pressed || this.first === null) this.first = event.pointerId;
       this.pressed = true;
-      this.follow(event);
+      this.point(event);
     });
-    canvas.addEventListener("pointermove", (event) => this.pressed && this.follow(event));
+    canvas.addEventListener("pointermove", (event) => this.pressed && this.point(event));
     for (const end of ["pointerup", "pointercancel"]) {
-      canvas.addEventListener(end, () => this.release());
+      canvas.addEventListener(end, (event) => this.lift(event));
     }
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -56,13 +60,38 @@ export class Press {
     window.addEventListener("pagehide", () => this.release());
   }
 
-  /** Takes place, force and tilt from a pointer. */
-  follow(event) {
+  /** The place of a pointer, mm. */
+  placeOf(event) {
     const box = this.canvas.getBoundingClientRect();
     const at = (from, start, length) => ((from - start) / length * 2 - 1) * FILM_MM;
-    const place = [
-      at(event.clientX, box.left, box.width), at(event.clientY, box.top, box.height),
-    ];
+    return [at(event.clientX, box.left, box.width), at(event.clientY, box.top, box.height)];
+  }
+
+  /** Follows the first finger, or a second one that presses with the same force. */
+  point(event) {
+    if (event.pointerId === this.first) {
+      this.follow(event);
+      return;
+    }
+    if (this.second !== null && this.second.pointer !== event.pointerId) return;
+    const place = this.placeOf(event).map((part) => limit(part, FARTHEST_MM));
+    this.second = { pointer: event.pointerId, place };
+    this.send();
+  }
+
+  /** Ends a finger's press: the second one's, or all. */
+  lift(event) {
+    if (event.pointerId === this.first) {
+      this.release();
+    } else if (this.second?.pointer === event.pointerId) {
+      this.second = null;
+      this.send();
+    }
+  }
+
+  /** Takes place, force and tilt from a pointer. */
+  follow(event) {
+    const place = this.placeOf(event);
     if (event.shiftKey) {
       const tilt = place.map((part, axis) => (part - this.place[axis]) * DEG_PER_MM);
       this.angles = tilt.map((angle) => limit(angle, STEEPEST_DEG));
@@ -108,6 +137,7 @@ export class Press {
 
   release() {
     this.pressed = false;
+    this.first = this.second = null;
     this.send();
   }
 
@@ -119,7 +149,9 @@ export class Press {
     while (this.waits) {
       this.waits = false;
       const press = [...this.place, this.force / 1e3, ...this.angles];
-      await (this.pressed ? this.order("press", { press }) : this.order("release"));
+      const other = this.second && [...this.second.place, this.force / 1e3, ...this.angles];
+      const both = other ? { press, other } : { press };
+      await (this.pressed ? this.order("press", both) : this.order("release"));
     }
     this.sends = false;
   }
@@ -141,7 +173,8 @@ export class Press {
   /** Compares a sample with the truth of its frame. */
   compare(sample) {
     const truth = this.truths.get(sample.frame);
-    if (truth) this.compared = { frame: sample.frame, truth, force: sample.force };
+    const { frame, force, parts } = sample;
+    if (truth) this.compared = { frame, truth, force, parts };
   }
 
   draw() {
@@ -193,7 +226,10 @@ export class Press {
     const truth = this.compared?.truth;
     const force = this.compared?.force;
     if (truth?.place) this.arrow(truth.place, truth.vector, "good");
-    if (force?.place && force.magnitude > 1) this.arrow(force.place, force.vector, "size");
+    const parts = this.compared?.parts ?? [];
+    for (const one of parts.length > 0 ? parts : [force]) {
+      if (one?.place && one.magnitude > 1) this.arrow(one.place, one.vector, "size");
+    }
     const tilt = this.angles.some((angle) => angle !== 0)
       ? `, α ${this.angles[0].toFixed(0)}°, β ${this.angles[1].toFixed(0)}°` : "";
     this.say("hand", `${this.pressed ? "pressed with" : "press with"} ` +

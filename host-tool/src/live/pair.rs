@@ -1,0 +1,239 @@
+//! The film under two needles, as the sensing's own model has it.
+//!
+//! The film's tables have one contact. Under two it moves by the mean of two single motions, and
+//! the dots by what the network of `hivtac_sensor::force::forward::pair` adds. So the live twin
+//! shows what the sensing knows of two contacts, and not how well it knows that: for its errors
+//! `docs/results/touches.md` has finite elements.
+
+use super::hand::{MOST_N, Touch};
+use hivtac_sensor::force::forward::pair::{Both, Interaction};
+use hivtac_sensor::force::forward::{Forward, Pose};
+use hivtac_sensor::force::model::Model;
+use hivtac_twin::{Layout, Load, Scene};
+
+/// How far from its middle a dot moves as one, mm.
+const DOT_MM: f64 = 1.0;
+/// Step for the slopes of a dot's image, mm.
+const STEP_MM: f64 = 0.01;
+
+/// What two contacts on a film with these dots do together.
+#[derive(Clone, Debug)]
+pub struct PairFilm {
+    forward: Forward<'static>,
+    interaction: Interaction<'static>,
+    dots_mm: Vec<[f64; 2]>,
+}
+
+impl PairFilm {
+    /// That of a model; `None` if two contacts on its layout are not known.
+    pub fn of(model: &'static [u8], layout: Layout) -> Option<PairFilm> {
+        let forward = Model::parse(model).ok()?.forward?;
+        let interaction = Interaction::of_layout(&forward.rest_image)?;
+        Some(PairFilm {
+            forward,
+            interaction,
+            dots_mm: layout.centres_mm().into_iter().collect(),
+        })
+    }
+
+    /// Returns the motion of a point of the scene's film, mm, under two touches; `None` if the film
+    /// cannot take them.
+    pub fn displacement(
+        &self,
+        scene: &Scene,
+        touches: [Touch; 2],
+    ) -> Option<impl Fn([f64; 2]) -> [f64; 3]> {
+        let together_n = touches[0].force_n + touches[1].force_n;
+        let part = touches[0].force_n / together_n;
+        let [first, second] = touches.map(|touch| {
+            let whole = Touch {
+                force_n: together_n,
+                ..touch
+            };
+            scene.pressed(&load(whole)?).ok()
+        });
+        let (first, second) = (first?, second?);
+        let mean = move |rest: [f64; 2]| -> [f64; 3] {
+            let [a, b] = [&first, &second].map(|film| film.displacement(rest));
+            [0, 1, 2].map(|i| part * a[i] + (1.0 - part) * b[i])
+        };
+        let shifts = self.shifts(scene, touches, &mean)?;
+        let dots_mm = self.dots_mm.clone();
+        Some(move |rest: [f64; 2]| {
+            let [x, y, z] = mean(rest);
+            let near = |dot: &[f64; 2]| libm::hypot(rest[0] - dot[0], rest[1] - dot[1]) < DOT_MM;
+            let [right, down] = dots_mm
+                .iter()
+                .position(near)
+                .map_or([0.0; 2], |id| shifts[id]);
+            [x + right, y + down, z]
+        })
+    }
+
+    /// The shift of each dot along the film, mm, that moves its image as the network says.
+    fn shifts(
+        &self,
+        scene: &Scene,
+        touches: [Touch; 2],
+        mean: &impl Fn([f64; 2]) -> [f64; 3],
+    ) -> Option<Vec<[f64; 2]>> {
+        let [first, second] = touches.map(|touch| {
+            let force_n = load(touch)?.vector_n().map(|part| part as f32);
+            let place_mm = touch.place_mm.map(|part| part as f32);
+            let Forward {
+                stiffness, limits, ..
+            } = &self.forward;
+            Some(Pose::of_force(force_n, place_mm, stiffness, limits))
+        });
+        let moved = self
+            .interaction
+            .moved(&Both::new([first?, second?], &self.forward));
+        let camera = scene.camera();
+        let shifts = self.dots_mm.iter().enumerate().map(|(id, dot)| {
+            let [x, y, z] = mean(*dot);
+            let at =
+                |right: f64, down: f64| camera.project([dot[0] + x + right, dot[1] + y + down, z]);
+            let (here, [a, c], [b, d]) = (at(0.0, 0.0), at(STEP_MM, 0.0), at(0.0, STEP_MM));
+            let slope = |there: f64, from: f64| (there - from) / STEP_MM;
+            let [a, b] = [slope(a, here[0]), slope(b, here[0])];
+            let [c, d] = [slope(c, here[1]), slope(d, here[1])];
+            let px = [2 * id, 2 * id + 1].map(|k| f64::from(moved.at(k)) * camera.focal_px());
+            let whole = a * d - b * c;
+            [
+                (d * px[0] - b * px[1]) / whole,
+                (a * px[1] - c * px[0]) / whole,
+            ]
+        });
+        Some(shifts.collect())
+    }
+}
+
+/// The load of a touch.
+fn load(touch: Touch) -> Option<Load> {
+    let [alpha, beta] = touch.angles_deg;
+    let load = Load::from_angles(touch.force_n, alpha, beta).ok()?;
+    load.with_offset_mm(touch.place_mm).ok()
+}
+
+/// The sum of two touches as one load in their middle, for the truth; no load if there is none.
+pub fn sum(touches: [Touch; 2]) -> Load {
+    let sum = || {
+        let [first, second] = touches.map(|touch| load(touch).map(|load| load.vector_n()));
+        let (first, second) = (first?, second?);
+        let together_n = touches[0].force_n + touches[1].force_n;
+        let part = touches[0].force_n / together_n;
+        let [a, b] = touches.map(|touch| touch.place_mm);
+        let middle_mm = [0, 1].map(|i| part * a[i] + (1.0 - part) * b[i]);
+        let load = Load::from_vector([0, 1, 2].map(|i| first[i] + second[i])).ok()?;
+        load.with_offset_mm(middle_mm).ok()
+    };
+    sum().unwrap_or(Load::REST)
+}
+
+/// Two touches whose forces are together in range.
+pub fn in_range(touches: [Touch; 2]) -> [Touch; 2] {
+    let together_n = touches[0].force_n + touches[1].force_n;
+    let part = (MOST_N / together_n.max(MOST_N)).min(1.0);
+    touches.map(|touch| Touch {
+        force_n: part * touch.force_n,
+        ..touch
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::live::camera::Kind;
+    use crate::live::device::{Captured, Device};
+    use crate::live::eye::{Disturbances, Eye, Presses};
+    use crate::live::hand::Hand;
+    use hivtac_terms::contact_shape::ContactShape;
+    use hivtac_terms::status::Status;
+    use hivtac_twin::Options;
+    use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
+    use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request, Sample};
+    use hivtac_wire::version::HelloPrefix;
+
+    const LEFT: Touch = Touch {
+        place_mm: [-2.5, 1.0],
+        force_n: 0.05,
+        angles_deg: [2.0, -1.0],
+    };
+    const RIGHT: Touch = Touch {
+        place_mm: [1.5, -0.5],
+        force_n: 0.06,
+        angles_deg: [0.0, 3.0],
+    };
+
+    fn ask(device: &mut Device, message: &HostMessage) {
+        let mut buffer = [0; MAX_HOST_FRAME];
+        device.receive(encode(message, &mut buffer).unwrap(), 0);
+        while device.message().is_some() {}
+    }
+
+    /// The samples of frames under two fingers.
+    fn samples(count: u32) -> Vec<Sample> {
+        let (kind, layout) = (Kind::Ov7725, "8v".parse().unwrap());
+        let scene = Scene::preset("rest", kind.preset(), 320, 240, 1).unwrap();
+        let options = Options {
+            layout,
+            ..scene.options().clone()
+        };
+        let scene = scene.with_options(options).unwrap();
+        let hand = Hand::at_once();
+        let usual = Disturbances::default();
+        let mut eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone()).unwrap();
+        let mut device = Device::new(kind, layout, [0; 12], 1.0);
+        ask(&mut device, &HostMessage::Hello(HelloPrefix::OURS.into()));
+        for request in [
+            Request::SetContactShape(ContactShape::Needle),
+            Request::Start,
+        ] {
+            ask(
+                &mut device,
+                &HostMessage::Command(Command { id: 1, request }),
+            );
+        }
+        hand.set([Some(LEFT), Some(RIGHT)]);
+        let sample = |number: u32| {
+            let camera = device.camera();
+            let begun_us = u64::from(number) * 6_405;
+            let frame = Captured {
+                number,
+                begun_us,
+                camera,
+                words: eye.shot(&camera, number, begun_us as f64 * 1e-6).words,
+            };
+            device.frame(&frame, false, || begun_us + 6_405);
+            loop {
+                if let DeviceMessage::Sample(sample) = device.message().unwrap() {
+                    return sample;
+                }
+            }
+        };
+        (1..=count).map(sample).collect()
+    }
+
+    #[test]
+    fn two_fingers_are_two_contacts() {
+        let samples = samples(90);
+        let told = |sample: &&Sample| sample.status.contains(Status::TWO_CONTACTS);
+        let first = samples.iter().position(|sample| told(&sample)).unwrap();
+        assert!((20..80).contains(&first), "{first}");
+        assert!(samples[first..].iter().all(|sample| told(&sample)));
+        let last = samples.last().unwrap();
+        let mut contacts = last.each_contact().to_vec();
+        contacts.sort_by_key(|contact| contact.place.unwrap().x);
+        assert_eq!(contacts.len(), 2, "{last:?}");
+        for (contact, touch) in contacts.iter().zip([LEFT, RIGHT]) {
+            let place = contact.place.unwrap();
+            let off = |um: i32, mm: f64| (1e-3 * f64::from(um) - mm).abs();
+            assert!(off(place.x.0, touch.place_mm[0]) < 0.3, "{contact:?}");
+            assert!(off(place.y.0, touch.place_mm[1]) < 0.3, "{contact:?}");
+            let off_n = 1e-6 * f64::from(contact.magnitude.0) - touch.force_n;
+            assert!(off_n.abs() < 0.006, "{contact:?}");
+        }
+        let sum = last.force.unwrap();
+        assert!((sum.magnitude.0 - 110_000).abs() < 2_000, "{sum:?}");
+    }
+}
