@@ -9,6 +9,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::forward::pairs::PairFilm;
+use hivtac_sensor::force::forward::pair::{Problem, Search, Work, find};
 use hivtac_sensor::force::forward::{
     Column, Estimate, Forward, Markers, Mounting, Observed, Start,
 };
@@ -140,8 +141,13 @@ impl Bench<'_> {
         };
         let one = self.one(&observed, Start::Anywhere);
         let unknown = self.forward.unknown(true);
-        let both = || (self.forward).estimate_pair(&observed, &self.mounting, unknown, &one.pose);
-        let both = (!one.is_explained()).then(both).flatten();
+        let searched = |problem: &Problem<'_>| {
+            let mut search = Search::new(one.pose);
+            search.go_on(problem, &mut { Work::ALL });
+            search.best(problem)
+        };
+        let both = || find(&self.forward, &observed, &self.mounting, unknown, searched);
+        let both = (!one.is_explained()).then(both).flatten().flatten();
         let is_one_without_a_dot = !one.is_explained()
             && (0..images.len()).any(|dot| {
                 let mut others = observed;

@@ -185,7 +185,9 @@ fn is_sound(sensor: &Sensor<'_>, measurement: &Measurement) {
         lost,
         features,
         force,
+        contacts,
     } = measurement;
+    assert!(contacts.is_empty() || force.is_some());
     assert_eq!(force.is_none(), status.intersects(Status::NO_FORCE));
     let is_whole = markers.is_some() && *lost == Lost::NONE;
     assert_eq!(is_whole, features.is_some());
