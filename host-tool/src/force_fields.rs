@@ -140,3 +140,22 @@ impl Serialize for ForceJson {
         fields.end()
     }
 }
+
+/// Returns the torque about the film's middle, N·m, of a force at its place, or of the two contacts
+/// whose sum it is. What has no place adds nothing.
+pub fn torque_nm(force: &Force, contacts: &[Force]) -> [f64; 3] {
+    let parts = match contacts {
+        [_, _] => contacts,
+        _ => std::slice::from_ref(force),
+    };
+    let mut sum = [0.0; 3];
+    for part in parts {
+        let Some(place) = part.place else { continue };
+        let [x, y] = [place.x.0, place.y.0].map(|um| f64::from(um) * 1e-6);
+        let [fx, fy, fz] = part.cartesian.map(|un| f64::from(un.0) * 1e-6);
+        for (sum, own) in sum.iter_mut().zip([y * fz, -x * fz, x * fy - y * fx]) {
+            *sum += own;
+        }
+    }
+    sum
+}

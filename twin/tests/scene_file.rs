@@ -121,7 +121,8 @@ fn documented_defaults_change_nothing() {
                     (chosen.clone() + &text, Scene::from_toml(&chosen).unwrap())
                 }
             };
-            assert_eq!(Scene::from_toml(&text), Ok(expected), "{text}");
+            // A scene is too long to be printed.
+            assert!(Scene::from_toml(&text) == Ok(expected), "{text}");
         }
     }
 }

@@ -1,6 +1,6 @@
 //! A sample as C reads it.
 
-use hivtac_host::force_fields::{FORCE, PLACE};
+use hivtac_host::force_fields::{FORCE, PLACE, torque_nm};
 use hivtac_host::grip::matrix::covariance;
 use hivtac_host::reader::Arrived;
 use hivtac_terms::force::{Force, MOST_CONTACTS};
@@ -57,10 +57,11 @@ impl From<&Arrived> for CSample {
             slip: status.contains(Status::SLIP).into(),
             ..UNKNOWN
         };
+        let contacts = sample.each_contact();
         if let Some(force) = &sample.force {
             told.set(force);
+            told.torque_nm = torque_nm(force, contacts);
         }
-        let contacts = sample.each_contact();
         told.contact_count = contacts.len() as u64;
         for (place, contact) in told.contacts.iter_mut().zip(contacts) {
             *place = CContact::from(contact);
@@ -123,7 +124,6 @@ impl CSample {
         let [_, _, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
         self.has_force = 1;
         self.force_n = [x, y, z];
-        self.torque_nm = [0.0; 3];
         self.magnitude_n = size;
         self.magnitude_sigma_n = size_sigma;
         self.direction_sigma_rad = angle_sigma;
@@ -134,7 +134,6 @@ impl CSample {
             self.has_place = 1;
             self.place_m = [right, down];
             self.place_sigma_m = sigma;
-            self.torque_nm = [down * z, -right * z, right * y - down * x];
         }
     }
 }

@@ -174,7 +174,8 @@ pub fn messages(sample: &Sample, stamp_ns: u64, frames: &Frames) -> Vec<(Channel
     let Sample { force, status, .. } = sample;
     let mut messages = Vec::with_capacity(Channel::ALL.len());
     if let Some(force) = force {
-        messages.push((Channel::Wrench, wrench(stamp_ns, &frames.film, force)));
+        let wrench = wrench(stamp_ns, &frames.film, force, sample.each_contact());
+        messages.push((Channel::Wrench, wrench));
         let place = point(stamp_ns, &frames.film, force);
         messages.extend(place.map(|place| (Channel::Place, place)));
         let each = contacts(stamp_ns, &frames.film, sample.each_contact());

@@ -2,7 +2,7 @@
 
 pub mod channel;
 
-use crate::force_fields::{FORCE, PLACE};
+use crate::force_fields::{FORCE, PLACE, torque_nm};
 use hivtac_terms::force::{Force, Place};
 use hivtac_terms::marker::Marker;
 
@@ -260,12 +260,11 @@ impl Cdr {
     }
 }
 
-/// A [`WRENCH`]. The torque is that of the force at its place, or zero if the place is unknown.
-pub fn wrench(stamp_ns: u64, frame: &str, force: &Force) -> Vec<u8> {
-    let [fx, fy, fz] = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
-    let [x, y] = force.place.map_or([0.0; 2], place_m);
-    let torque = [y * fz, -x * fz, x * fy - y * fx];
-    wrench_of(stamp_ns, frame, [fx, fy, fz], torque)
+/// A [`WRENCH`] of a force, or of the two contacts whose sum it is. Its torque is zero if the place
+/// is unknown.
+pub fn wrench(stamp_ns: u64, frame: &str, force: &Force, contacts: &[Force]) -> Vec<u8> {
+    let force_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    wrench_of(stamp_ns, frame, force_n, torque_nm(force, contacts))
 }
 
 /// A [`WRENCH`] of a force, N, and a torque, N·m.

@@ -38,7 +38,8 @@ pub struct Pairs {
     looked: u8,
     /// A search under way, and the markers for which it looks.
     search: Option<(Search, MarkerList)>,
-    /// Whether the search has this frame's work, where there is not enough for both.
+    /// Whether the search has this frame's work: every second one's, where there is not enough for
+    /// both.
     searches: bool,
 }
 
@@ -63,9 +64,10 @@ impl Pairs {
 
     /// Follows the known contacts to a frame; returns those that explain it.
     fn follow(&mut self, problem: &Problem<'_>, work: &mut Work) -> Option<PairEstimate> {
+        let is_wanted = self.search.is_some() || self.must_look();
         let known = self.known.as_mut()?;
-        self.searches = !self.searches;
-        if self.search.is_some() && self.searches && *work != Work::ALL {
+        self.searches = is_wanted && !self.searches;
+        if self.searches && *work != Work::ALL {
             return None;
         }
         let estimate = follow(known, problem, work);

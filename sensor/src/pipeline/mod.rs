@@ -247,10 +247,14 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// outside [`ContactShape::RADII`] counts as [`ContactShape::Unknown`]. Initially it is
     /// [`ContactShape::Needle`].
     pub fn set_contact_shape(&mut self, shape: ContactShape) {
-        self.contact_shape = match shape.is_sound() {
+        let shape = match shape.is_sound() {
             true => shape,
             false => ContactShape::Unknown,
         };
+        if shape != self.contact_shape {
+            self.pairs = Pairs::NONE;
+        }
+        self.contact_shape = shape;
         self.apply_contact_shape();
     }
 
@@ -294,6 +298,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Call before a frame that the previous one says nothing about. The motion of the markers, and
     /// the noise between the frames, are then unknown.
     pub fn forget_frame(&mut self) {
+        self.pairs = Pairs::NONE;
         self.motion.forget();
         self.noise.forget_frame();
     }

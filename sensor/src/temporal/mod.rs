@@ -122,7 +122,13 @@ impl Temporal {
         }
         let own = seen.force.as_ref();
         let touched = self.contact.follow(&contact, at.time_us, &seen);
-        let slipping = self.slip.follow(&slip, at.time_us, own, touched);
+        // The place of a sum is a mean, which moves where neither contact does.
+        let is_sum = measurement.status.contains(Status::TWO_CONTACTS);
+        if is_sum {
+            self.slip = Slip::NONE;
+        }
+        let of_one = own.filter(|_| !is_sum);
+        let slipping = self.slip.follow(&slip, at.time_us, of_one, touched);
         let mut status = Status(measurement.status.0 & !(Status::CONTACT.0 | Status::SLIP.0));
         for (set, bit) in [
             (touched == Some(true), Status::CONTACT),

@@ -147,3 +147,23 @@ fn what_a_film_may_remember_is_no_contact() {
     assert!(!told(9_400, 4_000));
     assert!(told(9_401, 30_000));
 }
+
+/// The mean place of two contacts moves with their forces, though neither does.
+#[test]
+fn a_sum_of_two_contacts_does_not_slip() {
+    let mut temporal = Temporal::new();
+    let mut slips = |number: u32, status: Status| {
+        let mut force = force_of([20_000, 0, -60_000]);
+        let moved_um = 40 * i32::try_from(number).unwrap();
+        force.place = force.place.map(|place| Place {
+            x: SignedMicrometres(moved_um),
+            ..place
+        });
+        let mut measurement = frame(Some(force), Px(0));
+        measurement.status |= status;
+        let followed = temporal.follow(moment(number), &measurement);
+        followed.status.contains(Status::SLIP)
+    };
+    assert!((0..20).any(|number| slips(number, Status::OK)), "one does");
+    assert!(!(20..60).any(|number| slips(number, Status::TWO_CONTACTS)));
+}

@@ -48,11 +48,13 @@ pub fn contacts<'a>(
     force: Option<&'a Force>,
     parts: &'a ContactList,
 ) -> &'a [Force] {
-    if status.contains(Status::TWO_CONTACTS) {
-        return parts;
+    if !status.contains(Status::CONTACT) {
+        return &[];
     }
-    let one = force.filter(|_| status.contains(Status::CONTACT));
-    one.map_or(&[], core::slice::from_ref)
+    match status.contains(Status::TWO_CONTACTS) {
+        true => parts,
+        false => force.map_or(&[], core::slice::from_ref),
+    }
 }
 
 /// The point of the film under the tip, named by its position at rest in the film frame; (0, 0) is

@@ -16,7 +16,8 @@ use hivtac_wire::message::{DeviceHello, Outcome, Sample};
 use hivtac_wire::settings::Name;
 use hivtac_wire::version::HelloPrefix;
 
-/// Steps to two contacts in a frame that one does not explain: the time of a frame allows one.
+/// Steps to two contacts in a frame that one does not explain: with one, a sample takes the time of
+/// two frames.
 pub const STEPS_A_FRAME: Work = Work(1);
 
 /// What identifies a device to a host.

@@ -1,4 +1,5 @@
-// Draws the force, or each of two contacts, as an arrow on the film, seen from the tip's side, with the sensor's x, y and z.
+// Draws the force, or each of two contacts, as an arrow on the film, seen from the tip's side, with
+// the sensor's x, y and z.
 
 /** Half the side of the drawn film, and the distance of its markers along x and y, mm. */
 const FILM_MM = 5;

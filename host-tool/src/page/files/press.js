@@ -47,7 +47,11 @@ export class Press {
       this.pressed = true;
       this.point(event);
     });
-    canvas.addEventListener("pointermove", (event) => this.pressed && this.point(event));
+    canvas.addEventListener("pointermove", (event) => {
+      // A mouse follows a press by keys without a button; it is no second finger.
+      if (this.pressed && this.first === null) this.follow(event);
+      else if (this.pressed && event.buttons !== 0) this.point(event);
+    });
     for (const end of ["pointerup", "pointercancel"]) {
       canvas.addEventListener(end, (event) => this.lift(event));
     }

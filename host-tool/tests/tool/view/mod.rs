@@ -180,7 +180,7 @@ fn events_carry_forces_and_how_the_device_stands() {
         [1250, -730, 85]
     ]);
     let status = 1 << 13 | 1 << 16;
-    assert_eq!(row, json!([59, 59, 59 * 33_333, status, force]));
+    assert_eq!(row, json!([59, 59, 59 * 33_333, status, force, []]));
     let state = view.events().state(0, |state| state["rate_hz"].is_f64());
     let rate = state["rate_hz"].as_f64().unwrap();
     assert!((rate - 30.0).abs() < 0.01, "{state}");
