@@ -62,7 +62,8 @@ fn a_look_that_comes_too_late_is_given_up() {
         let stats = run.stats();
         let dropped = stats.dropped_busy + stats.dropped_overrun + stats.dropped_size;
         let counted = stats.frames_processed + dropped + stats.dropped_setup;
-        assert!(stats.frames_exposed.abs_diff(counted) <= 2, "{stats:?}");
+        // One is measured, one waits, and one is being exposed.
+        assert!(stats.frames_exposed.abs_diff(counted) <= 3, "{stats:?}");
         assert!(run.missing_frames().len() <= dropped as usize, "{stats:?}");
         assert!(run.samples().len() >= 20, "{stats:?}");
     }

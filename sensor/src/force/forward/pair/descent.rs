@@ -233,7 +233,9 @@ impl Point {
         let all = columns.iter_mut().zip(&self.prediction.slopes);
         for (rows, column) in all.chain([(&mut side, &self.left)]) {
             if let Some(rows) = rows.get_mut(..markers) {
-                rows.copy_from_slice(column);
+                for (row, own) in rows.iter_mut().zip(column.iter()) {
+                    *row = *own;
+                }
                 whitening.whiten(rows);
             }
         }
