@@ -314,6 +314,27 @@ fn what_is_no_usbip_is_sent_away() {
     }
 }
 
+/// A client that never reads its answers is sent away; the rig goes on.
+#[test]
+fn one_that_sends_and_never_reads_is_sent_away() {
+    let rig = Rig::start(&[]);
+    let (mut client, status) = rig.import("1-1");
+    assert_eq!(status, 0);
+    client.stream.set_write_timeout(Some(PATIENCE)).unwrap();
+    let mut unlink: Vec<u8> = [2, 1, 0x1_0001, 0, 0, 1]
+        .into_iter()
+        .flat_map(u32::to_be_bytes)
+        .collect();
+    unlink.resize(48, 0);
+    let many = unlink.repeat(1 << 14);
+    let end = (0..128).find_map(|_| client.stream.write_all(&many).err());
+    let end = end.expect("100 MB of answers wait").kind();
+    assert_ne!(end, std::io::ErrorKind::WouldBlock);
+    assert_eq!(rig.import("1-1").1, 0);
+    let (_, said) = rig.end();
+    assert!(said.contains("it does not read"), "{said}");
+}
+
 /// A device that leaves the bus ends the connection.
 #[test]
 fn a_host_is_left_when_the_cable_is_pulled_at_the_device() {

@@ -20,7 +20,7 @@ use crate::{artifacts, packages, process, toolchain};
 
 /// How often each action is tried.
 const TIMES: u64 = 20;
-/// The longest duration of the whole; usual are some eight minutes.
+/// The longest duration of the whole; usual are nine to sixteen minutes.
 const LIMIT: Duration = Duration::from_secs(45 * 60);
 /// The package that needs the present kernel's.
 const KERNEL: &str = "linux-image-amd64";

@@ -18,6 +18,10 @@ use crate::usb_host::Host;
 
 /// The longest duration of one check for a client, ms.
 const LOOK: u8 = 20;
+/// The most bytes of one read call.
+const PART: usize = 1 << 12;
+/// The most bytes that are read at a time: a client that sends on and on does not hold the run.
+pub(crate) const ROUND: usize = 16 * PART;
 
 /// A byte stream with or without a client at its other end.
 pub trait Endpoint: Send + std::fmt::Debug {
@@ -141,11 +145,11 @@ fn nonblocking(descriptor: impl AsFd) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Reads all available bytes. Returns false if the other end is gone.
-pub(crate) fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
+/// Reads the available bytes, at most [`ROUND`]. Returns false if the other end is gone.
+pub(crate) fn read_some(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
     use nix::errno::Errno;
-    let mut buffer = [0; 4096];
-    loop {
+    let mut buffer = [0; PART];
+    for _ in 0..ROUND / PART {
         match nix::unistd::read(&descriptor, &mut buffer) {
             Ok(0) => return false,
             Ok(length) => to.extend(&buffer[..length]),
@@ -154,6 +158,7 @@ pub(crate) fn read_all(descriptor: impl AsFd, to: &mut VecDeque<u8>) -> bool {
             Err(_) => return false,
         }
     }
+    true
 }
 
 /// Writes until the other end takes no more. Returns false if it is gone.
@@ -168,4 +173,32 @@ pub(crate) fn write_all(descriptor: impl AsFd, from: &mut VecDeque<u8>) -> bool 
         }
     }
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::Write;
+    use std::os::unix::net::UnixStream;
+
+    #[test]
+    fn a_client_that_sends_much_is_read_in_rounds() {
+        let (near, mut far) = UnixStream::pair().unwrap();
+        for stream in [&near, &far] {
+            stream.set_nonblocking(true).unwrap();
+        }
+        let mut sent = 0;
+        while let Ok(length) = far.write(&[7; PART]) {
+            sent += length;
+        }
+        assert!(sent > ROUND, "the system takes {sent} bytes");
+        let mut got = VecDeque::new();
+        while got.len() < sent {
+            let before = got.len();
+            assert!(read_some(&near, &mut got));
+            assert!(got.len() <= before + ROUND);
+        }
+        drop(far);
+        assert!(!read_some(&near, &mut got));
+    }
 }

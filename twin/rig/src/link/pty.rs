@@ -15,7 +15,7 @@ use nix::sys::inotify::{AddWatchFlags, InitFlags, Inotify};
 use nix::sys::stat::Mode;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 
-use super::{Endpoint, nonblocking, read_all, write_all};
+use super::{Endpoint, nonblocking, read_some, write_all};
 
 /// A pseudo-terminal whose other side a client may open.
 #[derive(Debug)]
@@ -93,7 +93,7 @@ impl Endpoint for Pty {
 
     fn read(&mut self, to: &mut VecDeque<u8>) {
         // While the rig holds the terminal, the other side is never gone.
-        read_all(&self.master, to);
+        read_some(&self.master, to);
     }
 
     fn write(&mut self, from: &mut VecDeque<u8>) {

@@ -6,7 +6,7 @@ use std::os::fd::{AsFd, BorrowedFd};
 
 use anyhow::Context;
 
-use super::{Endpoint, read_all, write_all};
+use super::{Endpoint, read_some, write_all};
 
 /// A listener and its present client.
 #[derive(Debug)]
@@ -65,7 +65,7 @@ impl Endpoint for Tcp {
         if self
             .client
             .as_ref()
-            .is_some_and(|client| !read_all(client, to))
+            .is_some_and(|client| !read_some(client, to))
         {
             self.client = None;
         }

@@ -34,6 +34,8 @@ const CONTROL_TIMEOUT_NS: u64 = 5_000_000_000;
 const ATTEMPTS: u32 = 3;
 /// The most transfers that wait.
 const MOST: usize = 1024;
+/// The most bytes that they move together.
+const MOST_BYTES: usize = 1 << 24;
 /// Linux' hub driver reads so much of the device descriptor, from address 0, right after it reset
 /// the port. Nothing else in Linux asks for 64 bytes of it.
 const FIRST_AFTER_RESET: [u8; 8] = [0x80, 6, 0, 1, 0, 0, 64, 0];
@@ -139,9 +141,14 @@ impl Urbs {
     /// Adds a transfer.
     ///
     /// # Errors
-    /// If too many wait.
+    /// If too many wait, or they move too many bytes.
     pub fn submit(&mut self, urb: Urb) -> anyhow::Result<()> {
         anyhow::ensure!(self.waiting() < MOST, "more than {MOST} transfers wait");
+        let bytes = self.waiting_bytes() + urb.length;
+        anyhow::ensure!(
+            bytes <= MOST_BYTES,
+            "transfers of {bytes} bytes wait; at most {MOST_BYTES} are possible"
+        );
         if urb.endpoint & 0x7F == 0 {
             self.control.push_back(urb);
         } else {
@@ -176,6 +183,13 @@ impl Urbs {
     pub fn waiting(&self) -> usize {
         let of_queues: usize = self.queues.iter().map(|queue| queue.waiting.len()).sum();
         self.control.len() + of_queues
+    }
+
+    /// Returns the number of bytes that the transfers that wait move.
+    fn waiting_bytes(&self) -> usize {
+        let of_queues = self.queues.iter().flat_map(|queue| &queue.waiting);
+        let waiting = self.control.iter().chain(of_queues);
+        waiting.map(|urb| urb.length).sum()
     }
 
     /// Makes the next packet of every endpoint DATA0, as a bus reset does.
@@ -270,10 +284,10 @@ impl Urbs {
 }
 
 impl Queue {
-    /// Forgets what the first transfer has moved.
+    /// Forgets what the first transfer has moved, and until when it waits.
     fn begin(&mut self) {
         self.moved.clear();
-        (self.sent, self.silent) = (0, 0);
+        (self.sent, self.silent, self.due_ns) = (0, 0, 0);
     }
 
     /// Asks the device for a packet of at most `size` bytes.
@@ -452,6 +466,37 @@ mod tests {
         assert_eq!(ends(&mut urbs, 20).len(), 2);
         let many = (0..=MOST as u32).map(|number| urbs.submit(urb(number, 0x81, [0; 8])));
         assert_eq!(many.filter(Result::is_err).count(), 1);
+    }
+
+    #[test]
+    fn the_bytes_of_waiting_transfers_are_bounded() {
+        let mut urbs = Urbs::default();
+        let half = |number, endpoint| Urb {
+            length: MOST_BYTES / 2,
+            ..urb(number, endpoint, [0; 8])
+        };
+        urbs.submit(half(1, 1)).unwrap();
+        urbs.submit(half(2, 0)).unwrap();
+        let why = urbs.submit(urb(3, 0x81, [0; 8])).unwrap_err().to_string();
+        assert!(why.contains("16777224 bytes"), "{why}");
+        urbs.unlink(1);
+        urbs.submit(half(4, 0x81)).unwrap();
+    }
+
+    /// A long period counts for the transfer that gave it, not for those after it.
+    #[test]
+    fn a_poll_that_is_put_off_does_not_outlive_its_transfer() {
+        let off: [fn(&mut Urbs); 2] = [|urbs| assert_ne!(urbs.unlink(1), 0), Urbs::restart];
+        for off in off {
+            let mut urbs = Urbs::default();
+            urbs.submit(urb(1, 0x81, [0; 8])).unwrap();
+            urbs.queues[place(0x81)].due_ns = u64::MAX;
+            assert_eq!(ends(&mut urbs, 10), []);
+            off(&mut urbs);
+            urbs.submit(urb(2, 0x81, [0; 8])).unwrap();
+            let found = ends(&mut urbs, 10);
+            assert_eq!(found.last(), Some(&(2, status::SILENT)));
+        }
     }
 
     #[test]

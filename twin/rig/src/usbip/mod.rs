@@ -10,12 +10,12 @@ use std::collections::VecDeque;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::os::fd::AsFd;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
 
-use crate::link::{Plug, Traffic, read_all, write_all};
+use crate::link::{Plug, ROUND, Traffic, read_some, write_all};
 use crate::usb_host::{Host, Presence};
 use wire::{Command, Refusal, Request};
 
@@ -23,6 +23,12 @@ use wire::{Command, Refusal, Request};
 const LOOK: u8 = 20;
 /// The most connections at a time.
 const MOST: usize = 16;
+/// The longest duration, by the clock on the wall, until a connection has asked for something.
+const ASKING: Duration = Duration::from_secs(10);
+/// The most bytes that a connection without the device sends ahead.
+const AHEAD: usize = ROUND;
+/// The most bytes that wait for a connection to read them.
+const BEHIND: usize = 4 * wire::LARGEST_TRANSFER;
 
 /// A server for one device.
 #[derive(Debug)]
@@ -53,6 +59,8 @@ struct Visitor {
     input: VecDeque<u8>,
     output: VecDeque<u8>,
     state: State,
+    /// The time at which its request must be complete.
+    until: Instant,
 }
 
 impl Server {
@@ -89,6 +97,7 @@ impl Server {
                     input: VecDeque::new(),
                     output: VecDeque::new(),
                     state: State::Asks,
+                    until: Instant::now() + ASKING,
                 });
             }
         }
@@ -180,7 +189,7 @@ impl Visitor {
     /// Reads what has come. Returns whether anything has.
     fn read(&mut self) -> bool {
         let before = self.input.len();
-        if !read_all(&self.stream, &mut self.input) {
+        if !read_some(&self.stream, &mut self.input) {
             self.state = State::Gone;
         }
         self.input.len() > before
@@ -193,6 +202,7 @@ impl Visitor {
         {
             self.state = State::Waits(request);
         }
+        self.check_limits()?;
         if self.state != State::Has {
             return Ok(());
         }
@@ -215,6 +225,25 @@ impl Visitor {
         Ok(())
     }
 
+    /// Checks that it asks in time, waits for its answer, and reads.
+    fn check_limits(&self) -> anyhow::Result<()> {
+        ensure!(
+            self.state != State::Asks || Instant::now() < self.until,
+            "it asked for nothing within {} s",
+            ASKING.as_secs()
+        );
+        let (ahead, behind) = (self.input.len(), self.output.len());
+        ensure!(
+            self.state == State::Has || ahead <= AHEAD,
+            "it sent {ahead} bytes on without the device; at most {AHEAD} are possible"
+        );
+        ensure!(
+            behind <= BEHIND,
+            "it does not read: {behind} bytes wait for it; at most {BEHIND} are possible"
+        );
+        Ok(())
+    }
+
     fn take_done(&mut self, host: &mut Host) {
         while let Some(done) = host.next_done() {
             self.output.extend(wire::submitted(&done));
@@ -231,5 +260,80 @@ impl Visitor {
             self.state = State::Gone;
         }
         self.output.len() < before
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arrivals::Arrivals;
+    use crate::faults::Faults;
+    use std::io::Write;
+
+    const LIST: [u8; 8] = [1, 0x11, 0x80, 5, 0, 0, 0, 0];
+
+    /// Returns a server, and a host without a device: who asks for it waits.
+    fn server() -> (Server, Host) {
+        let host = Host::new(Faults::default(), Arrivals::default());
+        (Server::listen(0).unwrap(), host.of_client())
+    }
+
+    fn connect(server: &mut Server) -> TcpStream {
+        let before = server.visitors.len();
+        let address = (Ipv4Addr::LOCALHOST, server.port().unwrap());
+        let client = TcpStream::connect(address).unwrap();
+        while server.visitors.len() == before {
+            server.accept();
+        }
+        client
+    }
+
+    #[test]
+    fn one_that_sends_on_before_its_answer_is_sent_away() {
+        let (mut server, mut host) = server();
+        let mut client = connect(&mut server);
+        client.write_all(&LIST).unwrap();
+        client.set_nonblocking(true).unwrap();
+        for _ in 0..1000 {
+            // The system may take no more for now.
+            let _ = client.write(&[0; ROUND]);
+            server.exchange(&mut host, true);
+            let held = server.visitors.iter().map(|visitor| visitor.input.len());
+            assert!(held.sum::<usize>() <= AHEAD);
+        }
+        assert!(!server.connected());
+    }
+
+    #[test]
+    fn one_that_does_not_read_is_sent_away() {
+        for (length, is_kept) in [(BEHIND, true), (2 * BEHIND, false)] {
+            let (mut server, mut host) = server();
+            let _client = connect(&mut server);
+            let visitor = &mut server.visitors[0];
+            visitor.state = State::Leaves;
+            // What the system itself keeps does not count.
+            while visitor.stream.write(&[0; ROUND]).is_ok() {}
+            visitor.output.resize(length, 0);
+            let _ = [(); 2].map(|()| server.exchange(&mut host, true));
+            assert_eq!(server.connected(), is_kept);
+        }
+    }
+
+    #[test]
+    fn those_that_ask_for_nothing_are_sent_away_in_time() {
+        let (mut server, mut host) = server();
+        let mut clients: Vec<TcpStream> = (0..MOST).map(|_| connect(&mut server)).collect();
+        clients[0].write_all(&LIST).unwrap();
+        clients[1].write_all(&LIST[..7]).unwrap();
+        while server.visitors[0].state == State::Asks {
+            server.exchange(&mut host, true);
+        }
+        assert_eq!(server.visitors.len(), MOST);
+        for visitor in &mut server.visitors {
+            visitor.until = Instant::now();
+        }
+        server.exchange(&mut host, true);
+        assert_eq!(server.visitors.len(), 1, "one has asked");
+        connect(&mut server);
     }
 }
