@@ -44,7 +44,7 @@ impl PairFilm {
         touches: [Touch; 2],
     ) -> Option<impl Fn([f64; 2]) -> [f64; 3]> {
         let together_n = touches[0].force_n + touches[1].force_n;
-        if !(together_n > 0.0) {
+        if together_n <= 0.0 {
             return None;
         }
         let part = touches[0].force_n / together_n;
