@@ -145,9 +145,9 @@ class Sample:
     place_sigma: float | None
     """Standard uncertainty of each coordinate of the place, m."""
     contacts: tuple[Contact, ...]
-    """Each contact: one, two, or none if nothing touches the film. `force` is their sum, or what the
-    settings filter and creep make of it. None, too, if `status` has `two_contacts` and the two are
-    not told apart."""
+    """Each contact: one, two, or none if nothing touches the film. `force` is their sum, or what
+    the settings filter and creep make of it. None, too, if `status` has `two_contacts` and the two
+    are not told apart."""
     markers: Floats | None
     """(N, 2): column and row of each marker, px; `None` if not all were found."""
     marker_areas: npt.NDArray[np.int64] | None

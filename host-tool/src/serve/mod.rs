@@ -48,8 +48,8 @@ const LAST_DOMAIN: u16 = 232;
 /// For a hivtac that was built with it: `cargo install --path host-tool --features
 /// ros2,foxglove`. Prints `ready` and where; goes on after a lost connection, which diagnostics
 /// tell. Topics of the node, each below its name: `wrench`, `place`, `contacts`, `markers`,
-/// `contact`, `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are below
-/// /NODE/SENSOR, those of a grip below /NODE/grip.
+/// `contact`, `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are
+/// below /NODE/SENSOR, those of a grip below /NODE/grip.
 ///
 /// Example: hivtac serve --ros2 --foxglove
 #[derive(Args)]

@@ -148,8 +148,9 @@ fn inverse<const COUNT: usize>(upper: &[[f32; COUNT]; COUNT]) -> [[f32; COUNT]; 
     for column in 0..COUNT {
         inverse[column][column] = 1.0 / upper[column][column];
         for row in (0..column).rev() {
-            let sum =
-                (row + 1..=column).fold(0.0, |sum, k| sum + upper[row][k] * inverse[k][column]);
+            let below = upper[row].iter().zip(&inverse).skip(row + 1);
+            let below = below.take(column - row);
+            let sum = below.fold(0.0, |sum, (own, inverse)| sum + own * inverse[column]);
             inverse[row][column] = -sum * inverse[row][row];
         }
     }

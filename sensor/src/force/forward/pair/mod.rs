@@ -251,7 +251,9 @@ fn far_mm(one: &Pose, other: &Pose) -> f32 {
 fn slope_of_direction(pose: &Pose, way: usize) -> [f32; 3] {
     let [back, forth] = [-STEP, STEP].map(|step| {
         let mut there = *pose;
-        there.tilt[way] += step;
+        if let Some(tilt) = there.tilt.get_mut(way) {
+            *tilt += step;
+        }
         there.direction()
     });
     core::array::from_fn(|i| (forth[i] - back[i]) / (2.0 * STEP))
