@@ -57,6 +57,7 @@ fn assert_forces(run: &Run, missing: usize) {
 /// Data sheets and drivers disagree about the values of some registers after a reset. The rig gives
 /// them different values for each seed, and ends a run that captures a frame which depends on one.
 #[test]
+#[ignore = "9 s"]
 fn no_frame_depends_on_a_register_that_nobody_wrote() {
     for seed in [2, 3, 4] {
         let setup = Setup {

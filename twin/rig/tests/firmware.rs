@@ -109,6 +109,7 @@ fn another_seed_gives_other_forces() {
 }
 
 #[test]
+#[ignore = "8 s: all tests have a step at half speed"]
 fn half_as_many_instructions_per_second_are_enough() {
     let setup = Setup {
         instructions_per_second: INSTRUCTIONS_PER_SECOND / 2,

@@ -141,6 +141,7 @@ fn it_breathes_while_frames_give_forces() {
 
 /// The threshold is darker than all markers.
 #[test]
+#[ignore = "10 s of a lamp"]
 fn it_blinks_once_a_second_when_frames_give_no_force() {
     let nothing = Threshold::Mono(Mono { low: 0, high: 0 });
     let pattern = shown(openmv(3_700).at(380, set_threshold(31, nothing)));

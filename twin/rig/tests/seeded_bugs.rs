@@ -161,6 +161,7 @@ fn a_stamp_that_usb_delays_is_late() {
 /// The host begins with DATA0 after each SET_CONFIGURATION, and takes a packet with another toggle
 /// for one that it has.
 #[test]
+#[ignore = "18 s: packets are lost one by one"]
 fn a_toggle_that_outlives_a_configuration_loses_packets() {
     let repeated = |bug: Option<Bug>| {
         let mut setup = Setup::new(other("seeded-bugs"), 420);
