@@ -141,6 +141,17 @@ impl Serialize for ForceJson {
     }
 }
 
+/// Returns a place along x and y from the film's middle, m.
+pub fn place_m(place: Place) -> [f64; 2] {
+    [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
+}
+
+/// Returns the place of a force along x and y and its standard uncertainty, m; NaN if unknown.
+pub fn place_si(force: &Force) -> [f64; 3] {
+    let place = force.place.as_ref();
+    place.map_or([f64::NAN; 3], |place| PLACE.map(|it| it.si(place)))
+}
+
 /// Returns the torque about the film's middle, N·m, of a force at its place, or of the two contacts
 /// whose sum it is. What has no place adds nothing.
 pub fn torque_nm(force: &Force, contacts: &[Force]) -> [f64; 3] {
@@ -151,7 +162,7 @@ pub fn torque_nm(force: &Force, contacts: &[Force]) -> [f64; 3] {
     let mut sum = [0.0; 3];
     for part in parts {
         let Some(place) = part.place else { continue };
-        let [x, y] = [place.x.0, place.y.0].map(|um| f64::from(um) * 1e-6);
+        let [x, y] = place_m(place);
         let [fx, fy, fz] = part.cartesian.map(|un| f64::from(un.0) * 1e-6);
         for (sum, own) in sum.iter_mut().zip([y * fz, -x * fz, x * fy - y * fx]) {
             *sum += own;

@@ -73,10 +73,13 @@ pub const KIT: Environment = Environment {
     needs: "Python 3.10, 1 GB, and build123d's solid modeller for this computer",
 };
 
+/// The Python of an environment that is complete.
+pub struct Python(pub PathBuf);
+
 impl Environment {
     /// Makes the environment if missing; returns the obstacle, if there is one.
     pub fn obstacle(&self) -> Option<String> {
-        let error = self.python().err()?;
+        let error = self.ready().err()?;
         process::say(&format!("{error:#}"));
         Some(format!(
             "pip cannot install {}: is there python3 with venv (package python3-venv), and PyPI \
@@ -86,7 +89,7 @@ impl Environment {
     }
 
     /// Its Python, with the packages installed.
-    pub fn python(&self) -> Result<PathBuf> {
+    pub fn ready(&self) -> Result<Python> {
         let folder = toolchain::at("target").join(self.folder);
         let python = folder.join("bin/python");
         let import = format!("import {}", self.modules);
@@ -94,31 +97,31 @@ impl Environment {
             process::run(process::command("python3 -m venv --clear").arg(&folder))?;
             process::run(pip(&python).args(self.packages.split(' ')))?;
         }
-        Ok(python)
+        Ok(Python(python))
     }
+}
 
+impl Python {
     /// Installs packages of this project as a user does, but Rust in the profile of the tests'
     /// other programs.
     fn install(&self, folders: &[&str]) -> Result<()> {
-        let python = self.python()?;
-        let mut install = pip(&python);
+        let mut install = pip(&self.0);
         install.args("--no-build-isolation --force-reinstall --no-deps".split(' '));
         install.args(folders);
         // The build backend finds maturin in this folder.
         let path = std::env::var("PATH").unwrap_or_default();
-        let programs = python.with_file_name("");
+        let programs = self.0.with_file_name("");
         install.env("PATH", format!("{}:{path}", programs.display()));
         install.env("MATURIN_PEP517_ARGS", "--profile tools");
         process::run(install.current_dir(toolchain::at("")))
     }
 
-    /// The command that runs a file's tests, with the host tool named to them.
-    fn tests(&self, options: &[&str], file: &str) -> Result<Command> {
-        let mut command = Command::new(self.python()?);
-        command.args(options).arg(file);
-        command.env("HIVTAC_TOOL", artifacts::host_tool()?);
+    /// The command that runs a file's tests, with this host tool named to them.
+    fn tests(&self, options: &[&str], file: &str, tool: PathBuf) -> Command {
+        let mut command = Command::new(&self.0);
+        command.args(options).arg(file).env("HIVTAC_TOOL", tool);
         command.current_dir(toolchain::at(""));
-        Ok(command)
+        command
     }
 }
 
@@ -135,53 +138,74 @@ pub fn pip(python: &Path) -> Command {
 /// Installs Python's `hivtac`, runs its tests on the firmware in the rig, and checks its
 /// annotations.
 pub fn test_package(tally: &mut Tally) -> Result<()> {
-    PACKAGE.install(&["./host-tool/python"])?;
-    let mut types = Command::new(PACKAGE.python()?);
+    let python = PACKAGE.ready()?;
+    python.install(&["./host-tool/python"])?;
+    let mut types = Command::new(&python.0);
     types.args("-m mypy --strict --cache-dir target/mypy host-tool/python/hivtac".split(' '));
     process::run(types.current_dir(toolchain::at("")))?;
-    let tests = PACKAGE.tests(&STRICT, "host-tool/python/tests/test_hivtac.py")?;
-    run_tests(&mut on_rig(tests)?, tally)
+    let (file, tool) = (
+        "host-tool/python/tests/test_hivtac.py",
+        artifacts::host_tool()?,
+    );
+    run_tests(&mut on_rig(python.tests(&STRICT, file, tool))?, tally)
 }
 
 /// Records with LeRobot from the simulated sensor, and loads what was recorded.
 pub fn test_lerobot(tally: &mut Tally) -> Result<()> {
-    LEROBOT.install(&["./host-tool/python", "./host-tool/lerobot"])?;
+    let python = LEROBOT.ready()?;
+    python.install(&["./host-tool/python", "./host-tool/lerobot"])?;
+    let tool = artifacts::host_tool()?;
     run_tests(
-        &mut LEROBOT.tests(&[], "tests/python/test_lerobot.py")?,
+        &mut python.tests(&[], "tests/python/test_lerobot.py", tool),
         tally,
     )
 }
 
 /// Logs the simulated sensor and a recording into files of Rerun, and reads these.
 pub fn test_rerun(tally: &mut Tally) -> Result<()> {
-    RERUN.install(&["./host-tool/python"])?;
-    run_tests(&mut RERUN.tests(&[], "tests/python/test_rerun.py")?, tally)
+    let python = RERUN.ready()?;
+    python.install(&["./host-tool/python"])?;
+    let tool = artifacts::host_tool()?;
+    run_tests(
+        &mut python.tests(&[], "tests/python/test_rerun.py", tool),
+        tally,
+    )
 }
 
 /// Presses the simulated sensor in a program's own time, and in a simulation of MuJoCo.
 pub fn test_mujoco(tally: &mut Tally) -> Result<()> {
-    MUJOCO.install(&["./host-tool/python"])?;
-    let mut tests = MUJOCO.tests(&STRICT, "tests/python/test_twin.py")?;
-    run_tests(&mut tests, tally)
+    let python = MUJOCO.ready()?;
+    python.install(&["./host-tool/python"])?;
+    let tool = artifacts::host_tool()?;
+    run_tests(
+        &mut python.tests(&STRICT, "tests/python/test_twin.py", tool),
+        tally,
+    )
 }
 
 /// Serves the firmware in the rig, and tests what a receiver gets.
 pub fn test_serve(tally: &mut Tally) -> Result<()> {
-    let mut tests = SERVE.tests(&STRICT, "tests/python/test_serve.py")?;
-    tests.env("HIVTAC_TOOL", artifacts::serving_tool()?);
+    let tool = artifacts::serving_tool()?;
+    let tests = SERVE
+        .ready()?
+        .tests(&STRICT, "tests/python/test_serve.py", tool);
     run_tests(&mut on_rig(tests)?, tally)
 }
 
 /// Checks the kit's solids, alone and assembled.
 pub fn test_kit(tally: &mut Tally) -> Result<()> {
     let options = ["-W", "error::UserWarning"];
-    run_tests(&mut KIT.tests(&options, "tests/python/test_kit.py")?, tally)
+    let tool = artifacts::host_tool()?;
+    let mut tests = KIT
+        .ready()?
+        .tests(&options, "tests/python/test_kit.py", tool);
+    run_tests(&mut tests, tally)
 }
 
 /// Writes the kit's solids, drawings and pictures into a folder.
 pub fn write_kit(out: &Path, options: &[String]) -> Result<()> {
     let out = std::path::absolute(out)?;
-    let mut command = Command::new(KIT.python()?);
+    let mut command = Command::new(KIT.ready()?.0);
     command.args(["-m", "kit"]).arg(out).args(options);
     process::run(command.current_dir(toolchain::at("hardware")))
 }

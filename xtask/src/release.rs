@@ -50,7 +50,7 @@ impl Release {
         std::fs::create_dir_all(&folder)?;
         let changes = process::read(&toolchain::at("CHANGELOG.md"))?;
         std::fs::write(folder.join("notes.md"), notes(&changes, VERSION)?)?;
-        let python = BUILDERS.python()?;
+        let python = BUILDERS.ready()?.0;
         let mut names: Vec<&str> = self.target.iter().map(String::as_str).collect();
         if names.is_empty() {
             names.extend(LINUX);

@@ -1,6 +1,6 @@
 //! A sample as C reads it.
 
-use hivtac_host::force_fields::{FORCE, PLACE, torque_nm};
+use hivtac_host::force_fields::{FORCE, place_si, torque_nm};
 use hivtac_host::grip::matrix::covariance;
 use hivtac_host::reader::Arrived;
 use hivtac_terms::force::{Force, MOST_CONTACTS};
@@ -103,11 +103,7 @@ const UNKNOWN: CSample = CSample {
 impl From<&Force> for CContact {
     fn from(force: &Force) -> CContact {
         let [_, _, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
-        let place = force
-            .place
-            .as_ref()
-            .map(|place| PLACE.map(|it| it.si(place)));
-        let [right, down, sigma] = place.unwrap_or([f64::NAN; 3]);
+        let [right, down, sigma] = place_si(force);
         CContact {
             force_n: [x, y, z],
             magnitude_n: size,
@@ -121,19 +117,17 @@ impl From<&Force> for CContact {
 
 impl CSample {
     fn set(&mut self, force: &Force) {
-        let [_, _, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
+        let of_one = CContact::from(force);
+        let (size_sigma, angle_sigma) = (of_one.magnitude_sigma_n, of_one.direction_sigma_rad);
+        let covariance = covariance(of_one.force_n, size_sigma, angle_sigma);
         self.has_force = 1;
-        self.force_n = [x, y, z];
-        self.magnitude_n = size;
+        self.has_place = force.place.is_some().into();
+        self.force_n = of_one.force_n;
+        self.magnitude_n = of_one.magnitude_n;
         self.magnitude_sigma_n = size_sigma;
         self.direction_sigma_rad = angle_sigma;
-        let covariance = covariance([x, y, z], size_sigma, angle_sigma);
         self.force_covariance = std::array::from_fn(|index| covariance[index / 3][index % 3]);
-        if let Some(place) = &force.place {
-            let [right, down, sigma] = PLACE.map(|it| it.si(place));
-            self.has_place = 1;
-            self.place_m = [right, down];
-            self.place_sigma_m = sigma;
-        }
+        self.place_m = of_one.place_m;
+        self.place_sigma_m = of_one.place_sigma_m;
     }
 }

@@ -22,7 +22,7 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from types import TracebackType
 from typing import Any, overload
 
@@ -542,14 +542,10 @@ def _sample(
     contacts: list[Any],
     markers: list[tuple[float, float, int]] | None,
 ) -> Sample:
-    vector, (alpha, beta), magnitude, direction_sigma, magnitude_sigma, place = force or (
-        None,
-        (None, None),
-        None,
-        None,
-        None,
-        None,
-    )
+    # A sample has the fields of a contact, for its force.
+    of_force: dict[str, Any] = dict.fromkeys(field.name for field in fields(Contact))
+    if force:
+        of_force = vars(_contact(*force))
     return Sample(
         sequence=sequence,
         frame=frame,
@@ -558,14 +554,7 @@ def _sample(
         exposed=exposed,
         status=tuple(names),
         status_bits=bits,
-        force=None if vector is None else np.array(vector),
-        alpha=alpha,
-        beta=beta,
-        magnitude=magnitude,
-        direction_sigma=direction_sigma,
-        magnitude_sigma=magnitude_sigma,
-        place=np.array(place[0]) if place else None,
-        place_sigma=place[1] if place else None,
+        **of_force,
         contacts=tuple(_contact(*numbers) for numbers in contacts),
         markers=np.array([marker[:2] for marker in markers]) if markers else None,
         marker_areas=np.array([marker[2] for marker in markers]) if markers else None,

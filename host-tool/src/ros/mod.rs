@@ -2,8 +2,8 @@
 
 pub mod channel;
 
-use crate::force_fields::{FORCE, PLACE, torque_nm};
-use hivtac_terms::force::{Force, Place};
+use crate::force_fields::{FORCE, place_m, place_si, torque_nm};
+use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 
 /// A type of message: name and definition, with those of the types it uses.
@@ -286,11 +286,6 @@ pub fn point(stamp_ns: u64, frame: &str, force: &Force) -> Option<Vec<u8>> {
     Some(cdr.0)
 }
 
-/// A place along x and y from the film's middle, m.
-fn place_m(place: Place) -> [f64; 2] {
-    [place.x.0, place.y.0].map(|part| f64::from(part) * 1e-6)
-}
-
 /// A [`POLYGON`].
 pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker]) -> Vec<u8> {
     let mut cdr = Cdr::new();
@@ -355,11 +350,7 @@ pub fn contacts(stamp_ns: u64, frame: &str, contacts: &[Force]) -> Vec<u8> {
 /// The numbers of a contact in the order of [`CONTACT_FIELDS`].
 fn contact_numbers(force: &Force) -> [f32; CONTACT_FIELDS.len()] {
     let [_, _, size, fx, fy, fz, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
-    let place = force
-        .place
-        .as_ref()
-        .map(|place| PLACE.map(|it| it.si(place)));
-    let [x, y, sigma] = place.unwrap_or([f64::NAN; 3]);
+    let [x, y, sigma] = place_si(force);
     [x, y, 0.0, fx, fy, fz, size, sigma, size_sigma, angle_sigma].map(|number| number as f32)
 }
 
@@ -439,6 +430,7 @@ pub fn bytes(bytes: &[u8]) -> Vec<u8> {
 mod tests {
     use super::*;
     use crate::recording::BEFORE_BYTES;
+    use hivtac_terms::force::Place;
     use hivtac_terms::units::{MicroNewtons, Px, SignedMicrometres};
 
     /// Behind the header: the number of points, then column, row and area of each.

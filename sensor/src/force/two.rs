@@ -105,20 +105,8 @@ impl Pairs {
 
 impl Resting {
     /// Returns the two contacts that explain the markers, and their sum; `None` if one contact
-    /// explains them, two do not, or what presses is not known to be a needle.
-    pub fn two_contacts(
-        &self,
-        forward: &Forward<'_>,
-        range: &CalibratedRange,
-        markers: &MarkerList,
-        noise: FrameNoise,
-    ) -> Option<TwoContacts> {
-        let mut pairs = Pairs::NONE;
-        self.follow_two_contacts(forward, range, markers, noise, (&mut pairs, Work::ALL))
-    }
-
-    /// As [`two_contacts`](Self::two_contacts), beginning with those of the frames before. Where
-    /// the work does not suffice, it goes on with the next frame.
+    /// explains them, two do not, or what presses is not known to be a needle. It begins with those
+    /// of the frames before. Where the work does not suffice, it goes on with the next frame.
     #[inline(never)]
     pub fn follow_two_contacts(
         &self,

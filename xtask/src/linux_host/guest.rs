@@ -1,5 +1,6 @@
 //! The guest's kernel and files: Debian's packages, unpacked and not installed, and the host tool.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -44,7 +45,9 @@ pub fn make(folder: &Path, tool: &Path, port: &str, times: u64) -> Result<Guest>
     for name in ["bin", "modules", "proc", "sys", "dev"] {
         fs::create_dir_all(root.join(name))?;
     }
-    let names = modules(&linux, &root.join("modules"), &busybox)?;
+    let mut tree = Vec::new();
+    walk(&linux, &mut tree)?;
+    let names = modules(&tree, &root.join("modules"), &busybox)?;
     let programs = [
         busybox.clone(),
         package("usbip")?.join("usr/sbin/usbip"),
@@ -65,7 +68,9 @@ pub fn make(folder: &Path, tool: &Path, port: &str, times: u64) -> Result<Guest>
     fs::set_permissions(&init, fs::Permissions::from_mode(0o755))?;
     let files = folder.join("initramfs");
     pack(&root, &busybox, &files)?;
-    let kernel = found(&linux.join("boot"), |name| name.starts_with("vmlinuz"))?;
+    let kernel = tree
+        .into_iter()
+        .find(|file| name_of(file).starts_with("vmlinuz"));
     Ok(Guest {
         kernel: kernel.context("the package has no kernel")?,
         files,
@@ -92,14 +97,12 @@ fn needed_kernel(text: &str) -> Option<String> {
 }
 
 /// Copies the modules that are not part of the kernel itself; returns their names.
-fn modules(linux: &Path, to: &Path, busybox: &Path) -> Result<Vec<&'static str>> {
-    let mut tree = Vec::new();
-    walk(linux, &mut tree)?;
+fn modules(tree: &[PathBuf], to: &Path, busybox: &Path) -> Result<Vec<&'static str>> {
     let mut names = Vec::new();
     for module in MODULES {
         let file = format!("{module}.ko");
         let is_it = |path: &&PathBuf| {
-            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            let name = name_of(path);
             name == file || name == format!("{file}.xz")
         };
         let Some(path) = tree.iter().find(is_it) else {
@@ -134,17 +137,9 @@ fn walk(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
     Ok(())
 }
 
-/// A file of a folder whose name is of a kind.
-fn found(folder: &Path, is_it: impl Fn(&str) -> bool) -> Result<Option<PathBuf>> {
-    let mut files = Vec::new();
-    walk(folder, &mut files)?;
-    let name = |file: &PathBuf| {
-        file.file_name()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned()
-    };
-    Ok(files.into_iter().find(|file| is_it(&name(file))))
+/// A file's name without its folders.
+fn name_of(file: &Path) -> Cow<'_, str> {
+    file.file_name().unwrap_or_default().to_string_lossy()
 }
 
 /// Copies a file into a folder.

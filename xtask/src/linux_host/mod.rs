@@ -67,10 +67,8 @@ fn run(guest: &guest::Guest, console: &Path) -> Result<()> {
     command.args(["-append", words]).stdin(Stdio::null());
     process::say(&format!("+ {command:?}"));
     let errors = File::create(console.with_extension("errors"))?;
-    let mut qemu = command.stdout(Stdio::null()).stderr(errors).spawn();
-    let qemu = qemu
-        .as_mut()
-        .map_err(|error| anyhow::anyhow!("starting QEMU: {error}"))?;
+    command.stdout(Stdio::null()).stderr(errors);
+    let mut qemu = command.spawn().context("starting QEMU")?;
     let begin = Instant::now();
     loop {
         if let Some(status) = qemu.try_wait()? {

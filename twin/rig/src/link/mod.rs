@@ -5,6 +5,7 @@ mod pty;
 mod tcp;
 
 use std::collections::VecDeque;
+use std::net::{Ipv4Addr, TcpListener};
 use std::time::Duration;
 
 use anyhow::Context;
@@ -124,18 +125,31 @@ impl Plug for Link {
     }
 
     fn wait(&self) {
-        match self
-            .holder
-            .and_then(|holder| self.endpoints[holder].writable())
-        {
-            Some(descriptor) => {
-                let mut descriptors = [PollFd::new(descriptor, PollFlags::POLLOUT)];
-                // After an error or an interruption the caller checks again.
-                let _ = poll(&mut descriptors, PollTimeout::from(LOOK));
-            }
-            None => std::thread::sleep(Duration::from_millis(LOOK.into())),
-        }
+        let holder = self.holder.map(|holder| &self.endpoints[holder]);
+        wait_for(holder.and_then(|holder| holder.writable()));
     }
+}
+
+/// Listens on 127.0.0.1 for an option of the command line; port 0 takes a free one.
+///
+/// # Errors
+/// If the port is taken.
+pub(crate) fn listen(option: &str, port: u16) -> anyhow::Result<TcpListener> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+        .with_context(|| format!("{option} {port}"))?;
+    listener.set_nonblocking(true)?;
+    Ok(listener)
+}
+
+/// Waits a short time until one of these descriptors takes more, or, without any, for a client.
+pub(crate) fn wait_for<'a>(descriptors: impl IntoIterator<Item = BorrowedFd<'a>>) {
+    let polled = |descriptor| PollFd::new(descriptor, PollFlags::POLLOUT);
+    let mut descriptors: Vec<_> = descriptors.into_iter().map(polled).collect();
+    if descriptors.is_empty() {
+        return std::thread::sleep(Duration::from_millis(LOOK.into()));
+    }
+    // After an error or an interruption the caller checks again.
+    let _ = poll(&mut descriptors, PollTimeout::from(LOOK));
 }
 
 /// Makes reads and writes of a descriptor return instead of wait.

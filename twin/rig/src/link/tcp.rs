@@ -1,12 +1,10 @@
 //! The serial port as a TCP port on this machine.
 
 use std::collections::VecDeque;
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{TcpListener, TcpStream};
 use std::os::fd::{AsFd, BorrowedFd};
 
-use anyhow::Context;
-
-use super::{Endpoint, read_some, write_all};
+use super::{Endpoint, listen, read_some, write_all};
 
 /// A listener and its present client.
 #[derive(Debug)]
@@ -21,11 +19,8 @@ impl Tcp {
     /// # Errors
     /// If the port is taken.
     pub fn listen(port: u16) -> anyhow::Result<Self> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
-            .with_context(|| format!("--tcp {port}"))?;
-        listener.set_nonblocking(true)?;
         Ok(Self {
-            listener,
+            listener: listen("--tcp", port)?,
             client: None,
         })
     }
@@ -90,6 +85,7 @@ impl Endpoint for Tcp {
 mod tests {
     use super::*;
     use std::io::{Read, Write};
+    use std::net::Ipv4Addr;
 
     #[test]
     fn bytes_go_both_ways_and_a_hangup_is_noticed() {

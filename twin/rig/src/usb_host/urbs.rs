@@ -196,7 +196,7 @@ impl Urbs {
     pub fn restart(&mut self) {
         self.transfer = None;
         for queue in &mut self.queues {
-            (queue.data1, queue.silent) = (false, 0);
+            queue.data1 = false;
             queue.begin();
         }
     }

@@ -7,20 +7,16 @@
 pub mod wire;
 
 use std::collections::VecDeque;
-use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::net::{TcpListener, TcpStream};
 use std::os::fd::AsFd;
-use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, ensure};
-use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use anyhow::ensure;
 
-use crate::link::{Plug, ROUND, Traffic, read_some, write_all};
+use crate::link::{Plug, ROUND, Traffic, listen, read_some, wait_for, write_all};
 use crate::usb_host::{Host, Presence};
 use wire::{Command, Refusal, Request};
 
-/// The longest duration of one check for a client, ms.
-const LOOK: u8 = 20;
 /// The most connections at a time.
 const MOST: usize = 16;
 /// The longest duration, by the clock on the wall, until a connection has asked for something.
@@ -69,11 +65,8 @@ impl Server {
     /// # Errors
     /// If the port is taken.
     pub fn listen(port: u16) -> anyhow::Result<Self> {
-        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
-            .with_context(|| format!("--usbip {port}"))?;
-        listener.set_nonblocking(true)?;
         Ok(Self {
-            listener,
+            listener: listen("--usbip", port)?,
             visitors: Vec::new(),
         })
     }
@@ -170,18 +163,9 @@ impl Plug for Server {
     }
 
     fn wait(&self) {
-        let behind = self
-            .visitors
-            .iter()
-            .filter(|visitor| !visitor.output.is_empty());
-        let mut descriptors: Vec<PollFd<'_>> = behind
-            .map(|visitor| PollFd::new(visitor.stream.as_fd(), PollFlags::POLLOUT))
-            .collect();
-        if descriptors.is_empty() {
-            return thread::sleep(Duration::from_millis(LOOK.into()));
-        }
-        // After an error or an interruption the caller checks again.
-        let _ = poll(&mut descriptors, PollTimeout::from(LOOK));
+        let visitors = self.visitors.iter();
+        let behind = visitors.filter(|visitor| !visitor.output.is_empty());
+        wait_for(behind.map(|visitor| visitor.stream.as_fd()));
     }
 }
 
@@ -269,6 +253,7 @@ mod tests {
     use crate::arrivals::Arrivals;
     use crate::faults::Faults;
     use std::io::Write;
+    use std::net::Ipv4Addr;
 
     const LIST: [u8; 8] = [1, 0x11, 0x80, 5, 0, 0, 0, 0];
 
