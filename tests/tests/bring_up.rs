@@ -107,6 +107,7 @@ fn another_camera_is_named() {
 }
 
 #[test]
+#[ignore = "8 s"]
 fn a_register_that_the_camera_forgot_is_named() {
     let words = ["register 03 holds 00, 40 was written"];
     ends_wrong(

@@ -103,6 +103,7 @@ fn a_host_that_does_not_read_loses_samples_and_the_camera_none() {
 }
 
 #[test]
+#[ignore = "12 s"]
 fn a_pulled_cable_is_reported_and_survived() {
     let (output, lines, counters) = watch_pulled(&["--frames", "60", "--reconnect"]);
     check_recovery(&output, &lines);

@@ -127,6 +127,7 @@ fn dim() -> impl Iterator<Item = Options> {
 }
 
 #[test]
+#[ignore = "8 s"]
 fn light_that_eats_edges_is_refused_before_it_moves_markers() {
     for newtons in [0.0, 0.2] {
         let (worst, accepted) = sweep(WEIGHTED, &press(newtons), dim());
@@ -236,6 +237,7 @@ fn a_disc_in_place_of_a_marker_is_refused() {
 }
 
 #[test]
+#[ignore = "15 s"]
 fn a_fifth_disc_never_takes_a_markers_place() {
     for view in [WEIGHTED, BINARY] {
         let mut sensor = view.sensor().unwrap();

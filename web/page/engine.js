@@ -40,11 +40,11 @@ async function load(bytes) {
   };
   const { instance } = await WebAssembly.instantiate(await unpacked(bytes), { page });
   module = instance.exports;
-  simulate();
+  simulate({ dots: 4 });
 }
 
-function simulate() {
-  const length = module.simulate(epochMs());
+function simulate({ dots }) {
+  const length = module.simulate(dots, epochMs());
   if (length > 0) postMessage({ stopped: textOf(length) });
 }
 

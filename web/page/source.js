@@ -1,6 +1,7 @@
 // Where the page's data comes from, and where its orders go: the WebAssembly module in a worker. It
 // simulates a sensor, or talks with a device whose bytes this page brings.
 
+import { bytesOf } from "./packed.js";
 import { offer } from "./tools.js";
 
 /** Handlers of the page; answers that are awaited, by their tickets; and the open device. */
@@ -66,7 +67,7 @@ export function listen(ours) {
   worker = new Worker(URL.createObjectURL(new Blob([engine], { type: "text/javascript" })));
   worker.onmessage = take;
   worker.onerror = (event) => stop(event.message);
-  const bytes = Uint8Array.from(atob(module), (letter) => letter.charCodeAt(0)).buffer;
+  const bytes = bytesOf(module).buffer;
   post("load", { bytes }, [bytes]);
   offer({ connect, simulate, sense, firmware, firmwareParts, startLoader });
   // For tests and measurements: what comes of a camera's frames.
@@ -103,8 +104,8 @@ function connect(next) {
   };
 }
 
-/** Shows the simulated sensor again. */
-function simulate() {
+/** Shows a simulated sensor with this number of dots. */
+function simulate(dots) {
   device = null;
-  post("simulate");
+  post("simulate", { dots });
 }

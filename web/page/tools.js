@@ -26,13 +26,18 @@ export function offer({ connect, simulate, sense, ...forUpdates }) {
     return button;
   };
   const button = (id, text) => element("button", { type: "button", id, textContent: text });
-  const back = on(button("simulate", "Simulated sensor"), async () => {
+  const dots = element("select", { id: "dots" },
+    ...[[4, "four dots"], [8, "eight dots"]].map(([value, text]) =>
+      element("option", { value, textContent: text })));
+  const simulated = async () => {
     say("");
     back.hidden = true;
-    simulate();
+    simulate(Number(dots.value));
     await port?.close();
     port = null;
-  });
+  };
+  dots.addEventListener("change", simulated);
+  const back = on(button("simulate", "Simulated sensor"), simulated);
   back.hidden = true;
   const plug = on(button("connect", "Connect a sensor"), async () => {
     say(whyNot() ?? "");
@@ -60,8 +65,9 @@ export function offer({ connect, simulate, sense, ...forUpdates }) {
     file.value = "";
   });
   const label = element("label", {}, "A picture of your own: ", file);
+  const film = element("label", {}, "Simulated film: ", dots);
   const update = updates({ element, ...forUpdates });
-  document.getElementById("tools").append(plug, back, label, said, update, figure);
+  document.getElementById("tools").append(film, plug, back, label, said, update, figure);
 }
 
 /** Reads a picture: levels, width and height. */

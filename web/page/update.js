@@ -1,6 +1,7 @@
 // New firmware for a sensor: a file, the sensor's restart into its loader, and what is written.
 
 import { openLoader, whyNot } from "./dfu.js";
+import { bytesOf } from "./packed.js";
 
 /** Address of the flash: the device starts from there. */
 const FLASH = 0x08000000;
@@ -39,10 +40,9 @@ async function write(loader, look, firmwareParts, say) {
   await loader.leave(FLASH);
 }
 
-/** Unpacks what the page carries: gzip, as base64. */
+/** Unpacks a file of gzip that the page carries as text. */
 function carried(text) {
-  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+  const stream = new Blob([bytesOf(text)]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }
 

@@ -11,6 +11,7 @@ use hivtac_host::page::rows::{self, Event};
 use hivtac_host::page::{self, Cursor, Feed, Order, Press, State, Truth};
 use hivtac_host::usual_tare::TARE_PATIENCE;
 use hivtac_terms::contact_shape::ContactShape;
+use hivtac_twin::Layout;
 use hivtac_wire::message::{DeviceMessage, Request};
 use serde_json::json;
 use std::collections::VecDeque;
@@ -45,12 +46,18 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// A simulated sensor, set up as a user would: it knows its tip, and has a tare.
+    /// A simulated sensor with this number of dots, 4 or 8, set up as a user would: it knows its
+    /// tip, and has a tare.
     ///
     /// # Errors
-    /// When the scene cannot be made.
-    pub fn simulated(now_us: u64, epoch_ns: u64) -> Result<Engine, String> {
-        let simulated = Simulated::start(camera::Kind::default(), now_us)?;
+    /// When no film has that number, or the scene cannot be made.
+    pub fn simulated(dots: u32, now_us: u64, epoch_ns: u64) -> Result<Engine, String> {
+        let layout = match dots {
+            4 => Layout::default(),
+            8 => "8v".parse().map_err(|_| "the layout 8v is missing")?,
+            _ => return Err(format!("a simulated film has 4 or 8 dots, not {dots}")),
+        };
+        let simulated = Simulated::start(camera::Kind::default(), layout, now_us)?;
         let mut engine = Engine::new("simulated in this page", now_us, epoch_ns);
         engine.simulated = Some(Box::new(simulated));
         engine.presses = true;

@@ -5,7 +5,7 @@ use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::{Fingers, Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, Told, device_id};
-use hivtac_twin::{Layout, Scene};
+use hivtac_twin::{Layout, Options, Scene};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 
 /// Most frames of one turn, so that the page's other work is not late.
@@ -22,19 +22,26 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    /// Starts it.
+    /// Starts it, with a layout of dots.
     ///
     /// # Errors
     /// When the scene cannot be made; the text says why.
-    pub fn start(kind: Kind, now_us: u64) -> Result<Simulated, String> {
+    pub fn start(kind: Kind, layout: Layout, now_us: u64) -> Result<Simulated, String> {
         let [width, height] = kind.size().map(u32::from);
-        let scene = Scene::preset("rest", kind.preset(), width, height, SEED)
+        let nominal = Scene::preset("rest", kind.preset(), width, height, SEED)
+            .map_err(|error| error.to_string())?;
+        let options = Options {
+            layout,
+            ..nominal.options().clone()
+        };
+        let scene = nominal
+            .with_options(options)
             .map_err(|error| error.to_string())?;
         let hand = Hand::default();
         let usual = Disturbances::default();
         let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
             .map_err(|error| error.to_string())?;
-        let device = Device::new(kind, Layout::default(), device_id(kind, NOMINAL), 1.0);
+        let device = Device::new(kind, layout, device_id(kind, NOMINAL), 1.0);
         let frames = Frames::new(eye, &device.camera(), now_us);
         Ok(Simulated {
             device,

@@ -13,7 +13,7 @@ struct Page {
 
 impl Page {
     fn simulated() -> Page {
-        Page::of(Engine::simulated(0, 0).unwrap())
+        Page::of(Engine::simulated(4, 0, 0).unwrap())
     }
 
     fn of(engine: Engine) -> Page {

@@ -1,7 +1,7 @@
 //! `cargo xtask web`: builds the page that needs no server.
 //!
 //! A browser loads neither modules nor WebAssembly for a page on disk. So the page's scripts become
-//! one, and the WebAssembly module lies in another one, packed by gzip, as base64.
+//! one, and the WebAssembly module lies in another one, packed by gzip, as text.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use base64::prelude::{BASE64_STANDARD, Engine};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use hivtac_wire::image::Image;
@@ -67,13 +66,19 @@ pub fn page(images: &[Image]) -> Result<PathBuf> {
 
 /// The script with the images, by their boards, packed as the module is.
 fn firmware(images: &[Image]) -> Result<String> {
-    let packed: Result<BTreeMap<String, String>> = images
+    let packed: Result<Vec<String>> = images
         .iter()
-        .map(|image| Ok((image.board(), packed(image.bytes())?)))
+        .map(|image| {
+            Ok(format!(
+                "  \"{}\": \"{}\",\n",
+                image.board(),
+                packed(image.bytes())?
+            ))
+        })
         .collect();
-    let json = serde_json::to_string(&packed?)?;
     Ok(format!(
-        "// Firmware for sensors.\nglobalThis.FIRMWARE ??= {json};\n"
+        "// Firmware for sensors.\nglobalThis.FIRMWARE ??= {{\n{}}};\n",
+        packed?.concat()
     ))
 }
 
@@ -180,11 +185,37 @@ fn exported_name(line: &str) -> Option<&str> {
     rest.get(..end)
 }
 
-/// Packs bytes as a file of gzip, and that as base64.
+/// Packs bytes as a file of gzip, and that as text.
 fn packed(bytes: &[u8]) -> Result<String> {
     let mut packer = GzEncoder::new(Vec::new(), Compression::best());
     packer.write_all(bytes)?;
-    Ok(BASE64_STANDARD.encode(packer.finish()?))
+    Ok(text_of(&packer.finish()?))
+}
+
+/// Writes bytes as text for `web/page/packed.js`: seven bits a character, the highest first.
+fn text_of(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len() * 6 / 5);
+    let [mut bits, mut count] = [0_u16, 0];
+    for &byte in bytes {
+        bits = bits << 8 | u16::from(byte);
+        count += 8;
+        while count >= 7 {
+            count -= 7;
+            text.push(character((bits >> count & 127) as u8));
+        }
+    }
+    if count > 0 {
+        text.push(character((bits << (7 - count) & 127) as u8));
+    }
+    text
+}
+
+/// The character of seven bits. Those that a string in a script cannot hold are moved up.
+fn character(bits: u8) -> char {
+    match bits {
+        0 | b'\n' | b'\r' | b'"' | b'\\' => char::from(bits | 128),
+        _ => char::from(bits),
+    }
 }
 
 #[cfg(test)]
@@ -209,6 +240,26 @@ mod tests {
         assert!(first < second, "{text}");
         assert!(text.contains("  return { A, b };"), "{text}");
         assert!(text.contains("  const { A, b } = modules.a;"), "{text}");
+    }
+
+    #[test]
+    fn bytes_are_read_from_text() {
+        let bytes: Vec<u8> = (0..=255).rev().chain(*b"\0\n\r\"\\").collect();
+        for length in 0..bytes.len() {
+            let text = text_of(&bytes[..length]);
+            assert!(!text.contains(['\0', '\n', '\r', '"', '\\']));
+            // As `packed.js` reads it.
+            let bits = text
+                .chars()
+                .flat_map(|it| (0..7).rev().map(move |k| it as u32 >> k & 1));
+            let bits: Vec<u32> = bits.collect();
+            let read = bits
+                .chunks_exact(8)
+                .map(|byte| byte.iter().fold(0, |all, bit| all << 1 | bit));
+            let read: Vec<u32> = read.take(text.chars().count() * 7 / 8).collect();
+            let want: Vec<u32> = bytes[..length].iter().map(|&byte| byte.into()).collect();
+            assert_eq!(read, want, "{length}");
+        }
     }
 
     #[test]

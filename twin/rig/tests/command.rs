@@ -74,6 +74,7 @@ fn greet(port: &mut (impl Read + Write)) -> DeviceMessage {
 }
 
 #[test]
+#[ignore = "6 s"]
 fn a_tcp_client_is_served_and_its_hangup_ends_the_run() {
     let (child, ready) = start(&["--tcp", "0", "--exit-on-hangup"]);
     let address = ready[0].strip_prefix("tcp=").unwrap();

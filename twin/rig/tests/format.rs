@@ -119,6 +119,7 @@ fn a_change_waits_for_a_camera_that_is_away() {
 /// come in groups if the bus is ever busy, here long after the end. The device sends the same bytes
 /// at the same times, also if a change of the format stops and starts the capture.
 #[test]
+#[ignore = "8 s"]
 fn how_lines_reach_memory_changes_nothing() {
     let setup = || Setup::new(firmware(), 330).at(225, set_threshold(80, RED_CR));
     let lines = setup().run();

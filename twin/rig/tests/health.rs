@@ -104,6 +104,7 @@ fn kept_settings_that_are_not_read_are_told() {
 /// The built-in model is replaced by a different one with a valid checksum. Its answers differ from
 /// those computed at build time: the arithmetic counts as faulty.
 #[test]
+#[ignore = "13 s"]
 fn a_built_in_model_that_answers_otherwise_is_told() {
     let directory = tempfile::tempdir().unwrap();
     let elf = directory.path().join("firmware.elf");

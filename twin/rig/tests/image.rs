@@ -63,6 +63,7 @@ fn a_whole_image_is_started_and_starts_the_loader() {
 
 /// A host of another version cannot send commands, and yet update the firmware.
 #[test]
+#[ignore = "9 s"]
 fn a_hello_of_any_version_starts_the_loader() {
     let wanted = Action::Send(hello_of(HelloPrefix::START_LOADER));
     let other = Action::Send(hello_of(HelloPrefix {

@@ -45,6 +45,7 @@ fn wrong_polarities_give_frames_of_the_wrong_size() {
 
 /// The camera's format register stays at YUV: frames have the right size, but no red marker.
 #[test]
+#[ignore = "8 s"]
 fn a_wrong_camera_register_leaves_no_markers() {
     let run = run_with(Bug::CameraRegister);
     let samples = run.samples();
