@@ -17,6 +17,7 @@
 //! | `quantize` | weights to a model file, the same bytes on every machine |
 //! | `uncertainty` | a model's stated uncertainties, from its errors |
 //! | `unit` | guides a person through a unit's loads, to its own model |
+//! | `parallel` | work that all processors share |
 //! | `progress` | bars on the terminal |
 
 pub mod data;
@@ -26,6 +27,7 @@ pub mod forward;
 pub mod import;
 pub mod loads;
 pub mod network;
+mod parallel;
 pub mod progress;
 pub mod quantize;
 pub mod train;

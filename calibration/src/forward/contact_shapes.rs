@@ -1,5 +1,6 @@
 //! Computes how contacts of other shapes move the images, compared with the nominal tip.
 
+use crate::parallel;
 use std::f64::consts::TAU;
 
 use anyhow::{Context as _, Result};
@@ -10,7 +11,6 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::units::Micrometres;
 use hivtac_twin::film::reduced::{NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::{Camera, Preset};
-use rayon::prelude::*;
 
 use super::covariances::{Covariance, END_MM, Moved, OF_FOUR, covariances, knots, sum_of_squares};
 use super::{LeastSquares, UnitSetup, in_focal_lengths};
@@ -67,14 +67,11 @@ pub fn contact_shapes() -> Result<ShapesSpec> {
         y <= x
     };
     let octant: Vec<usize> = (0..places).filter(in_octant).collect();
-    let solved: Vec<Vec<Vec<Moved>>> = octant
-        .par_iter()
-        .map(|place| {
-            // Threads that share a film wait for its factors.
-            let nominal = NominalFilm::new()?;
-            nominal.shifts(&members, poses.iter().skip(*place).step_by(places))
-        })
-        .collect::<Result<_>>()?;
+    let solved = parallel::try_map(octant.len(), |k| {
+        // Threads that share a film wait for its factors.
+        let nominal = NominalFilm::new()?;
+        nominal.shifts(&members, poses.iter().skip(octant[k]).step_by(places))
+    })?;
     let (mut factors, mut shifts) = (Vec::new(), Vec::new());
     for (number, pose) in poses.iter().enumerate() {
         let [x, y] = pose.place_mm;

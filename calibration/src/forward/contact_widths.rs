@@ -5,6 +5,7 @@
 //! film. So the film is pressed at a few places, and what it does at a distance from there is
 //! interpolated between them.
 
+use crate::parallel;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use anyhow::Result;
@@ -13,7 +14,6 @@ use hivtac_shell::{Contact, Design, Equilibrium, Film, Patch};
 use hivtac_twin::film::Layout;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, NOMINAL_RADIUS_MM, Unit};
 use hivtac_twin::{Camera, Disc, Preset};
-use rayon::prelude::*;
 
 use super::contact_shapes::{RIM_MM, tilted};
 use super::covariances::Moved;
@@ -114,7 +114,7 @@ pub fn contact_widths(layout: Layout) -> Result<WidthsSpec> {
     let through = LeastSquares::new(&samples().map(row).collect::<Vec<_>>())?;
     let along = |k: usize| END_MM * k as f64 / f64::from(KNOTS - 1);
     let count = usize::from(KNOTS);
-    let knots = (0..count * count).into_par_iter().map(|knot| {
+    let knots = parallel::map(count * count, |knot| {
         let place_mm = [along(knot % count), along(knot / count)];
         let mut shifts = Vec::new();
         for number in 0..ROOTS.len() {
@@ -137,9 +137,7 @@ pub fn contact_widths(layout: Layout) -> Result<WidthsSpec> {
         }
         columns
     });
-    Ok(WidthsSpec {
-        knots: knots.collect(),
-    })
+    Ok(WidthsSpec { knots })
 }
 
 impl WidthsSpec {
@@ -235,7 +233,7 @@ impl Presses {
             under_all(&film, members, place.map(|k| PLACES_MM[k]))
         };
         Ok(Presses {
-            states: octant.par_iter().map(at).collect::<Result<_>>()?,
+            states: parallel::try_map(octant.len(), |k| at(&octant[k]))?,
             film: Film::new(&design)?,
         })
     }

@@ -1,6 +1,7 @@
 //! The film run forwards for any layout of dots: its tables come from those of the whole film, so
 //! that a layout needs no new finite elements.
 
+use crate::parallel;
 use anyhow::{Result, anyhow};
 use hivtac_sensor::force::forward::{
     Forward, Markers, Noise, Pose as ChipPose, Stiffness, between,
@@ -11,7 +12,6 @@ use hivtac_twin::film::reduced::{LARGEST_SIZE, NOMINAL_RADIUS_MM, Pose, Unit};
 use hivtac_twin::film::{Film, Layout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 
 use super::tables::{Dot, STEEP_COUNTS_LESS, UnitSetup, tables};
 use super::{limits, rest_image};
@@ -21,7 +21,7 @@ const NODES: usize = 16;
 /// Knots along the size, y and x of the tables' own error.
 const KNOTS: [usize; 3] = [4, 4, 4];
 /// Loads by which that error is measured, and their largest tilt along each axis, rad.
-const LOADS: u64 = 6_000;
+const LOADS: usize = 6_000;
 const TILT: f64 = 0.2;
 
 /// The nominal film with the dots of a layout, under a needle anywhere that it may press. Also the
@@ -76,11 +76,10 @@ pub fn of_layout(
 /// independent errors. It is that of usual loads, and of dots that a camera sees.
 fn errors(chip: &Forward<'_>, setup: &UnitSetup<'_>, film: &Film) -> Result<CovarianceSpec> {
     let last_mm = film.most_place_mm();
-    let left = (0..LOADS).into_par_iter().map(|number| {
-        let pose = random_pose(number, last_mm);
+    let left = parallel::try_map(LOADS, |number| {
+        let pose = random_pose(number as u64, last_mm);
         Ok((pose, left(chip, setup, film, &pose)?))
-    });
-    let left = left.collect::<Result<Vec<_>>>()?;
+    })?;
     let [sizes, lines, places] = KNOTS;
     let coordinates = 2 * chip.tables.dots();
     let mut sums = vec![vec![[0.0; 2]; coordinates]; sizes * lines * places];

@@ -1,6 +1,7 @@
 //! Describes uncalibrated units: how their images move differently from the nominal film's, as the
 //! chip reads them by their rest picture, and which force moves them as far.
 
+use crate::parallel;
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::features::Features;
 use hivtac_sensor::force::forward::{Forward, Markers, Mounting, Stiffness};
@@ -16,14 +17,13 @@ use hivtac_twin::units::{FOCAL, MARKER_MM, POST_MM, ROLL_DEG, STIFFNESS, THICKNE
 use hivtac_twin::{Camera, Disc};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::covariances::{Covariance, KNOTS, Moved, OF_FOUR, covariances, knots, sum_of_squares};
 use super::in_focal_lengths;
 
 /// Number of films that are drawn.
-const FILMS: u64 = 60;
+const FILMS: usize = 60;
 /// The largest deviation that is drawn, in standard deviations.
 const AT_MOST: f64 = 2.5;
 /// The stretch with which films are mounted, along each axis.
@@ -75,16 +75,12 @@ impl OtherUnits {
     /// # Errors
     /// When too many of them find no equilibrium.
     pub(super) fn of_films(chip: &Forward<'_>, camera: &Camera) -> Result<Self> {
-        let drawn = (0..FILMS)
-            .into_par_iter()
-            .map(|number| Other::random(number, chip, camera)?.matches());
-        let drawn: Vec<Vec<Match>> = drawn
-            .collect::<Vec<_>>()
-            .into_iter()
-            .filter_map(Result::ok)
-            .collect();
+        let drawn = parallel::map(FILMS, |number| {
+            Other::random(number as u64, chip, camera)?.matches()
+        });
+        let drawn: Vec<Vec<Match>> = drawn.into_iter().filter_map(Result::ok).collect();
         ensure!(
-            10 * drawn.len() >= 9 * FILMS as usize,
+            10 * drawn.len() >= 9 * FILMS,
             "only {} of {FILMS} films find all their equilibria",
             drawn.len()
         );

@@ -1,12 +1,12 @@
 //! Makes the tables of a film run forwards, from the simulated sensor.
 
+use crate::parallel;
 use anyhow::Result;
 use hivtac_sensor::force::forward::MOST_TILTS;
 use hivtac_sensor::force::model::TablesSpec;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
 use hivtac_twin::film::{Film, MAX_PLACE_MM};
 use hivtac_twin::{Camera, Disc, Load};
-use rayon::prelude::*;
 
 use super::functions::{Sampled, compressed};
 use super::least_squares::LeastSquares;
@@ -235,7 +235,7 @@ fn samples(
         Ok(Sampled {
             nodes_mm: dot.nodes_mm.clone(),
             away,
-            coefficients: along_y.par_iter().map(line).collect::<Result<_>>()?,
+            coefficients: parallel::try_map(along_y.len(), |k| line(&along_y[k]))?,
         })
     };
     let sampled = dots.iter().enumerate().map(sampled);

@@ -1,5 +1,6 @@
 //! Computes the effect of a film's own weight on its images, for a model file.
 
+use crate::parallel;
 use anyhow::Result;
 use hivtac_sensor::force::forward::weight::{
     AT_REST, Functions, SIZES, TERMS, UNDER_LOAD, soft, terms,
@@ -7,7 +8,6 @@ use hivtac_sensor::force::forward::weight::{
 use hivtac_sensor::force::forward::{Gravity, Stiffness};
 use hivtac_sensor::force::model::WeightSpec;
 use hivtac_twin::film::reduced::{AS_A_PRESS_N, LARGEST_SIZE, LARGEST_TILT};
-use rayon::prelude::*;
 
 use super::covariances::Moved;
 use super::least_squares::LeastSquares;
@@ -103,10 +103,7 @@ fn at_rest(film: &impl Weighed, functions: &Functions) -> Result<[Moved; AT_REST
         [[sin, 0.0, cos], [0.0, sin, cos]]
     });
     let around: Vec<[f64; 3]> = around.collect();
-    let sides: Vec<Moved> = around
-        .par_iter()
-        .map(|down| Ok(less(&hangs(*down)?, &weightless)))
-        .collect::<Result<_>>()?;
+    let sides = parallel::try_map(around.len(), |k| Ok(less(&hangs(around[k])?, &weightless)))?;
     let rows = around
         .iter()
         .map(|down| functions.at(0.0, single(*down)).map(f64::from));
@@ -129,10 +126,9 @@ fn under_load(
     let [weightless, toward, away, along_x, along_y] = DOWN.map(turned);
     let turned = [weightless?, toward?, away?, along_x?, along_y?];
     // By place and tilt, and by size.
-    let sides: Vec<Vec<[Moved; UNDER_LOAD]>> = pressed
-        .par_iter()
-        .map(|pressed| added(film, &turned, functions, at_rest, pressed, &sizes))
-        .collect::<Result<_>>()?;
+    let sides = parallel::try_map(pressed.len(), |k| {
+        added(film, &turned, functions, at_rest, &pressed[k], &sizes)
+    })?;
     let rows = pressed.iter().map(|(place_mm, tilt)| {
         let [place, tilt] = [place_mm, tilt].map(|pair| pair.map(|part| part as f32));
         terms(place, tilt).map(f64::from)

@@ -2,13 +2,13 @@
 
 use anyhow::{Result, anyhow};
 use hivtac_shell::Change;
-use rayon::prelude::*;
 
 use super::load::UNKNOWNS;
 use super::numbers::Number;
 use super::own_film::FoundNumber;
 use super::problem::{At, Problem, Solved, Trust, Unknowns};
 use crate::loads::SeenLoad;
+use crate::parallel;
 
 /// With more loads than this, the descent begins with a selection of them; it determines a unit
 /// well enough to continue with all of them from there.
@@ -254,8 +254,7 @@ impl Problem<'_> {
             }
             Ok((parts, here))
         };
-        let loads = (0..self.loads.len()).into_par_iter().map(of_load);
-        let loads: Vec<_> = loads.collect::<Result<_>>()?;
+        let loads = parallel::try_map(self.loads.len(), of_load)?;
         let (own, pressed): (Vec<_>, Vec<_>) = loads.into_iter().unzip();
         at.unknowns.loads = own;
         (at.states, at.residuals) = pressed.into_iter().unzip();

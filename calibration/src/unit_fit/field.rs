@@ -11,11 +11,11 @@
 use anyhow::{Context, Result};
 use hivtac_shell::{Equilibrium, Film, Response};
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, Pose, Terms};
-use rayon::prelude::*;
 
 use super::problem::{At, Problem, apart_mm};
 use super::view::{Rim, View};
 use crate::forward::LeastSquares;
+use crate::parallel;
 
 /// Tip places along x and along y at which the film is solved: the first, their spacing, mm, and
 /// their number.
@@ -83,14 +83,9 @@ impl<'a> Field<'a> {
             least_squares,
             terms,
         };
-        let places: Vec<usize> = (0..TIPS * TIPS).collect();
         let solve = |k: usize| field.solve_place([k % TIPS, k / TIPS].map(tip_mm));
-        let solved = places.into_par_iter().map(solve);
-        field.solved = solved
-            .collect::<Result<Vec<_>>>()?
-            .into_iter()
-            .flatten()
-            .collect();
+        let solved = parallel::try_map(TIPS * TIPS, solve)?;
+        field.solved = solved.into_iter().flatten().collect();
         Ok(field)
     }
 

@@ -11,7 +11,6 @@ use hivtac_terms::marker::{LEAST_MARKERS, MOST_MARKERS};
 use hivtac_twin::Camera;
 use hivtac_twin::film::MAX_PLACE_MM;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::descent::Found;
@@ -23,6 +22,7 @@ use super::weight::OwnWeight;
 use crate::forward::{
     Covariance, Dot, KNOTS, Moved, covariances, knots, limits, rest_image, sum_of_squares, tables,
 };
+use crate::parallel;
 
 /// Nodes along each axis of a dot's table, of four and of other dots. Others may be anywhere under
 /// the tip.
@@ -319,10 +319,7 @@ fn remaining_covariance(
         }
         covariance
     };
-    let moved_px: Vec<Vec<f64>> = states
-        .par_iter()
-        .map(|state| problem.moved_px(&at, state))
-        .collect();
+    let moved_px = parallel::map(states.len(), |k| problem.moved_px(&at, &states[k]));
     let knots = rates.pressed.iter().zip(&moved_px).zip(&poses);
     let all: Vec<Covariance> = knots.map(of_pose).collect();
     Ok(covariances(KNOTS, &all))
@@ -349,10 +346,7 @@ fn knot_states(at: &At, field: &Field<'_>, poses: &[Pose]) -> Result<Vec<Equilib
         }
         Ok(states)
     };
-    let by_place: Vec<Vec<Equilibrium>> = (0..places)
-        .into_par_iter()
-        .map(of_place)
-        .collect::<Result<_>>()?;
+    let by_place = parallel::try_map(places, of_place)?;
     let of_size = |size: usize| by_place.iter().map(move |states| states[size].clone());
     Ok((0..usize::from(KNOTS[0])).flat_map(of_size).collect())
 }

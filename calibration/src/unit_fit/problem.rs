@@ -3,7 +3,6 @@
 use anyhow::Result;
 use hivtac_shell::{Change, Design, Equilibrium, Film};
 use hivtac_twin::Camera;
-use rayon::prelude::*;
 
 use super::COARSE;
 use super::equations::{LoadEquations, LoadSlopes, Normal};
@@ -12,6 +11,7 @@ use super::load::UNKNOWNS;
 use super::numbers::{self, Family, Number, Prior};
 use super::view::View;
 use crate::loads::SeenLoad;
+use crate::parallel;
 
 /// Beyond this number, loads repeat each other: these cover places and directions all over the
 /// film.
@@ -276,8 +276,7 @@ impl Problem<'_> {
             let start = near.and_then(|(_, states)| states.get(k));
             self.press(&at, k, &at.unknowns.loads[k], start.unwrap_or(&at.rest))
         };
-        let pressed = (0..self.loads.len()).into_par_iter().map(press);
-        let pressed: Vec<_> = pressed.collect::<Result<_>>()?;
+        let pressed = parallel::try_map(self.loads.len(), press)?;
         (at.states, at.residuals) = pressed.into_iter().unzip();
         Ok(at)
     }
@@ -315,7 +314,7 @@ impl Problem<'_> {
         let of = |state: &Equilibrium| view.images(state, &made.dots_mm);
         Images {
             rest: of(&at.rest),
-            pressed: states.par_iter().map(of).collect(),
+            pressed: parallel::map(states.len(), |k| of(&states[k])),
         }
     }
 
@@ -450,7 +449,7 @@ impl Problem<'_> {
         };
         let mut rates = UnitRates {
             rest: vec![vec![0.0; 2 * at.made.dots_mm.len()]; self.priors.len()],
-            pressed: states.par_iter().map(of_state).collect::<Result<_>>()?,
+            pressed: parallel::try_map(states.len(), |k| of_state(&states[k]))?,
         };
         for (j, k) in numbers.iter().enumerate() {
             rates.rest[*k] = at_rest[j].iter().map(|part| units[j] * part).collect();

@@ -7,10 +7,10 @@
 //! for presses anywhere within ±4 mm the residual is 2 mN.
 
 use anyhow::{Result, bail, ensure};
-use rayon::prelude::*;
 
 use super::series::Joined;
 use crate::data::dataset::LARGEST_N;
+use crate::parallel;
 
 /// The markers' radius at a time of the sensor's clock.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,10 +129,9 @@ pub fn align(frames: &[RadiusSample], gauge: Joined<'_>, search: Search) -> Resu
          same recording?"
     );
     let steps = ((high - low) / STEP_S).ceil().max(0.0) as usize;
-    let grid: Vec<Option<Fit>> = (0..=steps)
-        .into_par_iter()
-        .map(|step| Fit::of(&sparse, gauge, low + step as f64 * STEP_S, 0.0, 0.0))
-        .collect();
+    let grid = parallel::map(steps + 1, |step| {
+        Fit::of(&sparse, gauge, low + step as f64 * STEP_S, 0.0, 0.0)
+    });
     let residual = |step: usize| grid[step].map_or(f64::INFINITY, |fit| fit.relative());
     let Some(best) = (0..=steps)
         .filter(|&step| grid[step].is_some())

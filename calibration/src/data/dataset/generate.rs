@@ -1,10 +1,10 @@
 //! Generates data sets from the scene: renders a frame and lets the sensing measure it.
 
+use crate::parallel;
 use std::ops::Range;
 
 use anyhow::Result;
 use hivtac_twin::Scene;
-use rayon::prelude::*;
 
 use super::detector::{Pool, Sensing};
 use super::{Dataset, Recipe, Row};
@@ -51,7 +51,8 @@ impl<'a> Renderer<'a> {
         pool: &Pool<'_>,
         progress: impl Fn() + Sync,
     ) -> Result<Vec<Vec<Row>>> {
-        let rendered = rows.into_par_iter().map(|row| {
+        parallel::try_map(rows.len(), |number| {
+            let row = rows.start + number;
             let place = self.recipe.place(row);
             let scene = &self.scenes[place.session];
             let frame = scene.render_load(&self.recipe.load(row)?, row as u64)?;
@@ -66,8 +67,7 @@ impl<'a> Renderer<'a> {
                 seen,
             };
             Ok(seen.into_iter().map(row).collect())
-        });
-        rendered.collect()
+        })
     }
 }
 
