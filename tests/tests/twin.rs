@@ -14,7 +14,7 @@ use hivtac_host::port::Address;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::HsvBox;
-use hivtac_twin::{Layout, Options, Preset, Scene, Shutter};
+use hivtac_twin::{Layout, Scene, Shutter};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::health::Health;
 use hivtac_wire::message::{
@@ -82,8 +82,8 @@ fn from_the_rig(rig: &Rig, count: usize) -> (DeviceHello, SettingsReport, Vec<Sa
 struct Twin(Device);
 
 impl Twin {
-    fn new(layout: Layout) -> Twin {
-        let mut twin = Twin(Device::new(Kind::Ov7725, layout, [0; 12], 1.0));
+    fn new(kind: Kind, layout: Layout) -> Twin {
+        let mut twin = Twin(Device::new(kind, layout, [0; 12], 1.0));
         twin.send(&HostMessage::Hello(HelloPrefix::OURS.into()));
         twin
     }
@@ -170,11 +170,22 @@ fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>)
 
 #[test]
 fn a_twin_sends_the_bytes_of_the_flashed_program() {
+    twin_and_flashed_program(Kind::Ov7725);
+}
+
+#[test]
+#[ignore = "as with the usual camera"]
+fn so_does_one_with_an_ov5640() {
+    twin_and_flashed_program(Kind::Ov5640);
+}
+
+fn twin_and_flashed_program(kind: Kind) {
     let seed = SEED.to_string();
-    let rig = Rig::start(&["--scene", "demo", "--seed", &seed]).unwrap();
+    let options = ["--scene", "demo", "--seed", &seed, "--camera", kind.name()];
+    let rig = Rig::start(&options).unwrap();
     let (hello, settings, samples) = from_the_rig(&rig, SAMPLES);
-    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
-    let mut twin = Twin::new(Layout::default());
+    let scene = kind.scene("demo", Layout::default(), SEED).unwrap();
+    let mut twin = Twin::new(kind, Layout::default());
     let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
         panic!("a hello comes first");
     };
@@ -211,13 +222,8 @@ fn a_twin_of_eight_dots_sends_the_bytes_of_the_flashed_program() {
     let options = ["--scene", "demo", "--seed", &seed, "--layout", "8v"];
     let rig = Rig::start(&[&options[..], &["--flash", flash]].concat()).unwrap();
     let (hello, _, samples) = from_the_rig(&rig, SAMPLES);
-    let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, SEED).unwrap();
-    let options = Options {
-        layout: eight_dots(),
-        ..scene.options().clone()
-    };
-    let scene = scene.with_options(options).unwrap();
-    let mut twin = Twin::new(eight_dots());
+    let scene = Kind::Ov7725.scene("demo", eight_dots(), SEED).unwrap();
+    let mut twin = Twin::new(Kind::Ov7725, eight_dots());
     let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
         panic!("a hello comes first");
     };
@@ -248,12 +254,7 @@ const SAMPLES_OF_TWO: usize = 100;
 
 /// A scene of two needles on a film of eight dots, which move as the sensing's model has it.
 fn scene_of_two() -> String {
-    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, SEED).unwrap();
-    let options = Options {
-        layout: eight_dots(),
-        ..scene.options().clone()
-    };
-    let scene = scene.with_options(options).unwrap();
+    let scene = Kind::Ov7725.scene("rest", eight_dots(), SEED).unwrap();
     let model = Kind::Ov7725.model(eight_dots());
     let film = PairFilm::of(model, eight_dots()).unwrap();
     let moved = film.displacement(&scene, NEEDLES).unwrap();

@@ -3,7 +3,7 @@
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::{Captured, Device};
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_twin::{Layout, Scene};
+use hivtac_twin::Layout;
 use hivtac_wire::frame::{CRC32, MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -26,8 +26,8 @@ pub struct Summed {
 /// # Errors
 /// When the scene cannot be made.
 pub fn sum(kind: Kind, frames: u32) -> Result<Summed, String> {
-    let [width, height] = kind.size().map(u32::from);
-    let scene = Scene::preset("demo", kind.preset(), width, height, SEED)
+    let scene = kind
+        .scene("demo", Layout::default(), SEED)
         .map_err(|error| error.to_string())?;
     let mut device = Device::new(kind, Layout::default(), [0; 12], 1.0);
     for message in greeting() {
@@ -49,7 +49,7 @@ pub fn sum(kind: Kind, frames: u32) -> Result<Summed, String> {
         }
         let words = match kind {
             // The camera sends the high byte first.
-            Kind::Ov7725 => words.iter().map(|word| word.swap_bytes()).collect(),
+            Kind::Ov7725 | Kind::Ov5640 => words.iter().map(|word| word.swap_bytes()).collect(),
             Kind::Mt9v034 => words,
         };
         let captured = Captured {

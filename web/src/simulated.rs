@@ -5,7 +5,7 @@ use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::{Fingers, Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, Told, device_id};
-use hivtac_twin::{Layout, Options, Scene};
+use hivtac_twin::Layout;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 
 /// Most frames of one turn, so that the page's other work is not late.
@@ -27,15 +27,8 @@ impl Simulated {
     /// # Errors
     /// When the scene cannot be made; the text says why.
     pub fn start(kind: Kind, layout: Layout, now_us: u64) -> Result<Simulated, String> {
-        let [width, height] = kind.size().map(u32::from);
-        let nominal = Scene::preset("rest", kind.preset(), width, height, SEED)
-            .map_err(|error| error.to_string())?;
-        let options = Options {
-            layout,
-            ..nominal.options().clone()
-        };
-        let scene = nominal
-            .with_options(options)
+        let scene = kind
+            .scene("rest", layout, SEED)
             .map_err(|error| error.to_string())?;
         let hand = Hand::default();
         let usual = Disturbances::default();

@@ -25,8 +25,8 @@ __all__ = ["Twin", "contact_on"]
 
 class Twin:
     """A simulated sensor whose tare was taken; nothing touches it. `camera`: "ov7725" with 156
-    frames a second, or "mt9v034" with 244. `contact`: what presses, as of `Sensor.set_contact`; the
-    simulated film is pressed by a needle. `seed`: decides the noise.
+    frames a second, "ov5640" with 119, or "mt9v034" with 232. `contact`: what presses, as of
+    `Sensor.set_contact`; the simulated film is pressed by a needle. `seed`: decides the noise.
 
     Raises `hivtac.Error` when there is no such camera or shape.
     """

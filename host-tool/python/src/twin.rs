@@ -9,7 +9,7 @@ use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::{Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, device_id};
-use hivtac_twin::{Layout, Scene};
+use hivtac_twin::Layout;
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -39,13 +39,14 @@ struct Simulated {
 
 #[pymethods]
 impl Twin {
-    /// A sensor with a camera, `ov7725` or `mt9v034`, told what presses it; nothing does yet. The
+    /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does yet. The
     /// seed decides its noise.
     #[new]
     fn start(py: Python<'_>, camera: &str, contact: &str, seed: u64) -> PyResult<Twin> {
-        let kinds = [Kind::Ov7725, Kind::Mt9v034];
+        let kinds = [Kind::Ov7725, Kind::Ov5640, Kind::Mt9v034];
         let kind = kinds.into_iter().find(|kind| kind.name() == camera);
-        let no_camera = || Error::new_err(format!("camera {camera:?}: use ov7725 or mt9v034"));
+        let no_camera =
+            || Error::new_err(format!("camera {camera:?}: use ov7725, ov5640 or mt9v034"));
         let kind = kind.ok_or_else(no_camera)?;
         let shape = contact_shape::parse(contact).map_err(Error::new_err)?;
         let started = py.detach(|| {
@@ -100,8 +101,8 @@ impl Twin {
 
 impl Simulated {
     fn start(kind: Kind, seed: u64) -> Result<Simulated, String> {
-        let [width, height] = kind.size().map(u32::from);
-        let scene = Scene::preset("rest", kind.preset(), width, height, seed)
+        let scene = kind
+            .scene("rest", Layout::default(), seed)
             .map_err(|error| error.to_string())?;
         let hand = Hand::at_once();
         let usual = Disturbances::default();

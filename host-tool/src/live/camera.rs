@@ -1,6 +1,6 @@
 //! The camera: its settings, the light that it needs, and its times.
 
-use hivtac_portable::device::camera::{mt9v034, ov7725};
+use hivtac_portable::device::camera::{Rolling, mt9v034, ov5640, ov7725};
 use hivtac_portable::device::model::Fitting;
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
@@ -8,7 +8,7 @@ use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_terms::units::{Microseconds, Sixteenths};
-use hivtac_twin::{Layout, Shutter};
+use hivtac_twin::{Layout, OV5640_NOISE, Options, Scene, SceneError, Shutter};
 use hivtac_wire::message::Inspection;
 use hivtac_wire::settings::CameraReport;
 
@@ -18,6 +18,8 @@ pub enum Kind {
     /// OmniVision OV7725: 320 × 240, in colour, rolling shutter, 156 frames a second.
     #[default]
     Ov7725,
+    /// OmniVision OV5640: 320 × 240, in colour, rolling shutter, 119 frames a second.
+    Ov5640,
     /// onsemi MT9V034: 160 × 152, mono, global shutter, 232 frames a second.
     Mt9v034,
 }
@@ -27,6 +29,7 @@ impl Kind {
     pub fn name(self) -> &'static str {
         match self {
             Kind::Ov7725 => ov7725::NAME,
+            Kind::Ov5640 => ov5640::NAME,
             Kind::Mt9v034 => mt9v034::NAME,
         }
     }
@@ -35,14 +38,41 @@ impl Kind {
     pub fn preset(self) -> Preset {
         match self {
             Kind::Ov7725 => ov7725::PRESET,
+            Kind::Ov5640 => ov5640::PRESET,
             Kind::Mt9v034 => mt9v034::PRESET,
         }
+    }
+
+    /// What it sees of the nominal sensor.
+    pub fn options(self) -> Options {
+        let options = Options::of(self.preset());
+        match self {
+            Kind::Ov5640 => Options {
+                noise: OV5640_NOISE,
+                ..options
+            },
+            Kind::Ov7725 | Kind::Mt9v034 => options,
+        }
+    }
+
+    /// A scene by its name, of the nominal sensor with these dots. The seed decides the noise.
+    ///
+    /// # Errors
+    /// When there is no such scene, or the film does not take the dots.
+    pub fn scene(self, name: &str, layout: Layout, seed: u64) -> Result<Scene, SceneError> {
+        let [width, height] = self.size().map(u32::from);
+        let options = Options {
+            layout,
+            ..self.options()
+        };
+        Scene::preset(name, self.preset(), width, height, seed)?.with_options(options)
     }
 
     /// Columns and rows of its frames.
     pub fn size(self) -> [u16; 2] {
         match self {
             Kind::Ov7725 => [ov7725::WIDTH, ov7725::HEIGHT],
+            Kind::Ov5640 => [ov5640::WIDTH, ov5640::HEIGHT],
             Kind::Mt9v034 => [mt9v034::WIDTH, mt9v034::HEIGHT],
         }
     }
@@ -51,6 +81,7 @@ impl Kind {
     pub fn motion(self) -> Motion {
         match self {
             Kind::Ov7725 => ov7725::MOTION,
+            Kind::Ov5640 => ov5640::MOTION,
             Kind::Mt9v034 => mt9v034::MOTION,
         }
     }
@@ -60,10 +91,12 @@ impl Kind {
     pub fn model(self, layout: Layout) -> &'static [u8] {
         let is_8v = "8v".parse() == Ok(layout);
         match self {
-            Kind::Ov7725 if is_8v => {
+            Kind::Ov7725 | Kind::Ov5640 if is_8v => {
                 include_bytes!("../../../calibration/models/8v/default.hvtm")
             }
-            Kind::Ov7725 => include_bytes!("../../../calibration/models/default.hvtm"),
+            Kind::Ov7725 | Kind::Ov5640 => {
+                include_bytes!("../../../calibration/models/default.hvtm")
+            }
             Kind::Mt9v034 => include_bytes!("../../../calibration/models/mt9v034/default.hvtm"),
         }
     }
@@ -76,6 +109,7 @@ impl Kind {
             geometry: Geometry::preset(self.preset(), width, height),
             pixels: match self {
                 Kind::Ov7725 => ov7725::PIXELS,
+                Kind::Ov5640 => ov5640::PIXELS,
                 Kind::Mt9v034 => mt9v034::PIXELS,
             },
             device_id,
@@ -85,6 +119,7 @@ impl Kind {
     fn limits(self) -> CameraLimits {
         match self {
             Kind::Ov7725 => ov7725::LIMITS,
+            Kind::Ov5640 => ov5640::LIMITS,
             Kind::Mt9v034 => mt9v034::LIMITS,
         }
     }
@@ -93,6 +128,7 @@ impl Kind {
     pub fn frame_us(self, rate: Rate) -> u32 {
         match self {
             Kind::Ov7725 => ov7725::frame_us(rate),
+            Kind::Ov5640 => ov5640::frame_us(rate),
             Kind::Mt9v034 => mt9v034::frame_us(rate),
         }
     }
@@ -102,7 +138,29 @@ impl Kind {
     fn well_exposed_us(self) -> f64 {
         match self {
             Kind::Ov7725 => 4_000.0,
+            Kind::Ov5640 => 25_300.0,
             Kind::Mt9v034 => 2_000.0,
+        }
+    }
+
+    /// The times of rows that are exposed one after the other; `None` if all are at once.
+    fn rows(self) -> Option<Rolling> {
+        match self {
+            Kind::Ov7725 => Some(ov7725::ROWS),
+            Kind::Ov5640 => Some(ov5640::ROWS),
+            Kind::Mt9v034 => None,
+        }
+    }
+
+    /// Part of a frame's time from its first row to its last.
+    fn readout(self) -> f64 {
+        match self {
+            Kind::Ov7725 => f64::from(ov7725::HEIGHT) / f64::from(ov7725::LINES),
+            Kind::Ov5640 => {
+                let rows = ov5640::WINDOW[1] / ov5640::SUBSAMPLING;
+                f64::from(rows) / f64::from(ov5640::LINES)
+            }
+            Kind::Mt9v034 => 0.0,
         }
     }
 }
@@ -165,9 +223,9 @@ impl Camera {
     /// The number of lines nearest to an exposure.
     fn lines_of(&self, exposure: Microseconds) -> u16 {
         let rate = self.settings.rate;
-        match self.kind {
-            Kind::Ov7725 => ov7725::ROWS.lines_in(exposure, rate),
-            Kind::Mt9v034 => mt9v034::rows_in(exposure).clamp(1, mt9v034::longest_exposure(rate)),
+        match self.kind.rows() {
+            Some(rows) => rows.lines_in(exposure, rate),
+            None => mt9v034::rows_in(exposure).clamp(1, mt9v034::longest_exposure(rate)),
         }
     }
 
@@ -178,9 +236,9 @@ impl Camera {
 
     /// The exposure of each row.
     fn exposed(&self) -> Microseconds {
-        match self.kind {
-            Kind::Ov7725 => ov7725::ROWS.exposed(self.lines.into(), self.settings.rate),
-            Kind::Mt9v034 => Microseconds(mt9v034::rows_us(self.lines)),
+        match self.kind.rows() {
+            Some(rows) => rows.exposed(self.lines.into(), self.settings.rate),
+            None => Microseconds(mt9v034::rows_us(self.lines)),
         }
     }
 
@@ -198,10 +256,7 @@ impl Camera {
         let frame_s = 1e-6 * f64::from(self.frame_us());
         Shutter {
             exposure_s: 1e-6 * f64::from(self.exposed().0),
-            readout_s: match self.kind {
-                Kind::Ov7725 => frame_s * f64::from(ov7725::HEIGHT) / f64::from(ov7725::LINES),
-                Kind::Mt9v034 => 0.0,
-            },
+            readout_s: frame_s * self.kind.readout(),
         }
     }
 
@@ -212,9 +267,9 @@ impl Camera {
 
     /// Time from a frame's begin to the middle of its exposure, µs.
     pub fn middle_us(&self) -> i32 {
-        match self.kind {
-            Kind::Ov7725 => ov7725::ROWS.middle_us(self.lines.into(), self.settings.rate),
-            Kind::Mt9v034 => mt9v034::middle_us(self.exposed()),
+        match self.kind.rows() {
+            Some(rows) => rows.middle_us(self.lines.into(), self.settings.rate),
+            None => mt9v034::middle_us(self.exposed()),
         }
     }
 
@@ -234,6 +289,7 @@ impl Camera {
             silicon: 0,
             camera_id: match self.kind {
                 Kind::Ov7725 => ov7725::ID,
+                Kind::Ov5640 => ov5640::ID,
                 Kind::Mt9v034 => mt9v034::ID,
             },
             registers: 0,
@@ -267,6 +323,21 @@ mod tests {
             "{}",
             hz(Kind::Mt9v034)
         );
+        assert!(
+            (hz(Kind::Ov5640) - 119.1).abs() < 0.1,
+            "{}",
+            hz(Kind::Ov5640)
+        );
+    }
+
+    #[test]
+    fn an_ov5640_exposes_for_the_whole_frame_and_amplifies() {
+        let usual = CameraSettings::default();
+        let camera = Camera::new(Kind::Ov5640, PixelFormat::Rgb565, usual, 1.0);
+        let shutter = camera.shutter();
+        assert!((shutter.exposure_s - 0.00832).abs() < 1e-5, "{shutter:?}");
+        assert!((shutter.readout_s - 0.00793).abs() < 3e-4, "{shutter:?}");
+        assert!((camera.brightness(1.0) - 1.0).abs() < 0.05, "{camera:?}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::course::Course;
 use super::hand::{Following, Hand};
 use super::pair::{self, PairFilm};
 use hivtac_terms::threshold::PixelFormat;
-use hivtac_twin::{Format, Frame, Load, Options, Paint, Patch, Scene, SceneError, Shutter, Truth};
+use hivtac_twin::{Format, Frame, Load, Paint, Patch, Scene, SceneError, Shutter, Truth};
 
 /// The light's reflection under `glare`: on the edge of marker 0, where it cuts a part off.
 const GLARE: Patch = Patch {
@@ -126,7 +126,7 @@ impl Eye {
         if size != kind.size().map(u32::from) {
             return Err(NotSeen::Size(size, kind.size()));
         }
-        let usual = Options::of(kind.preset());
+        let usual = kind.options();
         if scene.options().format != usual.format {
             return Err(NotSeen::Key("format"));
         }

@@ -152,7 +152,6 @@ mod tests {
     use crate::live::hand::Hand;
     use hivtac_terms::contact_shape::ContactShape;
     use hivtac_terms::status::Status;
-    use hivtac_twin::Options;
     use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
     use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request, Sample};
     use hivtac_wire::version::HelloPrefix;
@@ -177,12 +176,7 @@ mod tests {
     /// The samples of frames under two fingers.
     fn samples(count: u32) -> Vec<Sample> {
         let (kind, layout) = (Kind::Ov7725, "8v".parse().unwrap());
-        let scene = Scene::preset("rest", kind.preset(), 320, 240, 1).unwrap();
-        let options = Options {
-            layout,
-            ..scene.options().clone()
-        };
-        let scene = scene.with_options(options).unwrap();
+        let scene = kind.scene("rest", layout, 1).unwrap();
         let hand = Hand::at_once();
         let usual = Disturbances::default();
         let mut eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone()).unwrap();

@@ -212,10 +212,12 @@ pub fn device_id(kind: Kind, unit: u64) -> [u8; 12] {
     if let Some(place) = id.get_mut(4..) {
         place.copy_from_slice(&number);
     }
-    if kind == Kind::Mt9v034
-        && let Some(first) = id.get_mut(4)
-    {
-        *first |= 0x80;
+    if let Some(first) = id.get_mut(4) {
+        *first |= match kind {
+            Kind::Ov7725 => 0,
+            Kind::Ov5640 => 0x40,
+            Kind::Mt9v034 => 0x80,
+        };
     }
     id
 }

@@ -9,7 +9,7 @@ use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::Hand;
 use hivtac_host::live::run::device_id;
 use hivtac_twin::units;
-use hivtac_twin::{Layout, Options, Scene};
+use hivtac_twin::{Layout, Scene};
 use std::ops::RangeInclusive;
 
 /// Number of the nominal unit.
@@ -25,8 +25,8 @@ pub struct Simulated {
     /// Forces from a CSV file of `monitor --csv` in place of the scene's, again and again
     #[arg(long, value_name = "FILE")]
     course: Option<String>,
-    /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, or mt9v034
-    /// with 232
+    /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, ov5640 with
+    /// 119, or mt9v034 with 232
     #[arg(long, value_enum)]
     camera: Option<CameraName>,
     /// The dots on the film of a scene by name, and the model for them: 4 when not given, or 8v
@@ -60,6 +60,7 @@ pub struct Simulated {
 enum CameraName {
     #[default]
     Ov7725,
+    Ov5640,
     Mt9v034,
 }
 
@@ -80,6 +81,7 @@ impl Simulated {
     pub fn build(&self, before: Before, hand: Hand) -> Result<(Device, Eye), Failure> {
         let kind = match self.camera.unwrap_or_default() {
             CameraName::Ov7725 => Kind::Ov7725,
+            CameraName::Ov5640 => Kind::Ov5640,
             CameraName::Mt9v034 => Kind::Mt9v034,
         };
         let name = self.scene.as_deref().unwrap_or(match before {
@@ -100,7 +102,7 @@ impl Simulated {
         if kind == Kind::Mt9v034 && layout != Layout::default() {
             return Err(refused(
                 name,
-                "only the camera ov7725 has models of other dots",
+                "the camera mt9v034 has no model of other dots",
             ));
         }
         let eye = Eye::new(kind, scene, presses, disturbances, hand);
@@ -124,23 +126,13 @@ impl Simulated {
             let text = read(name)?;
             return Scene::from_toml(&text).map_err(|error| refused(name, error));
         }
-        let [width, height] = kind.size().map(u32::from);
-        let scene = Scene::preset(name, kind.preset(), width, height, self.seed.unwrap_or(1));
-        let scene = scene.map_err(|error| {
-            Failure::input(format!(
-                "{error}; or a scene file, whose name ends with .toml"
-            ))
-        })?;
-        let Some(layout) = self.layout else {
-            return Ok(scene);
-        };
-        let options = Options {
-            layout,
-            ..scene.options().clone()
-        };
-        scene
-            .with_options(options)
-            .map_err(|error| refused(name, error))
+        let layout = self.layout.unwrap_or_default();
+        kind.scene(name, layout, self.seed.unwrap_or(1))
+            .map_err(|error| {
+                Failure::input(format!(
+                    "{error}; or a scene file, whose name ends with .toml"
+                ))
+            })
     }
 
     fn as_unit(&self, name: &str, scene: Scene) -> Result<Scene, Failure> {

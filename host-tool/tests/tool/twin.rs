@@ -251,11 +251,8 @@ fn truth_of(log: &str, sample: &Value) -> Value {
 
 #[test]
 fn forces_of_a_press_are_within_three_sigma_of_the_truth() {
-    for camera in ["ov7725", "mt9v034"] {
-        let size = match camera {
-            "ov7725" => "",
-            _ => "[camera]\npreset = \"mt9v034\"\n",
-        };
+    for camera in ["ov7725", "ov5640", "mt9v034"] {
+        let size = format!("[camera]\npreset = \"{camera}\"\n");
         let folder = tempfile::tempdir().unwrap();
         let [scene, log] = ["press.toml", "truth.jsonl"].map(|name| text(&folder, name));
         std::fs::write(&scene, format!("{size}{PRESSED}")).unwrap();
@@ -283,7 +280,7 @@ fn forces_of_a_press_are_within_three_sigma_of_the_truth() {
 
 #[test]
 fn frames_come_at_the_cameras_rate() {
-    for (camera, hz) in [("ov7725", 156.1), ("mt9v034", 231.9)] {
+    for (camera, hz) in [("ov7725", 156.1), ("ov5640", 119.1), ("mt9v034", 231.9)] {
         let twin = Twin::of(&["--camera", camera]);
         let samples = twin.samples(&["--seconds", "2"]);
         let time = |sample: &Value| 1e-6 * sample["time_us"].as_f64().unwrap();

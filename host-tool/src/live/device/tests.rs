@@ -4,7 +4,7 @@ use super::{Captured, Device};
 use crate::live::camera::Kind;
 use crate::live::eye::{Disturbances, Eye, Presses};
 use crate::live::hand::Hand;
-use hivtac_twin::{Layout, Scene};
+use hivtac_twin::Layout;
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{
     Command, DeviceMessage, HostHello, HostMessage, ModelPart, Outcome, Request,
@@ -21,7 +21,7 @@ struct Tested {
 impl Tested {
     fn new() -> Tested {
         let kind = Kind::Ov7725;
-        let scene = Scene::preset("rest", kind.preset(), 320, 240, 1).unwrap();
+        let scene = kind.scene("rest", Layout::default(), 1).unwrap();
         let undisturbed = Disturbances::default();
         Tested {
             device: Device::new(kind, Layout::default(), [7; 12], 1.0),
