@@ -3,7 +3,7 @@
 //! ```text
 //! vsync ─┐
 //! camera ┴→ capture → bands → pipeline → outbox → usb → host
-//!                                ↑                 │
+//!                                ↑ └─→ uart        │
 //!                             orders ← commands ←──┘
 //!                                         └→ memory → flash
 //! ```
@@ -55,6 +55,7 @@ mod stats;
 mod supply;
 mod tare;
 mod thermometer;
+mod uart;
 mod usb;
 mod usb_core;
 mod usb_guard;
@@ -145,6 +146,7 @@ fn start() -> Foreground {
 
     let usb = USB_EXECUTOR.start(priorities::USB_EXECUTOR);
     usb.spawn(token(usb::run(board.usb)));
+    usb.spawn(token(uart::run(board.uart)));
     usb.spawn(token(memory::run(memory)));
     usb.spawn(token(led::run(board.led)));
     let capture = CAPTURE_EXECUTOR.start(priorities::CAPTURE_EXECUTOR);

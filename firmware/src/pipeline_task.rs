@@ -13,7 +13,7 @@ use crate::orders::{ORDERS, Order};
 use crate::session::Origin;
 use crate::snapshot_copy::SnapshotCopy;
 use crate::tare::Taring;
-use crate::{outbox, output, seeded_bugs, session, settings, stats, vsync};
+use crate::{outbox, output, seeded_bugs, session, settings, stats, uart, vsync};
 use embassy_futures::select::{Either3, select3};
 use embassy_time::{Instant, Timer};
 use hivtac_portable::capture::{Action, Band, Delivery, Ending, Event, Follower};
@@ -327,8 +327,9 @@ impl PipelineTask {
         });
         if session::is_streaming() {
             self.sequence = self.sequence.wrapping_add(1);
-            outbox::offer_sample(sample);
+            outbox::offer_sample(sample.clone());
         }
+        uart::offer(sample);
         // After the sample, which goes first.
         let threshold = self.sensor.threshold();
         self.snapshots.frame(frame, time_us, threshold);

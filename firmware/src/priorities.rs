@@ -6,7 +6,7 @@
 //! | 1 | DCMI and its DMA | a band takes the number of the newest VSYNC edge; neither interrupts the other |
 //! | 2 | time driver | wakes the tasks below |
 //! | 3 | capture task | sets the camera up while nothing else works |
-//! | 4 | USB core | moves packets between its FIFOs and memory |
+//! | 4 | USB core, DMA of the UART | moves packets between its FIFOs and memory; tells that a frame was sent |
 //! | 5 | USB tasks | answer the host while a frame is being processed |
 //! | thread | processing, health | takes milliseconds and may be interrupted by all above |
 
@@ -20,6 +20,9 @@ pub const USB_EXECUTOR: interrupt::Interrupt = interrupt::UART5;
 
 /// Priority of DCMI and its DMA, which is set during their set-up.
 pub const CAPTURE: Priority = Priority::P1;
+
+/// Priority of the HAL's DMA: the UART's.
+pub const DMA: Priority = Priority::P4;
 
 /// Sets every other priority. Call once, before any of these interrupts is enabled.
 pub fn set() {

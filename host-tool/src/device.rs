@@ -11,7 +11,8 @@ use std::time::Duration;
 /// One device.
 #[derive(Args, Default)]
 pub struct Device {
-    /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
+    /// Serial port, pseudo-terminal, tcp:HOST:PORT, or uart:PORT with an adapter for the sensor's
+    /// UART; found by its USB id when not given
     #[arg(long, value_name = "PORT", conflicts_with = "device")]
     port: Option<String>,
     /// The sensor with this name or serial number, as `list` shows them
@@ -25,8 +26,8 @@ pub struct Device {
 /// One device, or several.
 #[derive(Args)]
 pub struct Devices {
-    /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given. May be
-    /// repeated
+    /// Serial port, pseudo-terminal, tcp:HOST:PORT, or uart:PORT with an adapter for the sensor's
+    /// UART; found by its USB id when not given. May be repeated
     #[arg(long, value_name = "PORT")]
     port: Vec<String>,
     /// The sensor with this name or serial number, as `list` shows them. May be repeated

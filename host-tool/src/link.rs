@@ -33,10 +33,12 @@ pub struct Link {
     last_id: u16,
     /// Bytes that came, whatever they were.
     came: u64,
+    /// The device only sends over this port, and streams by itself.
+    only_sends: bool,
 }
 
 impl Link {
-    /// Opens the port and exchanges hellos.
+    /// Opens the port and exchanges hellos. On a UART, waits for the device's.
     ///
     /// # Errors
     /// [`Kind::NoDevice`] when the port cannot be opened or no hello comes within `patience`;
@@ -50,9 +52,13 @@ impl Link {
     /// Has a device that speaks another version of the protocol start its own loader.
     ///
     /// # Errors
-    /// [`Kind::NoDevice`] when the port cannot be opened; [`Kind::Lost`] when it takes no bytes.
+    /// [`Kind::NoDevice`] when the port cannot be opened; [`Kind::Lost`] when it takes no bytes;
+    /// [`Kind::Refused`] over a UART.
     pub fn start_loader(address: &Address, patience: Duration) -> Result<(), Failure> {
         let mut link = Link::open(address)?;
+        if link.only_sends {
+            return Err(link.cannot_ask("start loader"));
+        }
         link.write(&[0])?;
         link.send(&HostMessage::Hello(HelloPrefix::START_LOADER.into()))?;
         // Its hello, which is of that version: then it has read ours.
@@ -71,6 +77,7 @@ impl Link {
             decoded: 0,
             last_id: 0,
             came: 0,
+            only_sends: address.only_sends(),
         })
     }
 
@@ -78,7 +85,9 @@ impl Link {
         let end = Instant::now() + patience;
         let mut pause = HELLO_AGAIN;
         while Instant::now() < end {
-            self.say_hello()?;
+            if !self.only_sends {
+                self.say_hello()?;
+            }
             let next = end.min(Instant::now() + pause);
             pause = HELLO_AT_LEAST_EVERY.min(pause * 2);
             while let Some(message) = self.receive(next)? {
@@ -181,6 +190,15 @@ impl Link {
         }
     }
 
+    /// The failure for what a device is asked over a port on which it only sends.
+    fn cannot_ask(&self, what: &str) -> Failure {
+        let message = format!(
+            "cannot ask the device over {}: \"{what}\": it only sends samples there; use its USB port",
+            self.name
+        );
+        Failure::new(Kind::Refused, message)
+    }
+
     /// The failure for a broken connection.
     pub fn lost(&self, why: &str) -> Failure {
         let name = &self.name;
@@ -195,10 +213,23 @@ impl Link {
         Failure::new(Kind::Lost, message)
     }
 
-    /// Sends a command without waiting for its reply; returns its id.
+    /// Sends a command without waiting for its reply; returns its id. Over a UART it is not sent:
+    /// samples, hello and statistics come without one.
+    ///
+    /// # Errors
+    /// [`Kind::Lost`] or [`Kind::Interrupted`]; [`Kind::Refused`] for any other command over a
+    /// UART.
     pub fn command(&mut self, request: Request) -> Result<u16, Failure> {
         self.last_id = self.last_id.wrapping_add(1);
         let id = self.last_id;
+        if self.only_sends {
+            return match request {
+                Request::GetInfo | Request::Start | Request::StartWithMarkers | Request::Stop => {
+                    Ok(id)
+                }
+                other => Err(self.cannot_ask(name_of(&other))),
+            };
+        }
         self.send(&HostMessage::Command(Command { id, request }))?;
         Ok(id)
     }
@@ -207,8 +238,11 @@ impl Link {
     /// sends no reply, and this may be called at any rate.
     ///
     /// # Errors
-    /// [`Kind::Lost`] or [`Kind::Interrupted`].
+    /// [`Kind::Lost`] or [`Kind::Interrupted`]; [`Kind::Refused`] over a UART.
     pub fn set_down(&mut self, down: Down) -> Result<(), Failure> {
+        if self.only_sends {
+            return Err(self.cannot_ask("set gravity"));
+        }
         self.send(&HostMessage::Down(down))
     }
 
@@ -224,6 +258,9 @@ impl Link {
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<(), Failure> {
         let (asked, id) = (request.clone(), self.command(request)?);
+        if self.only_sends {
+            return Ok(());
+        }
         let end = Instant::now() + patience;
         while let Some(message) = self.receive(end)? {
             match message {
@@ -247,6 +284,9 @@ impl Link {
         patience: Duration,
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<bool, Failure> {
+        if self.only_sends {
+            return Err(self.lost("the device sends nothing"));
+        }
         let id = self.command(Request::GetInfo)?;
         let end = Instant::now() + patience;
         while let Some(message) = self.receive(end)? {
@@ -364,6 +404,7 @@ mod tests {
             came: 0,
             decoded: 0,
             last_id: 0,
+            only_sends: false,
         };
         link.write(&[1, 2, 3]).unwrap();
         drop(link);
@@ -414,6 +455,7 @@ mod tests {
                 came: 0,
                 decoded: 0,
                 last_id: 0,
+                only_sends: false,
             };
             let mut seen = Vec::new();
             let result = link.probe(Duration::from_millis(20), |message| seen.push(message));

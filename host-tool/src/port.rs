@@ -1,6 +1,8 @@
-//! Opens the device's port: a serial port found by USB id or name, or a TCP address.
+//! Opens the device's port: a serial port found by USB id or name, a TCP address, or the UART on
+//! which a device only sends.
 
 use crate::failure::{Failure, Kind};
+use hivtac_wire::uart::BAUD;
 use hivtac_wire::usb::{PRODUCT, PRODUCT_ID, VENDOR_ID};
 use serialport::{ErrorKind, SerialPortInfo, SerialPortType, UsbPortInfo};
 use std::io::{self, Read, Write};
@@ -9,6 +11,10 @@ use std::time::Duration;
 
 /// Longest wait of one read or write.
 const PATIENCE: Duration = Duration::from_millis(50);
+/// Over USB, the device ignores the baud rate, which some drivers require.
+const USB_BAUD: u32 = 115_200;
+/// What a UART's address begins with.
+const UART: &str = "uart:";
 /// Longest wait for a TCP connection.
 const TCP_PATIENCE: Duration = Duration::from_secs(2);
 
@@ -28,15 +34,25 @@ pub enum Address {
     Tty(String),
     /// `host:port`.
     Tcp(String),
+    /// The serial port of an adapter for the device's UART, or `tcp:host:port` of a bridge to it.
+    Uart(String),
 }
 
 impl Address {
-    /// From the text of `--port`: `tcp:HOST:PORT`, or the name of a serial port.
+    /// From the text of `--port`: `tcp:HOST:PORT`, `uart:PORT`, or the name of a serial port.
     pub fn parse(text: &str) -> Address {
+        if let Some(line) = text.strip_prefix(UART) {
+            return Address::Uart(line.to_owned());
+        }
         match text.strip_prefix("tcp:") {
             Some(address) => Address::Tcp(address.to_owned()),
             None => Address::Tty(text.to_owned()),
         }
+    }
+
+    /// True for a line on which the device only sends.
+    pub fn only_sends(&self) -> bool {
+        matches!(self, Address::Uart(_))
     }
 
     /// Opens the port; returns it with its name.
@@ -45,10 +61,11 @@ impl Address {
     /// [`Kind::NoDevice`] when the port is missing or cannot be opened.
     pub fn open(&self) -> Result<(Box<dyn Port>, String), Failure> {
         match self {
-            Address::Find => open_tty(&find(&ports()?)?),
-            Address::Serial(number) => open_tty(&find_serial(&ports()?, number)?),
-            Address::Tty(name) => open_tty(name),
+            Address::Find => open_tty(&find(&ports()?)?, USB_BAUD),
+            Address::Serial(number) => open_tty(&find_serial(&ports()?, number)?, USB_BAUD),
+            Address::Tty(name) => open_tty(name, USB_BAUD),
             Address::Tcp(address) => open_tcp(address),
+            Address::Uart(line) => open_uart(line),
         }
     }
 }
@@ -170,9 +187,17 @@ fn describe(port: &SerialPortInfo) -> String {
     }
 }
 
-fn open_tty(name: &str) -> Result<(Box<dyn Port>, String), Failure> {
-    // The device ignores the baud rate, which some drivers require. DTR signals a host to it.
-    let port = serialport::new(name, 115_200)
+fn open_uart(line: &str) -> Result<(Box<dyn Port>, String), Failure> {
+    let opened = match line.strip_prefix("tcp:") {
+        Some(address) => open_tcp(address),
+        None => open_tty(line, BAUD),
+    };
+    opened.map(|(port, name)| (port, format!("{UART}{name}")))
+}
+
+fn open_tty(name: &str, baud: u32) -> Result<(Box<dyn Port>, String), Failure> {
+    // DTR signals a host to the device's USB.
+    let port = serialport::new(name, baud)
         .timeout(PATIENCE)
         .dtr_on_open(true)
         .open();
@@ -264,6 +289,9 @@ mod tests {
             Address::Tty("/dev/ttyACM0".into())
         );
         assert_eq!(Address::parse("COM3"), Address::Tty("COM3".into()));
+        let uart = Address::parse("uart:/dev/ttyUSB0");
+        assert_eq!(uart, Address::Uart("/dev/ttyUSB0".into()));
+        assert!(uart.only_sends());
     }
 
     #[test]

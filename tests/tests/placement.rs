@@ -141,9 +141,13 @@ fn what_every_pixel_needs_lies_in_dtcm() {
 }
 
 #[test]
-fn axi_sram_has_the_ring_of_bands_and_a_snapshot_and_nothing_else() {
+fn axi_sram_has_what_the_dma_uses_and_nothing_else() {
     let symbols = symbols();
-    let buffers = [["bands", "RING"], ["snapshot", "FRAME"]];
+    let buffers = [
+        ["bands", "RING"],
+        ["snapshot", "FRAME"],
+        ["uart", "UART_FRAME"],
+    ];
     for words in buffers {
         for symbol in variables(&symbols, &words) {
             assert!(symbol.lies_in(&AXI_SRAM), "{}", symbol.name);

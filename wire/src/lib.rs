@@ -16,6 +16,7 @@ pub mod image;
 pub mod kept;
 pub mod message;
 pub mod settings;
+pub mod uart;
 pub mod usb;
 pub mod version;
 

@@ -3,7 +3,7 @@
 
 mod parts;
 mod silicon;
-pub use parts::{StatusLed, UsbPort};
+pub use parts::{StatusLed, UartPort, UsbPort};
 pub use silicon::revision as silicon_revision;
 
 #[cfg(feature = "board-openmv-h7")]

@@ -11,9 +11,10 @@
 //! | USB D−, D+ | PA11, PA12 |
 //! | LED (green) | PC1, low = on |
 //! | output | PD12, P7 of the header |
+//! | UART for samples | PB10 (USART3), P4 of the header |
 //! | crystal | 12 MHz |
 
-use super::parts::{self, Board, StatusLed, UsbPort};
+use super::parts::{self, Board, StatusLed, UartPort, UsbPort};
 use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
@@ -84,6 +85,11 @@ pub fn start() -> Board {
             core: p.USB_OTG_FS,
             plus: p.PA12,
             minus: p.PA11,
+        },
+        uart: UartPort {
+            usart: p.USART3,
+            pin: p.PB10,
+            dma: p.DMA2_CH0,
         },
         led: StatusLed {
             pin: Output::new(p.PC1, Level::High, Speed::Low),

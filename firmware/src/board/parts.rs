@@ -5,6 +5,7 @@ use crate::band_copy::BandCopy;
 use crate::camera::{BUS_CLOCK, Camera};
 use crate::capture::Capture;
 use crate::flash::SecondBank;
+use crate::priorities;
 use crate::seeded_bugs;
 use crate::snapshot_copy::SnapshotCopy;
 use crate::thermometer::Thermometer;
@@ -33,6 +34,8 @@ pub struct Board {
     pub thermometer: Thermometer,
     /// The parts that the USB task needs for its driver.
     pub usb: UsbPort,
+    /// The parts that the UART's task needs for its driver.
+    pub uart: UartPort,
     /// The status LED, off.
     pub led: StatusLed,
 }
@@ -45,6 +48,16 @@ pub struct UsbPort {
     pub plus: Peri<'static, peripherals::PA12>,
     /// D−.
     pub minus: Peri<'static, peripherals::PA11>,
+}
+
+/// The UART for samples.
+pub struct UartPort {
+    /// The UART.
+    pub usart: Peri<'static, peripherals::USART3>,
+    /// Its output.
+    pub pin: Peri<'static, peripherals::PB10>,
+    /// The stream that writes its data register.
+    pub dma: Peri<'static, peripherals::DMA2_CH0>,
 }
 
 /// The status LED.
@@ -93,6 +106,7 @@ pub fn clocks(crystal_hz: u32, prediv: PllPreDiv, mul: PllMul) -> embassy_stm32:
     config.rcc.apb3_pre = APBPrescaler::DIV2;
     config.rcc.apb4_pre = APBPrescaler::DIV2;
     clock_usb(&mut config.rcc);
+    config.dma_interrupt_priority = priorities::DMA;
     config
 }
 

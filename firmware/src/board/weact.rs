@@ -10,9 +10,10 @@
 //! | USB D−, D+ | PA11, PA12 |
 //! | LED | PE3, high = on |
 //! | output | PE7 |
+//! | UART for samples | PB10 (USART3) |
 //! | crystal | 25 MHz |
 
-use super::parts::{self, Board, StatusLed, UsbPort};
+use super::parts::{self, Board, StatusLed, UartPort, UsbPort};
 use super::silicon::{self, Led};
 use crate::band_copy::BandCopy;
 use crate::band_dma::BandDma;
@@ -76,6 +77,11 @@ pub fn start() -> Board {
             core: p.USB_OTG_FS,
             plus: p.PA12,
             minus: p.PA11,
+        },
+        uart: UartPort {
+            usart: p.USART3,
+            pin: p.PB10,
+            dma: p.DMA2_CH0,
         },
         led: StatusLed {
             pin: Output::new(p.PE3, Level::Low, Speed::Low),

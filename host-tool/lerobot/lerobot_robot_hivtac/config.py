@@ -12,7 +12,7 @@ class FingerConfig:
     """A sensor: by its port or its name, or the only one that is plugged in."""
 
     port: str | None = None
-    """A serial port's name, or `tcp:HOST:PORT`."""
+    """A serial port's name, `tcp:HOST:PORT`, or `uart:PORT` of an adapter for the UART."""
     device: str | None = None
     """The sensor's name or serial number."""
     picture: bool = False

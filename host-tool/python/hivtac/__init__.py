@@ -259,9 +259,9 @@ class Picture:
 def open(
     port: str | None = None, *, device: str | None = None, timeout: float = 2.0
 ) -> Sensor:
-    """Connects to a sensor: to the only one that is plugged in, to a port (a serial port's name, or
-    `tcp:HOST:PORT`), or to the `device` with a name or serial number. `timeout`: longest wait for
-    its answers, s.
+    """Connects to a sensor: to the only one that is plugged in, to a port (a serial port's name,
+    `tcp:HOST:PORT`, or `uart:PORT`), or to the `device` with a name or serial number. `timeout`:
+    longest wait for its answers, s.
 
     Raises `NoDeviceError` when the sensor is missing or does not answer, `VersionError` when its
     protocol has another version.

@@ -21,5 +21,6 @@ mod snapshot;
 mod threshold_auto;
 #[cfg(feature = "twin")]
 mod twin;
+mod uart;
 mod update;
 mod view;

@@ -97,9 +97,9 @@ const REASONS: [(&str, usize, &str); 19] = [
     ),
     (
         "embassy_executor",
-        29,
-        "the same of the capture, USB and memory tasks, compiled into their executor; executors \
-         start once",
+        33,
+        "the same of the capture, USB, UART and memory tasks, compiled into their executor; the \
+         UART's driver has its DMA; executors start once",
     ),
     (
         "embassy_sync",
@@ -108,9 +108,10 @@ const REASONS: [(&str, usize, &str); 19] = [
     ),
     (
         "embassy_stm32",
-        66,
-        "clocks, pins and timings that are constants, at the start; the time driver's cells, in \
-         a critical section and so never borrowed twice",
+        99,
+        "clocks, pins, rates and timings that are constants, at the start; the UART's DMA, whose \
+         addresses are constants within its reach, and whose lengths are those of frames; the \
+         time driver's cells, in a critical section and so never borrowed twice",
     ),
     (
         "embassy_time",

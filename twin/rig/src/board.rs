@@ -1,7 +1,8 @@
 //! The board's wiring: the pins that carry the camera's power, clock and signals, and USB's needs.
 //!
 //! On both boards: the camera's control bus on PB8 and PB9, D0–D4 on PC6 PC7 PE0 PE1 PE4, D6 and D7
-//! on PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB on PA11 and PA12.
+//! on PE5 PE6, VSYNC PB7, HSYNC PA4, PIXCLK PA6, USB on PA11 and PA12, the UART for samples on
+//! PB10.
 //!
 //! | | WeAct MiniSTM32H743 | OpenMV Cam H7 |
 //! |---|---|---|
@@ -39,6 +40,7 @@ pub const VSYNC_PORT: usize = B;
 const AF_MCO: u8 = 0;
 const AF_TIM1: u8 = 1;
 const AF_I2C1: u8 = 4;
+const AF_USART3: u8 = 7;
 const AF_USB: u8 = 10;
 const AF_DCMI: u8 = 13;
 
@@ -132,6 +134,9 @@ impl Kind {
     }
 }
 
+/// The UART for samples, USART3, by its place in the part.
+pub const UART: usize = 2;
+
 /// Returns the pin of VSYNC, PB7.
 pub fn vsync_pin() -> Pin {
     pin(7)
@@ -154,6 +159,8 @@ pub struct Wiring {
     pub led: bool,
     /// The output pin is high.
     pub output: bool,
+    /// The UART for samples has its pin.
+    pub uart: bool,
 }
 
 /// Slots of the registers that decide the wiring.
@@ -229,6 +236,7 @@ impl Slots {
             usb_hz: self.usb_hz(part),
             led: self.driven(part, led) == Some(on),
             output: self.driven(part, self.board.output()) == Some(Level::High),
+            uart: carries(B, 10, AF_USART3),
         }
     }
 

@@ -5,6 +5,8 @@
 //! MDMA, CRC, CRS, IWDG, the flash, and the three blocks of OTG2. All other accesses go to the
 //! part's own models.
 
+use std::any::Any;
+
 use rigless::device::{Device, ErasedDevice, Level, ResetCause};
 use rigless::emulator::{Access, AccessKind, Memory};
 use rigless::mcu::Mcu;
@@ -31,6 +33,7 @@ use crate::peripherals::iwdg::Iwdg;
 use crate::peripherals::mdma::Mdma;
 use crate::peripherals::otg::{Blocks, SharedCore};
 use crate::rules::Rules;
+use crate::uart_line::{Heard, Listener};
 use crate::usb_host::SharedHost;
 
 /// The board's supply, mV.
@@ -162,6 +165,7 @@ impl Chip {
             part::Kind::Ov5640 => part.i2c[0].attach(Sccb::new(camera.clone(), sccb::OV5640)),
             part::Kind::Mt9v034 => part.i2c[0].attach(TwoWire::new(camera.clone())),
         };
+        part.usart[board::UART].attach(Listener::default());
         let core = SharedCore::new(faults.clone(), seed);
         let late_flags = LateFlags::new(faults.clone(), seed);
         let mut otg = Blocks::fit(&mut part, &core, &host)?;
@@ -256,6 +260,13 @@ impl Chip {
         &self.output.0
     }
 
+    /// Returns what came over the UART for samples.
+    pub fn uart_heard(&self) -> &[Heard] {
+        let peer = self.part.usart[board::UART].peer();
+        let listener = peer.and_then(|peer| (peer as &dyn Any).downcast_ref::<Listener>());
+        listener.map_or(&[], |listener| &listener.heard)
+    }
+
     /// Returns the count of words that the firmware wrote into full USB FIFOs.
     pub fn lost_usb_words(&self) -> u64 {
         self.core.lock().lost_words
@@ -283,6 +294,8 @@ impl Chip {
             }
             self.wiring = wiring;
             self.dcmi.wire(wiring.pins, wiring.hclk_hz);
+            // Without its pin, nothing of it reaches the line.
+            let _ = self.part.usart[board::UART].silence(!wiring.uart);
             let mut core = self.core.lock();
             (core.wired, core.clock_hz) = (wiring.usb, wiring.usb_hz);
             drop(core);

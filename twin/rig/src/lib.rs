@@ -17,6 +17,7 @@
 //! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
 //! | [`usb_host`], [`link`], [`usbip`], [`script`] | the host; who uses its serial port, or the device itself |
 //! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules`, `power` | what goes wrong on request; what firmware must not do; what a power-on leaves |
+//! | [`uart_line`] | what listens to the UART for samples |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
 pub mod arrivals;
@@ -46,5 +47,6 @@ pub mod script;
 mod start_rules;
 mod translations;
 pub mod truth;
+pub mod uart_line;
 pub mod usb_host;
 pub mod usbip;

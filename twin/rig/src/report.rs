@@ -11,6 +11,7 @@ use crate::camera::SharedCamera;
 use crate::chip::Chip;
 use crate::peripherals::dcmi;
 use crate::peripherals::flash::{Bank, Operation};
+use crate::uart_line::Heard;
 use crate::usb_host::{self, Port, SharedHost};
 
 /// Counters of a run.
@@ -54,6 +55,8 @@ pub struct Report {
     pub usb: usb_host::Counters,
     /// Events on the USB port.
     pub usb_log: Vec<String>,
+    /// Bytes that came over the UART for samples.
+    pub uart: Vec<Heard>,
     /// Words that the firmware wrote into full USB FIFOs.
     pub lost_usb_words: u64,
     /// Accesses to addresses without a device, or refused by a clock gate.
@@ -102,6 +105,7 @@ impl Report {
             port: host.port(),
             usb: host.counters(),
             usb_log: host.log().to_vec(),
+            uart: chip.uart_heard().to_vec(),
             lost_usb_words: chip.lost_usb_words(),
             refused: unmapped.chain(refused).collect(),
             warnings: session
@@ -153,6 +157,7 @@ impl Report {
                 "lost_words": self.lost_usb_words,
                 "log": self.usb_log,
             },
+            "uart": { "bytes": self.uart.len() },
             "refused": self.refused,
             "warnings": self.warnings,
         })

@@ -28,6 +28,7 @@ mod slip;
 mod snapshot;
 mod tare;
 mod threshold;
+mod uart;
 mod usb;
 mod usb_dead;
 mod usbip;

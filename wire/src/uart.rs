@@ -1,0 +1,5 @@
+//! Defines the UART on which a device sends its samples, beside USB.
+
+/// Bits a second; each byte has one start bit, eight data bits and one stop bit. Common adapters
+/// go that fast.
+pub const BAUD: u32 = 2_000_000;
