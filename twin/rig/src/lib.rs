@@ -18,9 +18,11 @@
 //! | [`usb_host`], [`link`], [`usbip`], [`script`] | the host; who uses its serial port, or the device itself |
 //! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules`, `power` | what goes wrong on request; what firmware must not do; what a power-on leaves |
 //! | [`uart_line`] | what listens to the UART for samples |
+//! | [`awake`] | how long the core sleeps |
 //! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
 
 pub mod arrivals;
+pub mod awake;
 pub mod board;
 mod busy_bus;
 pub mod camera;

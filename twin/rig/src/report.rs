@@ -19,6 +19,9 @@ use crate::usb_host::{self, Port, SharedHost};
 pub struct Report {
     /// Virtual time, ns.
     pub virtual_ns: u64,
+    /// Share of the time during which the core executed instructions, once the camera was set up;
+    /// asleep in the rest. `None` in a run that ended before.
+    pub awake: Option<f64>,
     /// Wall time.
     pub wall: Duration,
     /// Times of the LED's switches, on and off in turn, ns.
@@ -87,6 +90,7 @@ impl Report {
             .map(|(address, fault)| format!("{address:#010x}: {fault}"));
         Self {
             virtual_ns,
+            awake: None,
             wall,
             resets: session.resets().len(),
             led_edges_ns: chip.led_edges_ns().to_vec(),
@@ -124,6 +128,7 @@ impl Report {
     pub fn json(&self) -> Value {
         json!({
             "virtual_s": self.virtual_ns as f64 / 1e9,
+            "awake": self.awake,
             "wall_s": self.wall.as_secs_f64(),
             "wall_per_frame_s": self.wall_per_frame_s(),
             "resets": self.resets,

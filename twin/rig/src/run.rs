@@ -15,6 +15,7 @@ use rigless::session::Session;
 use rigless::time::VirtualNanos;
 
 use crate::arrivals::Arrivals;
+use crate::awake::Awake;
 use crate::board;
 use crate::camera::{Camera, SharedCamera, part};
 use crate::chip::{Chip, Revision};
@@ -189,6 +190,7 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
         settling_until: 0,
         next_look: 0,
         settled_at_ns: 0,
+        awake: Awake::new(options.instructions_per_second),
         restart: None,
         seed: options.seed,
         is_on: false,
@@ -214,7 +216,10 @@ pub fn run(options: Options) -> anyhow::Result<Outcome> {
     );
     Ok(Outcome {
         bytes: finished.driver.bytes,
-        report,
+        report: Report {
+            awake: finished.driver.awake.share(),
+            ..report
+        },
     })
 }
 
@@ -262,6 +267,7 @@ struct Conductor {
     /// Time of their next check, ns.
     next_look: u64,
     settled_at_ns: u64,
+    awake: Awake,
     /// A restart from outside that is due.
     restart: Option<Restart>,
     seed: u64,
@@ -328,6 +334,7 @@ impl Driver<Sensor> for Conductor {
         host: &mut dyn emulator::Host,
     ) -> Option<VirtualNanos> {
         let now = stop.at.0;
+        self.awake.look(now, stop.instruction_count);
         let frames = session.board().chip.dcmi.counters().frames;
         let full = self.limits.frames.is_some_and(|limit| frames >= limit);
         if self.armed != Some(session.resets().len()) {

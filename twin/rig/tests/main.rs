@@ -8,6 +8,7 @@ mod camera;
 mod camera_settings;
 mod command;
 mod cuts;
+mod energy;
 mod failures;
 mod faults;
 mod firmware;
