@@ -203,6 +203,13 @@ class Recorded(unittest.TestCase):
         for axis in "xy":
             felt = column[f"thumb.place_{axis}_m"][known]
             np.testing.assert_allclose(felt, true[f"place_{axis}_mm"] / 1e3, atol=2e-4)
+        # One contact: the force itself.
+        self.assertTrue((column["thumb.contact_count"][known] == 1).all())
+        for field in ("force_x_n", "force_z_n", "place_x_m", "place_y_m"):
+            of_one, other = (column[f"thumb.contact{n}_{field}"] for n in (1, 2))
+            np.testing.assert_array_equal(of_one, column[f"thumb.{field}"])
+            self.assertTrue((other == 0).all())
+        self.assertTrue((column["index.contact_count"] == 0).all())
         self.assertTrue((column["thumb.contact"][known] == 1).all())
         self.assertTrue((column["index.contact"] == 0).all())
         self.assertTrue((column["thumb.force_sigma_n"][known] > 0).all())
@@ -224,7 +231,25 @@ class Live(unittest.TestCase):
         self.assertEqual(seen["tip.force_known"], 0)
         self.assertEqual(seen["tip.place_known"], 0)
         self.assertEqual(seen["tip.force_z_n"], 0)
+        self.assertEqual(seen["tip.contact_count"], 0)
+        self.assertEqual(seen["tip.contact1_force_z_n"], 0)
         self.assertEqual(set(seen), set(sensors.observation_features))
+
+    def test_each_of_two_contacts_has_its_numbers(self):
+        from lerobot_robot_hivtac.finger import observed
+
+        contacts = [
+            mock.Mock(force=np.array([0.01, 0.02, -0.03]), place=np.array([1e-3, 2e-3])),
+            mock.Mock(force=np.array([0.04, 0.05, -0.06]), place=None),
+        ]
+        sample = mock.Mock(force=None, place=None, contact=True, slip=False, contacts=contacts)
+        seen = observed(sample, 0.0)
+        self.assertEqual(seen["contact_count"], 2)
+        self.assertEqual(seen["contact1_force_z_n"], -0.03)
+        self.assertEqual(seen["contact1_place_y_m"], 2e-3)
+        self.assertEqual(seen["contact2_force_x_n"], 0.04)
+        self.assertEqual(seen["contact2_place_x_m"], 0)
+        self.assertEqual(observed(sample, 1.0)["contact_count"], 0)
 
     def test_a_sensor_that_falls_silent_is_not_waited_for_and_one_that_goes_is_told(self):
         with Twin(PRESSED) as twin:

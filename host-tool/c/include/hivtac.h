@@ -50,6 +50,8 @@ typedef struct hivtac_contact {
 typedef struct hivtac_sample {
     uint64_t time_us;            /* device time of the middle of the exposure, us */
     uint64_t arrived_ns;         /* time of its arrival here, ns since 1970 */
+    uint64_t exposed_ns;         /* time of the middle of the exposure, ns since 1970: of several
+                                    sensors comparable, and without the jitter of arrivals */
     uint32_t sequence;           /* running number; a gap shows samples that were lost */
     uint32_t frame;              /* running number of the frames exposed */
     uint32_t status;             /* bits of docs/wire.md: why no force, or how good it is */

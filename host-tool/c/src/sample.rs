@@ -24,6 +24,7 @@ pub struct CContact {
 pub struct CSample {
     time_us: u64,
     arrived_ns: u64,
+    exposed_ns: u64,
     sequence: u32,
     frame: u32,
     status: u32,
@@ -50,6 +51,7 @@ impl From<&Arrived> for CSample {
         let mut told = CSample {
             time_us: sample.time_us,
             arrived_ns: arrived.came_ns,
+            exposed_ns: arrived.exposed_ns,
             sequence: sample.sequence,
             frame: sample.frame,
             status: status.0,
@@ -74,6 +76,7 @@ impl From<&Arrived> for CSample {
 const UNKNOWN: CSample = CSample {
     time_us: 0,
     arrived_ns: 0,
+    exposed_ns: 0,
     sequence: 0,
     frame: 0,
     status: 0,

@@ -48,6 +48,8 @@ int main(int count, char **arguments)
     }
     CHECK(result == HIVTAC_DONE);
     CHECK(!sample.contact && sample.arrived_ns > 1700000000000000000u);
+    CHECK(sample.exposed_ns <= sample.arrived_ns);
+    CHECK(sample.arrived_ns - sample.exposed_ns < 1000000000u);
     if (!sample.has_force)
         CHECK(isnan(sample.force_n[2]) && isnan(sample.force_covariance[0]));
     hivtac_close(sensor);

@@ -3,6 +3,7 @@
 import logging
 import threading
 import time
+from collections.abc import Sequence
 
 import hivtac
 import numpy as np
@@ -11,6 +12,9 @@ import numpy.typing as npt
 from lerobot_robot_hivtac.config import FingerConfig
 
 _log = logging.getLogger(__name__)
+
+_OF_A_CONTACT = ("force_x_n", "force_y_n", "force_z_n", "place_x_m", "place_y_m")
+_MOST_CONTACTS = 2
 
 FIELDS = (
     "force_x_n",
@@ -26,10 +30,13 @@ FIELDS = (
     "force_known",
     "place_known",
     "age_s",
+    "contact_count",
+    *(f"contact{n}_{field}" for n in range(1, _MOST_CONTACTS + 1) for field in _OF_A_CONTACT),
 )
 """What a finger observes: N, m, rad and s; the film's frame; 1 or 0 for yes or no. Force, place and
 their standard uncertainties are 0 unless `force_known` and `place_known` are 1: one number that is
-none would make the statistics of a whole data set useless."""
+none would make the statistics of a whole data set useless. `contact_count` is how many contacts
+are told, 0 to 2, and the numbers of the others are 0."""
 
 OLDEST = 0.1
 """Age from which a sample counts no more, s: some 16 frames of the slower camera."""
@@ -122,7 +129,19 @@ def observed(sample: hivtac.Sample, age: float) -> dict[str, float]:
         numbers[5:] = [*place, sample.place_sigma]
     is_felt = [is_new and sample.contact, is_new and sample.slip]
     flags = [*is_felt, force is not None, place is not None]
-    return dict(zip(FIELDS, map(float, [*numbers, *flags, max(age, 0.0)]), strict=True))
+    contacts = sample.contacts if is_new else ()
+    told = [*numbers, *flags, max(age, 0.0), len(contacts), *_each(contacts)]
+    return dict(zip(FIELDS, map(float, told), strict=True))
+
+
+def _each(contacts: Sequence[hivtac.Contact]) -> list[float]:
+    """The numbers of each contact by `_OF_A_CONTACT`, 0 for those that are not known."""
+    each = np.zeros((_MOST_CONTACTS, len(_OF_A_CONTACT)))
+    for row, contact in zip(each, contacts, strict=False):
+        row[:3] = contact.force
+        if contact.place is not None:
+            row[3:] = contact.place
+    return each.ravel().tolist()
 
 
 class Pictures:

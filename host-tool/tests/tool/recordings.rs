@@ -219,7 +219,7 @@ fn ctrl_c_ends_a_recording_cleanly() {
     assert_eq!(recorded.code, Some(130), "{recorded:?}");
     let text = std::fs::read_to_string(&file).unwrap();
     assert!(
-        text.starts_with("host_time_s,seq,frame,time_us,alpha_deg,"),
+        text.starts_with("host_time_s,exposed_time_s,seq,frame,time_us,alpha_deg,"),
         "{text}"
     );
     let fields: Vec<_> = text.lines().map(|line| line.matches(',').count()).collect();
