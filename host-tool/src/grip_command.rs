@@ -55,7 +55,8 @@ fn is_port(finger: &str) -> bool {
     let is_com = finger
         .strip_prefix("COM")
         .is_some_and(|rest| rest.parse::<u32>().is_ok());
-    finger.starts_with("tcp:") || finger.contains('/') || is_com
+    let is_address = ["tcp:", "uart:"].iter().any(|it| finger.starts_with(it));
+    is_address || finger.contains('/') || is_com
 }
 
 /// Two fingers of a command that also works without.
@@ -287,6 +288,7 @@ mod tests {
             ("tcp:robot:7000", true),
             ("/dev/ttyACM0", true),
             ("COM5", true),
+            ("uart:COM4", true),
             ("COMfort", false),
             ("0001020304050607080910ff", false),
         ] {
