@@ -47,6 +47,23 @@ fn a_reader_joins_at_any_time() {
     assert!(run.stderr.contains("5 received, 0 lost"), "{}", run.stderr);
 }
 
+/// As all that read samples do: it asks for them, and once more at its end.
+#[test]
+fn a_recording_needs_no_answer() {
+    let device = FakeDevice::on_tcp([sending(0..9)]);
+    let port = format!("uart:{}", device.port);
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("a.csv");
+    let file = file.to_str().unwrap();
+    let run = run(&["record", file, "--port", &port, "--seconds", "0.5"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert_eq!(
+        std::fs::read_to_string(file).unwrap().lines().count(),
+        1 + 9
+    );
+    assert_eq!(device.commands.iter().count(), 0);
+}
+
 #[test]
 fn what_needs_an_answer_is_refused() {
     let device = FakeDevice::on_tcp([sending(0..0)]);
