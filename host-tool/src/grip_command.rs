@@ -63,7 +63,7 @@ fn is_port(finger: &str) -> bool {
 #[derive(Args)]
 pub struct GripArguments {
     /// Two sensors that grip together, by name, serial number or port: also grip force, common
-    /// wrench and friction margin, in topics below grip/
+    /// wrench and friction margin; where there are topics, below grip/
     #[arg(long, value_name = "FIRST,SECOND", value_parser = Fingers::parse)]
     grip: Option<Fingers>,
     /// Where the fingers are in the grip, and friction: a JSON file; opposing fingers, 30 mm apart,

@@ -75,6 +75,23 @@ pub fn line(grip: &Grip, names: &[String; 2]) -> String {
     )
 }
 
+/// A sentence for a person: what squeezes, what holds, and what both feel together.
+pub fn sentence(grip: &Grip, names: &[String; 2]) -> String {
+    let [first, second] = names;
+    let Ok(held) = &grip.held else {
+        let why = cause(grip, names).unwrap_or_default();
+        return format!("grip of {first} and {second}: unknown ({why})");
+    };
+    let thousandths = |value: f64| format!("{:.1}", 1e3 * value);
+    let known = |value: f64, sigma: f64| format!("{} ± {}", thousandths(value), thousandths(sigma));
+    format!(
+        "grip of {first} and {second}: {} mN; margin {} mN; together {} mN",
+        known(held.force, held.force_sigma),
+        known(held.margin, held.margin_sigma),
+        held.common.map(thousandths).join(", "),
+    )
+}
+
 fn seconds(ns: u64) -> Decimal {
     Decimal::new(ns / 1_000, 6)
 }

@@ -29,6 +29,8 @@ pub struct State {
     lines: VecDeque<String>,
     /// The shape of what presses; `None` until the device told its settings.
     pub contact_shape: Option<ContactShape>,
+    /// What this sensor and another feel together, for a person; `None` without a grip.
+    pub grip: Option<String>,
 }
 
 impl State {
@@ -43,6 +45,7 @@ impl State {
             stats: None,
             lines: VecDeque::new(),
             contact_shape: None,
+            grip: None,
         }
     }
 
@@ -114,6 +117,7 @@ impl State {
             latency_us: self.stats.map(|stats| stats.latency_us),
             processing_us: self.stats.map(|stats| stats.processing_us),
             recording,
+            grip: self.grip.clone(),
             lines: self.lines.iter().cloned().collect(),
             ..Told::of(&self.port, &self.hello)
         };

@@ -48,6 +48,8 @@ pub struct Told {
     pub lines: Vec<String>,
     /// The coverage of free presses, while these are recorded.
     pub coverage: Option<Coverage>,
+    /// What this sensor and another feel together, for a person; `None` without a grip.
+    pub grip: Option<String>,
 }
 
 /// The state of a recording.
@@ -127,6 +129,7 @@ impl Told {
             recording: Recording::default(),
             lines: Vec::new(),
             coverage: None,
+            grip: None,
         }
     }
 

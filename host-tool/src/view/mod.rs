@@ -1,13 +1,16 @@
 //! `hivtac view`: shows a live page in a browser of this computer.
 
+mod gripping;
 mod owner;
 mod recorder;
 #[cfg(feature = "twin")]
 mod twin;
 
 use crate::device::seconds;
+use crate::grip_command::GripArguments;
 use crate::output::{Reader, print};
 use clap::Args;
+use gripping::Gripping;
 use hivtac_host::failure::Failure;
 #[cfg(feature = "twin")]
 use hivtac_host::failure::Kind;
@@ -43,10 +46,12 @@ pub struct ViewArguments {
     /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
     #[arg(long, value_name = "PORT")]
     port: Vec<String>,
+    #[command(flatten)]
+    grip: GripArguments,
     /// A simulated sensor in place of a device: the page presses its film, and shows the true press
     /// beside what the sensor says
     #[cfg(feature = "twin")]
-    #[arg(long, conflicts_with = "port")]
+    #[arg(long, conflicts_with_all = ["port", "grip"])]
     twin: bool,
     #[cfg(feature = "twin")]
     #[command(flatten)]
@@ -77,16 +82,26 @@ pub fn run(arguments: &ViewArguments) -> Result<(), Failure> {
         let why = "options of a simulated sensor need --twin";
         return Err(Failure::new(Kind::Usage, why));
     }
-    let addresses = match arguments.port.as_slice() {
-        [] => vec![Address::Find],
-        ports => ports.iter().map(|port| Address::parse(port)).collect(),
-    };
-    let opened = addresses.iter().map(|address| {
-        let feed = Arc::new(Feed::default());
-        let connected = Link::connect(address, arguments.timeout)?;
-        Ok(open(address, connected, feed, arguments))
+    let addresses = (arguments.grip).before(arguments.timeout, || {
+        Ok(match arguments.port.as_slice() {
+            [] => vec![Address::Find],
+            ports => ports.iter().map(|port| Address::parse(port)).collect(),
+        })
+    })?;
+    let connect = |address| Link::connect(address, arguments.timeout);
+    let connected: Vec<_> = addresses.iter().map(connect).collect::<Result<_, _>>()?;
+    let hellos: Vec<_> = connected.iter().map(|(_, hello)| hello.clone()).collect();
+    let grip = arguments.grip.pair(&hellos)?.map(Gripping::new);
+    let opened = addresses.iter().zip(connected).enumerate();
+    let opened = opened.map(|(number, (address, connected))| {
+        let (sensor, (mut owner, link)) =
+            open(address, connected, Arc::new(Feed::default()), arguments);
+        if let Some(grip) = grip.clone().filter(|_| number < 2) {
+            owner.grips(number, grip);
+        }
+        (sensor, (owner, link))
     });
-    serve(opened.collect::<Result<_, _>>()?, arguments)
+    serve(opened.collect(), arguments)
 }
 
 fn serve(opened: Vec<(Sensor, Opened)>, arguments: &ViewArguments) -> Result<(), Failure> {

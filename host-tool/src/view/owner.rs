@@ -1,6 +1,7 @@
 //! The thread that communicates with a device for the page: keeps its messages and carries out
 //! orders.
 
+use super::gripping::Gripping;
 use super::recorder::Recorder;
 use crate::follow::{Follower, follow};
 use hivtac_host::failure::{Failure, Kind};
@@ -31,6 +32,8 @@ struct Watched {
     feed: Arc<Feed>,
     state: State,
     recorder: Recorder,
+    /// Which finger of a grip it is, 0 or 1, and the grip.
+    grip: Option<(usize, Gripping)>,
     told: Instant,
     /// Whether a message has come since the last update.
     is_new: bool,
@@ -40,6 +43,9 @@ impl Watched {
     fn message(&mut self, message: DeviceMessage) {
         self.state.take(&message);
         self.recorder.message(&message);
+        if let Some((finger, grip)) = &self.grip {
+            grip.message(*finger, &message);
+        }
         if let DeviceMessage::Sample(sample) = message {
             self.feed.sample(sample);
         }
@@ -56,6 +62,10 @@ impl Watched {
     fn tell(&mut self) {
         self.told = Instant::now();
         self.is_new = false;
+        // The first finger's page has it.
+        if let Some((0, grip)) = &self.grip {
+            self.state.grip = grip.told();
+        }
         self.feed.state(self.state.json(self.recorder.told()));
     }
 
@@ -79,6 +89,7 @@ impl Owner {
             feed,
             state: State::new(link.name.clone(), hello),
             recorder,
+            grip: None,
             told: Instant::now(),
             is_new: false,
         };
@@ -90,6 +101,11 @@ impl Owner {
             watched,
             asked_settings: false,
         }
+    }
+
+    /// Makes the device a finger of a grip, 0 or 1.
+    pub fn grips(&mut self, finger: usize, grip: Gripping) {
+        self.watched.grip = Some((finger, grip));
     }
 
     /// Runs until the program is interrupted.

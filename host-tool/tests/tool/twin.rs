@@ -1,6 +1,7 @@
 //! Tests `hivtac twin`: it answers every command as a device does, and its forces are true.
 
 use crate::run::*;
+use crate::view::client::View;
 use hivtac_host::clock::Clock;
 use hivtac_host::grip::Reading;
 use hivtac_host::grip::geometry::Geometry;
@@ -463,6 +464,25 @@ fn two_twins_are_a_grip() {
         number(&held["margin_sigma_n"]),
     );
     assert!(shown.stderr.contains("latency: p50"), "{}", shown.stderr);
+}
+
+/// The first finger's page says what both feel together.
+#[test]
+fn two_twins_are_a_grip_on_the_page() {
+    let [(thumb, _), (index, _)] = [Twin::pressed(&[]), Twin::pressed(&[])];
+    thumb.done(&["settings", "set", "name", "thumb"]);
+    index.done(&["settings", "set", "name", "index"]);
+    let fingers = format!("{},{}", thumb.port, index.port);
+    let view = View::with(&[], &["--grip", &fingers]);
+    let squeezed = "grip of thumb and index: 1";
+    let says = |state: &Value| state["grip"].as_str().map(str::to_owned);
+    let is_known = |state: &Value| says(state).is_some_and(|it| it.starts_with(squeezed));
+    let told = says(&view.events().state(0, is_known)).unwrap();
+    assert!(
+        told.contains(" mN; margin ") && told.contains(" mN; together "),
+        "{told}"
+    );
+    assert_eq!(view.events().state(1, |_| true)["grip"], Value::Null);
 }
 
 #[test]

@@ -133,6 +133,8 @@ export class SensorView {
     this.say("lost", why ? `${state.lost} (${why})` : `${state.lost}`);
     this.say("latency", state.latency_us ? (state.latency_us / 1e3).toFixed(2) : "–");
     this.say("recording", state.recording.text);
+    this.say("grip", state.grip ?? "");
+    this.part("grip").hidden = !state.grip;
     this.say("record", state.recording.on ? "Stop recording" : "Record");
     this.part("record").dataset.do = state.recording.on ? "stop_recording" : "record";
     this.say("lines", state.lines.join("\n"));

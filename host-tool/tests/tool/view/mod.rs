@@ -1,6 +1,6 @@
 //! Tests `hivtac view` as its browser and as unauthorized clients.
 
-mod client;
+pub mod client;
 mod orders;
 
 use crate::fake::*;
