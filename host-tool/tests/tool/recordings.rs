@@ -251,7 +251,7 @@ fn a_full_disk_ends_a_recording_with_what_fits() {
     let device = FakeDevice::on_tcp([paced((0..2_000).collect())]);
     let Finished {
         code, stderr: said, ..
-    } = run_on_full_disk(100, &format!("record {file} --port {}", device.port));
+    } = run_on_full_disk(150, &format!("record {file} --port {}", device.port));
     assert_eq!(code, Some(1), "{said}");
     assert!(said.contains("cannot record into "), "{said}");
     let text = std::fs::read_to_string(format!("{file}.partial")).unwrap();
