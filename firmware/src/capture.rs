@@ -246,6 +246,9 @@ fn configure() {
 /// limited, because they may never come.
 fn drain(dma: &BandDma) {
     const PATIENCE: u32 = 64;
+    if seeded_bugs::leaves_last_words() {
+        return;
+    }
     for _ in 0..PATIENCE {
         if !DCMI.sr().read().fne() && dma.is_between_bands() {
             break;

@@ -26,6 +26,7 @@ enum Bug {
     FlashErrors = 15,
     VsyncPriority = 16,
     KeptToggles = 17,
+    UndrainedEnd = 18,
 }
 
 #[cfg(not(feature = "seeded-bugs"))]
@@ -96,6 +97,11 @@ pub fn lowers_vsync() -> bool {
 /// True if endpoints keep their data toggles when a host configures the device anew.
 pub fn keeps_toggles() -> bool {
     is_chosen(Bug::KeptToggles)
+}
+
+/// True if a frame's end does not wait for its last words.
+pub fn leaves_last_words() -> bool {
+    is_chosen(Bug::UndrainedEnd)
 }
 
 /// The number of the first frame that the program does not survive: about 0.26 s after the start.

@@ -7,6 +7,7 @@ mod demo;
 mod fuzz;
 mod kit;
 mod linux_host;
+mod mutants;
 mod packages;
 mod process;
 mod python;
@@ -34,6 +35,9 @@ enum Task {
     Test(test::Test),
     /// What a frame and an inference cost on the microcontroller, measured in QEMU.
     Bench(bench::Bench),
+    /// Put small mistakes into the firmware, one at a time, and show those that no test notices: an
+    /// hour. The builds and tests are those of `cargo xtask test rig`, which must have run.
+    Mutants(mutants::Mutants),
     /// Show what the firmware takes of each memory.
     Size,
     /// Make the files of a release: programs, Python wheels and firmware, and install them.
@@ -65,6 +69,7 @@ fn run(task: Task) -> Result<()> {
         Task::Test(test) => test.run(),
         Task::Bench(bench) => bench.run(),
         Task::Release(release) => release.run(),
+        Task::Mutants(mutants) => mutants.run(),
         Task::Size => size::memories().map(|table| println!("{table}")),
         Task::Kit(kit) => kit.run(),
         Task::Web => web::run(),

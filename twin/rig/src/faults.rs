@@ -34,6 +34,8 @@ pub enum Kind {
     FrameShort,
     /// The camera sends five surplus rows in frames that begin while the fault is on.
     FrameLong,
+    /// VSYNC comes with the last byte of a frame, whose last words wait for the bus, by seed.
+    VsyncEarly,
     /// The DMA gets no access to the bus, and the camera interface overruns.
     DcmiOverrun,
     /// Others hold the bus, by seed. Blocks that the MDMA moves take up to 16 times as long, the
@@ -55,7 +57,7 @@ pub enum Kind {
     SupplyLow,
 }
 
-const NAMES: [(&str, Kind); 20] = [
+const NAMES: [(&str, Kind); 21] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),
@@ -68,6 +70,7 @@ const NAMES: [(&str, Kind); 20] = [
     ("camera-hesitant", Kind::CameraHesitant),
     ("frame-short", Kind::FrameShort),
     ("frame-long", Kind::FrameLong),
+    ("vsync-early", Kind::VsyncEarly),
     ("dcmi-overrun", Kind::DcmiOverrun),
     ("bus-busy", Kind::BusBusy),
     ("host-not-reading", Kind::HostNotReading),

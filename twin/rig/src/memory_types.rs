@@ -17,6 +17,17 @@ const TIGHTLY_COUPLED: [(u64, u64); 2] = [(0, 64 << 10), (0x2000_0000, 128 << 10
 const EXTERNAL: std::ops::Range<u64> = 0x6000_0000..0xA000_0000;
 const EXTERNAL_STEP: usize = 0x1000_0000;
 
+/// The memories of the part, each by an address.
+const MEMORIES: [u64; 7] = [
+    0,
+    0x0800_0000,
+    0x0810_0000,
+    0x2000_0000,
+    0x2400_0000,
+    0x3000_0000,
+    0x3800_0000,
+];
+
 /// The memory types that the rules distinguish.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Type {
@@ -99,6 +110,16 @@ impl MemoryTypes {
         }
     }
 
+    /// Returns a memory that the program may both write and execute; `None` if there is none.
+    pub fn writable_code(&self) -> Option<u64> {
+        let state = self.lock();
+        let is_writable_code = |address: &u64| {
+            let region = state.region_of(*address);
+            region.is_none_or(Region::is_writable_code)
+        };
+        MEMORIES.into_iter().find(is_writable_code)
+    }
+
     /// Notes a breach if caches may hold other bytes than those that a DMA reads from `source` or
     /// writes to `target`. Ranges are a first address and a length in bytes.
     pub fn check_dma(
@@ -140,11 +161,14 @@ impl State {
         if TIGHTLY_COUPLED.iter().any(is_tightly_coupled) {
             return Type::NonCacheable;
         }
-        let regions = self.regions.iter().rev().filter(|_| self.is_on);
-        let mut having = regions.filter(|region| region.has(address));
-        having
-            .next()
-            .map_or_else(|| default_type(address), |region| region.memory_type())
+        self.region_of(address)
+            .map_or_else(|| default_type(address), Region::memory_type)
+    }
+
+    /// Returns the region that decides about an address; `None` if it is the default map.
+    fn region_of(&self, address: u64) -> Option<&Region> {
+        let mut regions = self.regions.iter().rev().filter(|_| self.is_on);
+        regions.find(|region| region.has(address))
     }
 }
 
@@ -158,6 +182,12 @@ impl Region {
         }
         let eighth = (address - base) * 8 / bytes;
         bytes < 256 || self.attributes >> (8 + eighth) & 1 == 0
+    }
+
+    /// ARMv7-M, B3.5.9: XN, and AP for privileged code, as the whole firmware is.
+    fn is_writable_code(&self) -> bool {
+        let (never_executed, access) = (self.attributes >> 28 & 1, self.attributes >> 24 & 7);
+        never_executed == 0 && (1..=3).contains(&access)
     }
 
     /// ARMv7-M, B3.5.9: AP, and TEX, C, B.
@@ -223,6 +253,21 @@ mod tests {
         types.switch(true, &Rules::default());
         assert_eq!(breach(&types, (0x2000_0000, 128 << 10)), None);
         assert!(breach(&types, (0x3000_0000, 1)).is_some());
+    }
+
+    #[test]
+    fn memory_is_written_or_executed_as_its_region_says() {
+        const ALL: u64 = 31 << 1 | 1;
+        const NEVER_EXECUTED: u64 = 1 << 28;
+        let types = MemoryTypes::default();
+        assert_eq!(types.writable_code(), Some(0), "the unit is off");
+        types.switch(true, &Rules::default());
+        types.set_attributes(6 << 24 | ALL);
+        assert_eq!(types.writable_code(), None, "read-only");
+        types.set_attributes(NEVER_EXECUTED | 3 << 24 | ALL);
+        assert_eq!(types.writable_code(), None, "data");
+        types.set_attributes(3 << 24 | 28 << 1 | 1);
+        assert_eq!(types.writable_code(), Some(0));
     }
 
     #[test]

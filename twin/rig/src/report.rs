@@ -30,6 +30,8 @@ pub struct Report {
     pub output_edges_ns: Vec<u64>,
     /// The longest time from an edge of VSYNC to its handler, ns.
     pub latest_stamp_ns: u64,
+    /// A memory that the program may both write and execute, if its regions are not enforced.
+    pub writable_code: Option<u64>,
     /// Resets of the microcontroller.
     pub resets: usize,
     /// VSYNC pulses of the sensor.
@@ -96,6 +98,7 @@ impl Report {
             led_edges_ns: chip.led_edges_ns().to_vec(),
             output_edges_ns: chip.output_edges_ns().to_vec(),
             latest_stamp_ns: chip.latest_stamp_ns(),
+            writable_code: (chip.mpu.as_ref()).and_then(|mpu| mpu.types().writable_code()),
             exposures: camera.exposures(),
             sccb_writes: camera.sccb_writes(),
             camera_fault: camera.faulty_output().map(str::to_owned),

@@ -52,6 +52,14 @@ fn every_sample_is_of_an_exposure_and_shows_its_markers() {
     );
 }
 
+/// A stray write faults in place of changing the program, and nothing that came from outside is
+/// executed.
+#[test]
+fn no_memory_is_both_written_and_executed() {
+    let run = Setup::new(firmware(), 200).fault("camera-absent").run();
+    assert_eq!(run.report.writable_code, None);
+}
+
 /// The camera sends without a pause, and every frame becomes a sample.
 #[test]
 fn frames_back_to_back_are_all_measured() {

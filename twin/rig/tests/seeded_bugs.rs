@@ -1,7 +1,9 @@
 //! Tests with firmware that has a seeded bug. Each bug must fail in its own way, which shows that
 //! the rig detects it.
 
-use crate::common::{Bug, Run, Setup, command, hello, other};
+use std::path::PathBuf;
+
+use crate::common::{Bug, Run, Setup, command, firmware, hello, other};
 use hivtac_rig::peripherals::flash::{Contents, SECTOR_BYTES};
 use hivtac_rig::script::Action;
 use hivtac_rig::usb_host::Port;
@@ -128,34 +130,36 @@ fn an_erase_that_fails_is_noticed() {
     let mut old = Contents::default();
     old.array[..2 * SECTOR_BYTES as usize].fill(0x55);
     old.save(&flash).unwrap();
-    let keeping = || {
+    let keeping = |elf: PathBuf| {
         let keep = command(KEEP, Request::Keep(Selection::ALL));
         Setup {
             flash: Some(flash.clone()),
-            ..Setup::new(other("seeded-bugs"), 2_600)
+            ..Setup::new(elf, 2_600)
                 .fault("camera-absent")
                 .fault("flash-fails@0-1000")
                 .at(190, Action::Send(keep))
         }
     };
-    let run = keeping().run_with(None);
+    let run = keeping(firmware()).run();
     assert_eq!(run.outcome(KEEP), Outcome::Done, "it tries again");
-    let message = broken_rule(keeping(), Bug::FlashErrors);
+    let message = broken_rule(keeping(other("seeded-bugs")), Bug::FlashErrors);
     assert!(message.contains("is programmed twice"), "{message}");
 }
 
 /// USB's handler and the stamp of a frame have one priority: some stamps are late.
 #[test]
 fn a_stamp_that_usb_delays_is_late() {
-    let latest_ns = |bug: Option<Bug>| {
-        let mut setup = Setup::new(other("seeded-bugs"), 500);
+    let busy = |elf: PathBuf| {
+        let mut setup = Setup::new(elf, 500);
         for nth in 0..150 {
             let get_status = Action::Request([0x80, 0, 0, 0, 0, 0, 2, 0]);
             setup = setup.at_us(200_000 + 1_900 * nth, get_status);
         }
-        setup.run_with(bug).report.latest_stamp_ns
+        setup
     };
-    let (right, wrong) = (latest_ns(None), latest_ns(Some(Bug::VsyncPriority)));
+    let right = busy(firmware()).run().report.latest_stamp_ns;
+    let wrong = busy(other("seeded-bugs")).run_with(Bug::VsyncPriority);
+    let wrong = wrong.report.latest_stamp_ns;
     assert!(right < 1_000 && wrong > 2 * right, "{right}, {wrong}");
 }
 
@@ -178,6 +182,18 @@ fn a_toggle_that_outlives_a_configuration_loses_packets() {
     };
     assert_eq!(repeated(None), 0);
     assert!(repeated(Some(Bug::KeptToggles)) > 0);
+}
+
+/// VSYNC comes while a frame's last words are on their way. Who does not wait for them takes whole
+/// frames for short ones.
+#[test]
+fn an_end_without_its_last_words_drops_whole_frames() {
+    let early = |elf: PathBuf| Setup::new(elf, 300).fault("vsync-early");
+    let right = early(firmware()).run();
+    let lost = (right.stats().dropped_size, right.missing_frames());
+    assert_eq!(lost, (0, vec![]));
+    let wrong = early(other("seeded-bugs")).run_with(Bug::UndrainedEnd);
+    assert!(wrong.stats().dropped_size >= 4, "{:?}", wrong.stats());
 }
 
 /// A bug is what the tests above notice, not the way in which it is chosen.

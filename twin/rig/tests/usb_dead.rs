@@ -93,6 +93,20 @@ fn a_hello_without_an_answer_makes_it_connect_again() {
     assert_eq!(run.report.resets, 0);
 }
 
+/// Samples come between a start and the next hello or stop, and at no other time.
+#[test]
+fn a_hello_or_a_stop_ends_the_samples() {
+    let run = Setup::new(firmware(), 420)
+        .at(240, Action::Send(hello()))
+        .at(300, Action::Send(command(7, Request::Start)))
+        .at(360, Action::Send(command(8, Request::Stop)))
+        .run();
+    for (from_s, until_s, flows) in [(0.2, 0.24, true), (0.25, 0.3, false), (0.32, 0.36, true)] {
+        assert_eq!(arrivals(&run, from_s, until_s) > 0, flows, "{from_s} s");
+    }
+    assert_eq!(arrivals(&run, 0.37, 1.0), 0, "after the stop");
+}
+
 /// Times of all arrivals between two times, s.
 fn arrivals(run: &Run, from_s: f64, until_s: f64) -> usize {
     let times = run

@@ -59,6 +59,7 @@ pub enum Bug {
     FlashErrors = 15,
     VsyncPriority = 16,
     KeptToggles = 17,
+    UndrainedEnd = 18,
 }
 
 /// Time at which the host says hello, ms: the port exists from about 140 ms on.

@@ -1,6 +1,7 @@
 //! Tests tracker and follower in a simulated world: every delivered frame is right and every frame
 //! is counted.
 
+mod follower;
 mod world;
 
 use crate::capture::{Ending, Event, Tally, Tracker};

@@ -16,16 +16,21 @@
 //! A fault that disturbs the camera or the DMA within a line keeps that line in groups. A busy bus
 //! does the same to all lines of a run in which it is ever busy.
 
-use rigless::device::{DeviceContext, Level};
+use rigless::device::{DeviceContext, Level, RegisterFile};
 
 use super::receiver::Overrun;
 use super::signals::{Run, sampled_while_changing};
 use super::timeline::{Bytes, Step};
-use super::{Dcmi, GROUP, control, flag};
+use super::{Dcmi, GROUP, LONGEST_LAST_WAIT_NS, LONGEST_WAIT_NS, control, flag};
 use crate::faults::Kind;
 
 impl Dcmi {
-    pub(super) fn bytes(&mut self, bytes: Bytes, context: &mut DeviceContext<'_>) {
+    pub(super) fn bytes(
+        &mut self,
+        bytes: Bytes,
+        registers: &mut RegisterFile,
+        context: &mut DeviceContext<'_>,
+    ) {
         // The first group left at once.
         let flows = bytes.from == GROUP
             && self.receiver.waiting() == 0
@@ -37,9 +42,18 @@ impl Dcmi {
         } else {
             self.receive_due();
         }
-        self.wait_for_the_bus(context);
+        let (Bytes { run, to, .. }, now) = (bytes, context.now().0);
+        match self.early_vsync(&run, now).filter(|_| to == run.bytes) {
+            Some(level) => {
+                self.wait_for_the_bus(LONGEST_LAST_WAIT_NS, context);
+                self.set_vsync(level, registers, context);
+            }
+            None if self.faults.on(Kind::BusBusy, now) => {
+                self.wait_for_the_bus(LONGEST_WAIT_NS, context);
+            }
+            None => {}
+        }
         self.drive(context);
-        let Bytes { run, to, .. } = bytes;
         if to == run.bytes || !self.listens() {
             self.plan_from(run.line + 1, context);
         } else if flows {
@@ -66,6 +80,15 @@ impl Dcmi {
         context.request(0, Level::Low);
     }
 
+    /// Returns VSYNC's active level if it comes at the end of a run: the frame's last one, under
+    /// [`Kind::VsyncEarly`].
+    fn early_vsync(&self, run: &Run, now_ns: u64) -> Option<Level> {
+        let output = &self.frame.as_ref()?.output;
+        let is_last = run.row.is_some_and(|row| row + 1 == output.rows);
+        (is_last && self.faults.on(Kind::VsyncEarly, now_ns))
+            .then(|| Level::from(output.vsync_active_high))
+    }
+
     /// Returns whether a fault may delay words of a run or end it early.
     fn is_disturbed(&self, run: &Run, now_ns: u64) -> bool {
         let Some(frame) = &self.frame else {
@@ -77,7 +100,9 @@ impl Dcmi {
             let change = self.faults.next_change(kind, now_ns);
             self.faults.on(kind, now_ns) || change.is_some_and(|at| at <= end_ns)
         };
-        self.faults.asked_for(Kind::BusBusy) || disturbing.into_iter().any(disturbs)
+        self.faults.asked_for(Kind::BusBusy)
+            || self.early_vsync(run, now_ns).is_some()
+            || disturbing.into_iter().any(disturbs)
     }
 
     /// Receives the due bytes up to the next word that has to leave first.
@@ -337,6 +362,29 @@ mod tests {
             bench.dcmi.next.map(|next| next.at),
             undisturbed.dcmi.next.map(|next| next.at)
         );
+    }
+
+    /// The interface tells the end of the frame, and nobody has taken its last words yet.
+    #[test]
+    fn an_early_vsync_comes_with_the_last_byte() {
+        let mut bench = Bench::new();
+        bench.dcmi.faults = Faults::new(vec!["vsync-early".parse().unwrap()]);
+        let is_last = |bench: &Bench| {
+            let Some(Bytes { run, to, .. }) = bench.coming() else {
+                return false;
+            };
+            to == run.bytes && bench.dcmi.early_vsync(&run, 0).is_some()
+        };
+        while !is_last(&bench) {
+            bench.step();
+        }
+        let next = bench.dcmi.next.expect("the last bytes");
+        let (registers, mut context) = bench.part.bus_mut().drive(next.at, bench.slot);
+        bench.dcmi.on_event(next.event, registers, &mut context);
+        assert_eq!(bench.dcmi.vsync, Level::High);
+        assert_ne!(bench.dcmi.raised & flag::FRAME, 0);
+        assert_eq!(bench.dcmi.receiver.waiting() as u32 * 4, GROUP);
+        assert!(bench.dcmi.bus.is_some() && !bench.dcmi.requested);
     }
 
     /// A DMA that stops within a line costs the frame, at the latest when the next line begins.

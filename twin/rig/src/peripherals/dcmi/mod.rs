@@ -30,6 +30,9 @@ const GROUP: u32 = 4 * receiver::FIFO_WORDS as u32;
 /// The longest wait of the DMA for a busy bus, ns. A group of bytes comes every 320 ns at 50 MHz,
 /// and the FIFO holds no more than one.
 const LONGEST_WAIT_NS: u64 = 250;
+/// The same after the last byte of a frame, when no more bytes come: a burst of the MDMA before each
+/// of four words.
+const LONGEST_LAST_WAIT_NS: u64 = 700;
 /// GPIOB_IDR. A write has no effect on the chip; the rig uses it to make the port look at its pins.
 const VSYNC_PORT_INPUT: u64 = 0x5802_0410;
 
@@ -218,11 +221,10 @@ impl Dcmi {
         }
     }
 
-    /// Delays the words of a group to the DMA on a busy bus.
-    fn wait_for_the_bus(&mut self, context: &mut DeviceContext<'_>) {
-        let now = context.now().0;
-        if self.bus.is_none() && self.faults.on(Kind::BusBusy, now) {
-            let later = now + self.chance.below(LONGEST_WAIT_NS);
+    /// Delays the words of a group to the DMA.
+    fn wait_for_the_bus(&mut self, longest_ns: u64, context: &mut DeviceContext<'_>) {
+        if self.bus.is_none() {
+            let later = context.now().0 + self.chance.below(longest_ns);
             self.bus = Some(context.schedule(VirtualNanos(later)));
             self.counters.waits += 1;
         }
@@ -261,18 +263,9 @@ impl Dcmi {
     }
 
     fn status(&self, now_ns: u64) -> u32 {
-        let (in_vsync, in_row) = match &self.frame {
-            Some(frame) => (frame.in_vsync(now_ns), frame.in_row(now_ns)),
-            None => (false, false),
-        };
-        let level = |active: bool, active_high: bool| active == active_high;
-        let (vsync_high, hsync_high) = match &self.frame {
-            Some(frame) => (
-                level(in_vsync, frame.output.vsync_active_high),
-                level(in_row, frame.output.href_active_high),
-            ),
-            None => (false, false),
-        };
+        let vsync_high = self.vsync == Level::High;
+        let hsync_high = (self.frame.as_ref())
+            .is_some_and(|frame| frame.in_row(now_ns) == frame.output.href_active_high);
         u32::from(hsync_high == self.settings.has(control::HSYNC_BLANKS_HIGH))
             | u32::from(vsync_high == self.settings.has(control::VSYNC_BLANKS_HIGH)) << 1
             | u32::from(self.receiver.waiting() > 0) << 2
@@ -349,7 +342,7 @@ impl Device for Dcmi {
             Step::Retry => self.start_over(registers, context),
             Step::VsyncBegins => self.begin_frame(registers, context),
             Step::VsyncEnds => self.end_vsync(registers, context),
-            Step::Bytes(bytes) => self.bytes(bytes, context),
+            Step::Bytes(bytes) => self.bytes(bytes, registers, context),
         }
     }
 

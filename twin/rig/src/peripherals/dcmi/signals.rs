@@ -59,11 +59,6 @@ impl Frame {
         ((clocks / line_clocks) as u64, (clocks % line_clocks) as u32)
     }
 
-    /// Returns whether VSYNC is at its active level at an instant.
-    pub fn in_vsync(&self, now_ns: u64) -> bool {
-        self.position(now_ns).0 < u64::from(self.output.vsync_lines)
-    }
-
     /// Returns whether HREF is at its active level at an instant.
     pub fn in_row(&self, now_ns: u64) -> bool {
         let (line, clock) = self.position(now_ns);
@@ -197,7 +192,6 @@ mod tests {
     #[test]
     fn levels_follow_the_position_in_the_frame() {
         let frame = vga();
-        assert!(frame.in_vsync(1000) && !frame.in_vsync(frame.instant(4, 0) + 1));
         assert!(frame.in_row(frame.instant(22, 5)) && !frame.in_row(frame.instant(22, 1400)));
         assert!(!frame.in_row(frame.instant(5, 5)));
     }

@@ -51,9 +51,9 @@ impl Dcmi {
         let now = context.now().0;
         self.next = None;
         self.epoch = Epoch::default();
-        let pulse = (self.frame.take())
-            .is_some_and(|frame| frame.exposed.is_none() && frame.output.vsync_active_high);
-        if pulse {
+        let frame = self.frame.take();
+        let active_high = frame.is_some_and(|frame| frame.output.vsync_active_high);
+        if active_high && self.vsync == Level::High {
             // VSYNC was at its active level. Its fall is an edge like any other.
             self.camera.lock().count_edge(now);
         }
