@@ -27,9 +27,8 @@ const COPY: &str = r#"now=$(git stash create) && git archive "${now:-HEAD}" | ta
 /// Options of `cargo xtask mutants`.
 #[derive(Args)]
 pub struct Mutants {
-    /// Only mistakes in files whose paths contain this.
-    #[arg(default_value = "firmware/")]
-    files: String,
+    /// Only those of the list, in files whose paths contain this.
+    files: Option<String>,
 }
 
 /// A mistake in a file.
@@ -49,26 +48,17 @@ struct Mutant {
 impl Mutants {
     /// Makes the mistakes; an error if one is not noticed for which no reason is known.
     pub fn run(&self) -> Result<()> {
-        let portable = self.portable();
+        let portable = match self.files {
+            None => portable(),
+            Some(_) => Ok(()),
+        };
         self.firmware().and(portable)
     }
 
-    fn portable(&self) -> Result<()> {
-        ensure!(
-            toolchain::has("mutants"),
-            "cargo-mutants is not installed: `cargo install cargo-mutants --locked`"
-        );
-        let mut command = cargo("mutants --package hivtac-portable --colors never", "");
-        command.args(["--config", PORTABLE, "--re", &self.files]);
-        process::run(command.arg("--output").arg(work_folder("mutants")?))
-    }
-
     fn firmware(&self) -> Result<()> {
+        let files = self.files.as_deref().unwrap_or("");
         let mut mutants = list()?;
-        mutants.retain(|mutant| mutant.file.contains(&self.files));
-        if mutants.is_empty() {
-            return Ok(());
-        }
+        mutants.retain(|mutant| mutant.file.contains(files));
         let bench = Bench::new()?;
         let tests = mutants.iter().flat_map(|mutant| &mutant.tests);
         let passes = bench.passes(tests)?;
@@ -88,6 +78,17 @@ impl Mutants {
         ensure!(unexplained == 0, "{unexplained} are not noticed: see above");
         Ok(())
     }
+}
+
+fn portable() -> Result<()> {
+    ensure!(
+        toolchain::has("mutants"),
+        "cargo-mutants is not installed: `cargo install cargo-mutants --locked`"
+    );
+    let words = "mutants --package hivtac-portable --colors never --config";
+    let mut command = cargo(words, "");
+    command.args([PORTABLE, "--output"]);
+    process::run(command.arg(work_folder("mutants")?))
 }
 
 fn list() -> Result<Vec<Mutant>> {

@@ -27,7 +27,12 @@ fn with_requests(setups: &[[u8; 8]]) -> Run {
 fn goes_on(run: &Run) {
     assert_eq!((run.report.resets, run.rejected.frames()), (0, 0));
     assert!(run.missing_frames().is_empty());
-    assert!(run.samples().len() > 10, "{}", run.samples().len());
+    let sequence: Vec<u32> = run.samples().iter().map(|sample| sample.sequence).collect();
+    assert!(sequence.len() > 10, "{sequence:?}");
+    assert!(
+        sequence.windows(2).all(|pair| pair[1] == pair[0] + 1),
+        "{sequence:?}"
+    );
     assert_eq!(run.stats().usb_dropped, 0);
 }
 

@@ -144,7 +144,7 @@ impl Tracker {
     /// Reports a frame that has begun and not ended as short.
     fn give_up_begun(&mut self, interface: &mut impl Interface, tell: &mut impl FnMut(Event)) {
         let edge = interface.newest_edge();
-        if self.running && (self.index > 0 || edge != self.frame) {
+        if self.index > 0 || edge != self.frame {
             tell(Event::Ended {
                 edge,
                 how: Ending::Short,

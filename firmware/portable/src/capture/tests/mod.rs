@@ -154,6 +154,31 @@ fn silence_gives_the_begun_frame_up() {
     assert_eq!((world.tally.size, world.counted()), (1, 2));
 }
 
+fn silence(tracker: &mut Tracker, chip: &mut Chip) -> Vec<Event> {
+    let mut told = Vec::new();
+    tracker.silence(chip, &mut |event| told.push(event));
+    told
+}
+
+#[test]
+fn silence_tells_of_a_frame_that_began_and_of_no_other() {
+    let (mut tracker, mut chip) = (Tracker::new(SHAPE), Chip::new());
+    tracker.start(&mut chip);
+    assert_eq!(silence(&mut tracker, &mut chip), []);
+    let how = Ending::Short;
+    for (number, bands) in [(1, 0), (2, 1)] {
+        chip.edge.number = number;
+        for _ in 0..bands {
+            (chip.band_flag, chip.second) = (true, !chip.second);
+            tracker.band_finished(&mut chip, &mut |_| ());
+        }
+        let edge = chip.edge;
+        let expected = [Event::Ended { edge, how }];
+        assert_eq!(silence(&mut tracker, &mut chip), expected);
+        assert_eq!(silence(&mut tracker, &mut chip), []);
+    }
+}
+
 #[test]
 fn frames_that_passed_during_set_up_are_not_counted_here() {
     let mut world = promptly(&[GOOD, GOOD]);
