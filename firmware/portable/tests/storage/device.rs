@@ -135,4 +135,8 @@ impl<'c> Device<'c> {
     pub fn failures(&self) -> u32 {
         self.log.failures()
     }
+
+    pub fn erases(&self) -> u32 {
+        self.log.erases()
+    }
 }

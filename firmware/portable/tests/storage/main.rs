@@ -2,6 +2,7 @@
 
 mod cuts;
 mod device;
+mod limits;
 mod mock;
 mod random;
 mod worn;

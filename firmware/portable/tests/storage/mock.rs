@@ -60,6 +60,8 @@ pub struct Cells {
     pub worn: Vec<u32>,
     /// Words that stay unchanged when they are programmed.
     pub deaf: Vec<u32>,
+    /// Words that read otherwise than they were programmed, without an error.
+    pub faint: Vec<u32>,
     chance: u64,
 }
 
@@ -71,8 +73,15 @@ impl Cells {
             operations: 0,
             worn: Vec::new(),
             deaf: Vec::new(),
+            faint: Vec::new(),
             chance: seed,
         }
+    }
+
+    /// Copies the first words of the first sector to its end.
+    pub fn repeat_at_the_end(&mut self, words: usize) {
+        let end = SECTOR_WORDS as usize;
+        self.words.copy_within(..words, end - words);
     }
 
     fn coin(&mut self) -> bool {
@@ -171,7 +180,11 @@ impl Flash for Mock<'_> {
             self.cells.words[at] = State::Torn;
             return Err(Failed);
         }
-        self.cells.words[at] = State::Whole(*word);
+        let mut written = *word;
+        if self.cells.faint.contains(&(at as u32)) {
+            written[12] ^= 1;
+        }
+        self.cells.words[at] = State::Whole(written);
         Ok(())
     }
 
