@@ -120,7 +120,8 @@ impl Bench {
     fn passes<'t>(&self, tests: impl Iterator<Item = &'t String>) -> Result<bool> {
         let mut build = artifacts::firmware_command(Board::Weact, "");
         build.current_dir(self.copy.path()).arg("--target-dir");
-        let elf = artifacts::build(build.arg(work_folder("mutants/target")?), "hivtac-firmware")?;
+        build.arg(work_folder("mutants/target")?);
+        let elf = artifacts::build(&mut build, "hivtac-firmware")?;
         let mut command = Command::new(&self.tests);
         command.args(["--include-ignored", "--exact"]);
         command.args(tests.collect::<BTreeSet<_>>());
