@@ -20,7 +20,7 @@ use hivtac_portable::capture::{Action, Band, Delivery, Ending, Event, Follower};
 use hivtac_portable::device::answer;
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::rest::Rest;
-use hivtac_sensor::pipeline::Measurement;
+use hivtac_sensor::pipeline::{Measurement, Work};
 use hivtac_sensor::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::TemporalSettings;
@@ -304,10 +304,10 @@ impl PipelineTask {
         seeded_bugs::fail_at(delivery.edge.number);
         let begun = Instant::now();
         let mut measurement = self.sensor.finish_frame();
+        (self.sensor).follow_two_contacts(&mut measurement, Work::OF_A_FRAME);
         if self.taring.is_none() {
             self.look_again(&mut measurement, delivery);
         }
-        (self.sensor).follow_two_contacts(&mut measurement, answer::STEPS_A_FRAME);
         self.newest = delivery.edge.number;
         let followed = self.sensor.follow(moment(delivery), &measurement);
         output::set(followed.output);

@@ -101,6 +101,8 @@ fn the_sensing_runs_from_itcm() {
         "8Geometry10along_flat",
         "$GT$9configure17h",
         "$GT$13set_threshold17h",
+        "$GT$11reconfigure17h",
+        "$GT$14set_tare_under17h",
         "8pipeline6taring",
         "hivtac_sensor5force4rest",
         "5trust5Trust3new",
@@ -118,6 +120,8 @@ fn the_sensing_runs_from_itcm() {
         "8majority8Majority",
         "8portable8multiply",
         "8portable6spline",
+        "8portable8products",
+        "hivtac_products",
         "17mask_covered_rows",
     ];
     let runs_for_frames = |symbol: &&Symbol| !seldom.iter().any(|part| symbol.name.contains(part));

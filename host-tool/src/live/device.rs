@@ -16,7 +16,7 @@ use hivtac_portable::device::model::{self, Fitting};
 use hivtac_portable::device::settings::{InUse, OfPipeline, known};
 use hivtac_sensor::force::forward::Drift;
 use hivtac_sensor::force::model::Model;
-use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::pipeline::{Measurement, Sensor, Work};
 use hivtac_sensor::temporal::{Followed, Moment};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::Down;
@@ -257,11 +257,11 @@ impl Device {
         }
         self.sensor.set_down(self.down);
         self.sensor.set_contact_shape(self.contact_shape);
-        let mut measurement = match self.taring.is_none() {
-            true => self.sensor.measure_frame_closely(&frame.words),
-            false => self.sensor.measure_frame(&frame.words),
-        };
-        (self.sensor).follow_two_contacts(&mut measurement, answer::STEPS_A_FRAME);
+        let mut measurement = self.sensor.measure_frame(&frame.words);
+        (self.sensor).follow_two_contacts(&mut measurement, Work::OF_A_FRAME);
+        if self.taring.is_none() {
+            measurement = self.sensor.measure_again(&frame.words, measurement);
+        }
         let time_us = frame
             .begun_us
             .saturating_add_signed(frame.camera.middle_us().into());

@@ -48,7 +48,7 @@ pub use contact::{CONTACT_SIGMAS, LEAST_CONTACT, is_contact, is_force};
 pub use explained::Resting;
 pub use hivtac_terms::force::{Force, Place};
 pub use noise::{FrameNoise, NoiseLevel};
-pub use two::{Pairs, TwoContacts};
+pub use two::{Means, Pairs, TwoContacts};
 
 use crate::force::model::{CalibratedRange, Model, OutputKind};
 use crate::force::network::Output;

@@ -2,10 +2,8 @@
 
 use super::explained::{Resting, of_vector, rounded};
 use super::{Force, FrameNoise, trust};
-use crate::force::forward::pair::{
-    PairEstimate, PairOfFrame, Part, Problem, Search, Work, find, follow,
-};
-use crate::force::forward::{Forward, Start};
+use crate::force::forward::pair::{Found, PairEstimate, Part, Problem, Search, Work, find, follow};
+use crate::force::forward::{Forward, Pose, Start};
 use crate::force::model::CalibratedRange;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::marker::MarkerList;
@@ -16,6 +14,9 @@ use hivtac_terms::units::MicroNewtons;
 const FORGOTTEN: u8 = 16;
 /// Frames between two looks for others that explain them as well.
 const LOOK_EVERY: u8 = 64;
+
+/// The size of a contact beside the other's below which it may have ended.
+const ENDED: f32 = 0.2;
 
 /// Two contacts that explain a frame together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -32,7 +33,7 @@ pub struct TwoContacts {
 /// What frames before tell of two contacts.
 #[derive(Clone, Copy, Debug)]
 pub struct Pairs {
-    known: Option<PairOfFrame>,
+    known: Option<PairEstimate>,
     /// Frames since they explained one, and since others were looked for.
     missed: u8,
     looked: u8,
@@ -41,6 +42,15 @@ pub struct Pairs {
     /// Whether the search has this frame's work: every second one's, where there is not enough for
     /// both.
     searches: bool,
+}
+
+/// How much may be done for a frame that one contact does not explain, and what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Means {
+    /// Steps.
+    pub work: Work,
+    /// The one contact that explains it best, if that is known.
+    pub one: Option<Pose>,
 }
 
 impl Pairs {
@@ -56,49 +66,66 @@ impl Pairs {
     /// Takes a frame that one contact explains, or none at all.
     pub fn miss(&mut self) {
         self.search = None;
+        self.pass();
+    }
+
+    /// Whether two contacts explained the frame before.
+    pub fn are_followed(&self) -> bool {
+        self.known.is_some() && self.missed == 0
+    }
+
+    /// The stronger of two contacts that explained the frame before, if the other one is hardly
+    /// there: perhaps it ended.
+    pub fn nearly_one(&self) -> Option<Pose> {
+        let [first, second] = self.known.filter(|_| self.missed == 0)?.pair;
+        let [weaker, stronger] = match first.size < second.size {
+            true => [first, second],
+            false => [second, first],
+        };
+        (weaker.size < ENDED * stronger.size).then_some(stronger)
+    }
+
+    /// Takes a frame that the known contacts do not explain.
+    fn pass(&mut self) {
         self.missed = self.missed.saturating_add(1);
         if self.missed > FORGOTTEN {
             self.known = None;
         }
     }
 
-    /// Follows the known contacts to a frame; returns those that explain it.
+    /// Follows the known contacts to a frame; returns those that explain it. Where the work is not
+    /// enough for a search as well, they are held for every second frame.
     fn follow(&mut self, problem: &Problem<'_>, work: &mut Work) -> Option<PairEstimate> {
         let is_wanted = self.search.is_some() || self.must_look();
-        let known = self.known.as_mut()?;
+        let known = self.known.as_ref()?;
         self.searches = is_wanted && !self.searches;
-        if self.searches && *work != Work::ALL {
-            return None;
-        }
-        let estimate = follow(known, problem, work);
-        known.pair = estimate.pair;
-        self.looked = self.looked.saturating_add(1);
-        self.missed = match estimate.is_explained() {
-            true => 0,
-            false => self.missed.saturating_add(1),
+        let is_held = self.searches && *work != Work::ALL;
+        let estimate = match is_held {
+            true => follow(known, problem, &mut Work(0)),
+            false => follow(known, problem, work),
         };
-        if self.missed > FORGOTTEN {
-            self.known = None;
+        self.looked = self.looked.saturating_add(1);
+        self.known = Some(estimate);
+        match estimate.is_explained() {
+            true => self.missed = 0,
+            false => self.pass(),
         }
-        Some(estimate).filter(PairEstimate::is_explained)
+        Some(estimate).filter(|estimate| estimate.is_explained() && estimate.solved.is_some())
     }
 
     /// Whether contacts must be looked for: none are known, or others may be there as well.
     fn must_look(&self) -> bool {
-        let is_sure = |known: PairOfFrame| known.is_only || self.looked < LOOK_EVERY;
-        self.search.is_none() && (self.missed > 0 || !self.known.is_some_and(is_sure))
+        let is_sure = |known: &PairEstimate| known.is_only || self.looked < LOOK_EVERY;
+        self.search.is_none() && (self.missed > 0 || !self.known.as_ref().is_some_and(is_sure))
     }
 
     /// Takes what a search found.
-    fn take(&mut self, found: Option<PairEstimate>) {
+    fn take(&mut self, found: &Found) {
         self.search = None;
         self.looked = 0;
-        if let Some(found) = found.filter(PairEstimate::is_explained) {
+        if found.is_explained() {
             self.missed = 0;
-            self.known = Some(PairOfFrame {
-                pair: found.pair,
-                is_only: found.is_only,
-            });
+            self.known = Some(PairEstimate::from(*found));
         }
     }
 }
@@ -114,7 +141,7 @@ impl Resting {
         range: &CalibratedRange,
         markers: &MarkerList,
         noise: FrameNoise,
-        (pairs, mut work): (&mut Pairs, Work),
+        (pairs, mut means): (&mut Pairs, Means),
     ) -> Option<TwoContacts> {
         if self.shape != ContactShape::Needle {
             return None;
@@ -122,8 +149,8 @@ impl Resting {
         let observed = self.observed(forward, markers, noise);
         let unknown = forward.unknown(self.is_own);
         let found = find(forward, &observed, &self.mounting, unknown, |problem| {
-            let followed = pairs.follow(problem, &mut work);
-            let searched = self.search(problem, markers, noise, (pairs, &mut work));
+            let followed = pairs.follow(problem, &mut means.work);
+            let searched = self.search(problem, markers, noise, (pairs, &mut means));
             followed.or(searched)
         });
         self.told(forward, range, &found??)
@@ -136,10 +163,13 @@ impl Resting {
         problem: &Problem<'_>,
         markers: &MarkerList,
         noise: FrameNoise,
-        (pairs, work): (&mut Pairs, &mut Work),
+        (pairs, means): (&mut Pairs, &mut Means),
     ) -> Option<PairEstimate> {
-        if pairs.must_look() && *work != Work(0) {
-            let one = problem.one(Start::Anywhere);
+        if means.work == Work(0) {
+            return None;
+        }
+        if pairs.must_look() {
+            let one = problem.one(means.one.map_or(Start::Anywhere, Start::At));
             if one.is_explained() {
                 return None;
             }
@@ -152,12 +182,13 @@ impl Resting {
             observed: &observed,
             ..*problem
         };
-        let found = match search.go_on(&problem, work) {
-            true => search.best(&problem),
-            false => return None,
-        };
-        pairs.take(found);
-        found.filter(|found| is_now && found.is_explained())
+        if !search.go_on(&problem, &mut means.work) {
+            return None;
+        }
+        let found = search.found();
+        let best = (is_now && found.is_explained()).then(|| search.best(&problem));
+        pairs.take(&found);
+        best
     }
 
     /// The forces of two contacts; `None` beyond the tables.

@@ -102,15 +102,29 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let resting = self.prepared.as_ref().map(|prepared| &prepared.resting);
         // The force goes on without a marker as long as others check it.
         let goes_on = self.has_other_layout() && measurement.force.is_some();
+        let before = self.prepared.as_ref().map(|prepared| &prepared.before);
+        let is_like_before = status.contains(Status::UNEXPLAINED)
+            && self.has_other_layout()
+            && before.is_some_and(|before| !before.may_be_disturbed());
         status.intersects(AGAIN)
             && !status.intersects(NEVER)
             && matches!(resting, Some(Some(_)))
             && !goes_on
+            && !is_like_before
     }
 
     /// Ends a second look. Returns its measurement if that has a force, otherwise the first one.
     #[inline(never)]
     pub fn finish_again(&mut self, again: Again) -> Measurement {
+        // To measure once more takes as long as the rest of the frame.
+        let is_known = self.has_other_layout() && again.measurement.markers.is_some();
+        let is_disturbed = is_known && self.is_disturbed(&again);
+        if let Some(prepared) = self.prepared.as_mut() {
+            prepared.before.is_disturbed = is_disturbed;
+        }
+        if is_known && !is_disturbed {
+            return again.measurement;
+        }
         let mut second = match self.end_scan() {
             Ok(()) => self.measure_blobs(),
             Err(reason) => self.measurement(Err(reason)),

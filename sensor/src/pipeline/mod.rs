@@ -353,6 +353,12 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// help.
     pub fn measure_frame_closely(&mut self, frame: &[u16]) -> Measurement {
         let measurement = self.measure_frame(frame);
+        self.measure_again(frame, measurement)
+    }
+
+    /// Returns the measurement of a [second look](Self::look_again) at the last frame, if that may
+    /// help; otherwise this one.
+    pub fn measure_again(&mut self, frame: &[u16], measurement: Measurement) -> Measurement {
         let Some(again) = self.look_again() else {
             return measurement;
         };

@@ -24,6 +24,10 @@ const SQUARE: usize = 4;
 /// Number of markers that are left out in turn, those that a contact explains least first.
 const SUSPECTS: usize = 3;
 
+/// Frames after which everything was tried that is tried at once after a frame that a load
+/// explained: in each second one something. All of it takes longer than a frame.
+const ATTEMPTS: u8 = 2 * (SUSPECTS as u8 + 2);
+
 /// What the previous frame showed: where the steps of the next one begin.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Before {
@@ -31,6 +35,61 @@ pub(super) struct Before {
     load: Option<Pose>,
     /// The marker that it left out.
     left_out: Option<usize>,
+    /// The frame, if no load explained it.
+    refused: Option<Refused>,
+    /// Whether the last second look showed that the frame was disturbed.
+    pub(super) is_disturbed: bool,
+}
+
+/// A frame that no load explains.
+#[derive(Clone, Copy, Debug)]
+struct Refused {
+    /// The load that explains it best.
+    load: Pose,
+    /// The number of such frames before, modulo 256.
+    count: u8,
+}
+
+/// What is tried of a frame that follows one which no load explains.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Attempt {
+    /// Steps from the load of the frame before, and nothing else.
+    Same,
+    /// Also without the marker that they explain least; or the one after that.
+    Without(usize),
+    /// Also from elsewhere.
+    From(Start),
+}
+
+impl Before {
+    /// The load that explains the last frame best, if none explains it well.
+    pub(super) fn refused(&self) -> Option<Pose> {
+        self.refused.map(|refused| refused.load)
+    }
+
+    /// Whether more than the same load was tried in the last frame.
+    pub(super) fn tried_more(&self) -> bool {
+        self.refused.is_some_and(|refused| refused.count % 2 == 0)
+    }
+
+    /// Whether a second look at the last frame, which no load explained, may show more. It takes
+    /// longer than the rest: if the last one showed no disturbance, few are worth it.
+    pub(super) fn may_be_disturbed(&self) -> bool {
+        let count = self.refused.map_or(0, |refused| refused.count);
+        self.is_disturbed || count == 0 || count % ATTEMPTS == 2
+    }
+
+    /// What to try next; `None` after a frame that a load explained.
+    fn attempt(&self) -> Option<(Pose, Attempt)> {
+        let Refused { load, count } = self.refused?;
+        let attempt = match count % ATTEMPTS {
+            nth if nth % 2 == 0 => Attempt::Same,
+            1 => Attempt::From(Start::WhereMost),
+            3 => Attempt::From(Start::Press),
+            nth => Attempt::Without(usize::from(nth / 2).saturating_sub(2)),
+        };
+        Some((load, attempt))
+    }
 }
 
 impl Prepared {
@@ -145,7 +204,13 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             placed,
             noise,
         };
-        let (estimate, left_out) = seen.explained(&prepared.before, is_still);
+        let mut before = prepared.before;
+        match self.pairs.nearly_one().zip(before.refused.as_mut()) {
+            _ if is_again => before.refused = None,
+            Some((one, refused)) => refused.load = one,
+            None => {}
+        }
+        let (estimate, left_out) = seen.explained(&before, is_still, self.pairs.are_followed());
         let lost = placed.without(left_out);
         if !is_again && lost == Lost::NONE {
             self.noise.saw(noise, &estimate.left);
@@ -157,9 +222,18 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
         // A second look may come too late: no later frame depends on it.
         if let Some(prepared) = self.prepared.as_mut().filter(|_| !is_again) {
+            let is_explained = estimate.is_explained();
+            let count = before
+                .refused
+                .map_or(0, |refused| refused.count.wrapping_add(1));
             prepared.before = Before {
-                load: estimate.is_explained().then_some(estimate.pose),
+                load: is_explained.then_some(estimate.pose),
                 left_out,
+                refused: (!is_explained).then_some(Refused {
+                    load: estimate.pose,
+                    count,
+                }),
+                is_disturbed: before.is_disturbed,
             };
         }
         (!status.intersects(Status::NO_FORCE)).then_some(force)
@@ -177,9 +251,32 @@ struct Seen<'a> {
 impl Seen<'_> {
     /// Returns the load that explains the markers best, and the one that it leaves out. A marker is
     /// left out if a contact explains only the others, and if they are `still`. The load of the
-    /// frame before is tried first, then without the marker that it left out.
-    fn explained(&self, before: &Before, is_still: bool) -> (Estimate, Option<usize>) {
+    /// frame before is tried first, then without the marker that it left out. After a frame that no
+    /// load explained, little is tried in each; less if two contacts explained it.
+    fn explained(
+        &self,
+        before: &Before,
+        is_still: bool,
+        are_two: bool,
+    ) -> (Estimate, Option<usize>) {
         let may_leave_out = is_still && self.placed.may_lose(1);
+        if let Some((load, attempt)) = before.attempt() {
+            let found = self.estimate(None, Start::At(load));
+            let suspect = |nth| least_explained(&found.left, self.placed.lost, nth);
+            let goes_on = match attempt {
+                _ if found.is_explained() => true,
+                _ if are_two => false,
+                Attempt::Same => false,
+                Attempt::Without(nth) => {
+                    let others = |suspect| self.estimate(Some(suspect), Start::At(found.pose));
+                    may_leave_out && others(suspect(nth)).is_explained()
+                }
+                Attempt::From(start) => self.estimate(None, start).is_explained(),
+            };
+            if !goes_on {
+                return (found, None);
+            }
+        }
         if let Some(load) = before.load {
             let found = self.estimate(None, Start::At(load));
             if found.is_explained() {
@@ -197,10 +294,8 @@ impl Seen<'_> {
         if all.is_explained() || !may_leave_out {
             return (all, None);
         }
-        let mut suspects = Lost::NONE;
-        for _ in 0..SUSPECTS {
-            let suspect = least_explained(&all.left, self.placed.lost, suspects);
-            suspects = suspects.and(suspect);
+        for nth in 0..SUSPECTS {
+            let suspect = least_explained(&all.left, self.placed.lost, nth);
             let others = self.estimate(Some(suspect), Start::At(all.pose));
             if others.is_explained() {
                 return (others, Some(suspect));
@@ -217,14 +312,19 @@ impl Seen<'_> {
     }
 }
 
-/// The marker, neither lost nor among `others`, of which a load leaves most over.
-fn least_explained(left: &Column, lost: Lost, others: Lost) -> usize {
-    let (mut suspect, mut most) = (0, -1.0);
-    for (identity, [x, y]) in left.as_chunks().0.iter().enumerate() {
-        let square = x * x + y * y;
-        if square > most && !lost.contains(identity) && !others.contains(identity) {
-            (suspect, most) = (identity, square);
+/// The marker, not lost, of which a load leaves most over; or the one with so many before it.
+fn least_explained(left: &Column, lost: Lost, before: usize) -> usize {
+    let mut others = lost;
+    let mut suspect = 0;
+    for _ in 0..=before {
+        let mut most = -1.0;
+        for (identity, [x, y]) in left.as_chunks().0.iter().enumerate() {
+            let square = x * x + y * y;
+            if square > most && !others.contains(identity) {
+                (suspect, most) = (identity, square);
+            }
         }
+        others = others.and(suspect);
     }
     suspect
 }

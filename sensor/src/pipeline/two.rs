@@ -3,9 +3,10 @@
 //! To find them takes many times as long as a force. A device does it in parts: it looks for them
 //! over some frames, and then follows them with one step a frame.
 
+use super::again::Look;
 use super::{Measurement, Sensor};
 pub use crate::force::forward::pair::Work;
-use crate::force::{Pairs, TwoContacts};
+use crate::force::{Means, Pairs, TwoContacts};
 use crate::markers::tables::Table;
 use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::{Marker, MarkerList};
@@ -18,21 +19,22 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// lost; if [what presses](Self::set_contact_shape) is not known to be a needle; or if two
     /// contacts on this layout are not known. Known is the layout `8v`.
     pub fn two_contacts(&self, measurement: &Measurement) -> Option<TwoContacts> {
-        let mut pairs = Pairs::NONE;
-        self.two_contacts_by(measurement, (&mut pairs, Work::ALL))
+        self.two_contacts_by(measurement, &mut { Pairs::NONE }, Work::ALL)
     }
 
-    /// Call after each frame, before [`follow`](Self::follow). Makes the measurement that of
-    /// [two contacts](Self::two_contacts), if two explain it. They are followed from those of the
-    /// frame before. Until they are found, for 28 to 76 steps, the measurement stays as it is.
+    /// Call after each frame, before [`look_again`](Self::look_again). Makes the measurement that
+    /// of [two contacts](Self::two_contacts), if two explain it; then there is no second look. They
+    /// are followed from those of the frame before. Until they are found, for 28 to 76 steps, the
+    /// measurement stays as it is.
     pub fn follow_two_contacts(&mut self, measurement: &mut Measurement, work: Work) {
+        if !is_asked(measurement) {
+            self.pairs.miss();
+            return;
+        }
         let mut pairs = self.pairs;
-        if is_asked(measurement) {
-            if let Some(two) = self.two_contacts_by(measurement, (&mut pairs, work)) {
-                measurement.tell(&two);
-            }
-        } else {
-            pairs.miss();
+        if let Some(two) = self.two_contacts_by(measurement, &mut pairs, work) {
+            measurement.tell(&two);
+            self.look = Look::First;
         }
         self.pairs = pairs;
     }
@@ -41,19 +43,30 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     fn two_contacts_by(
         &self,
         measurement: &Measurement,
-        by: (&mut Pairs, Work),
+        pairs: &mut Pairs,
+        work: Work,
     ) -> Option<TwoContacts> {
         let features = measurement.features.filter(|_| is_asked(measurement))?;
         let model = self.model.as_ref()?;
-        let resting = self.prepared.as_ref()?.resting.as_ref()?;
+        let prepared = self.prepared.as_ref()?;
+        let resting = prepared.resting.as_ref()?;
         // Where the markers are at one common time.
-        let pairs = features.centroids.iter().zip(measurement.markers?);
-        let markers = MarkerList::of(pairs.map(|((x, y), seen)| Marker {
+        let seen = features.centroids.iter().zip(measurement.markers?);
+        let markers = MarkerList::of(seen.map(|((x, y), seen)| Marker {
             x: *x,
             y: *y,
             area: seen.area,
         }));
         let noise = self.noise.of_frame(Px(0));
+        let is_free = pairs.are_followed() || !prepared.before.tried_more();
+        let means = Means {
+            work: match is_free || work == Work::ALL {
+                true => work,
+                false => Work(0),
+            },
+            one: prepared.before.refused(),
+        };
+        let by = (pairs, means);
         resting.follow_two_contacts(model.forward.as_ref()?, &model.range, &markers, noise, by)
     }
 }

@@ -147,7 +147,7 @@ impl Bench<'_> {
             search.best(problem)
         };
         let both = || find(&self.forward, &observed, &self.mounting, unknown, searched);
-        let both = (!one.is_explained()).then(both).flatten().flatten();
+        let both = (!one.is_explained()).then(both).flatten();
         let is_one_without_a_dot = !one.is_explained()
             && (0..images.len()).any(|dot| {
                 let mut others = observed;

@@ -21,7 +21,7 @@ use hivtac_sensor::markers::formats::Formats;
 use hivtac_sensor::markers::scanner::{MAX_WIDTH, ScanSettings, Scanner};
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::markers::tables::{ByteTable, Pixels};
-use hivtac_sensor::pipeline::{Measurement, Sensor};
+use hivtac_sensor::pipeline::{Measurement, Sensor, Work};
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::geometry::{Geometry, Preset};
@@ -365,8 +365,14 @@ fn sense_frame(
         above_length = band.len();
         core::mem::swap(&mut above, &mut below);
     }
+    // As the firmware does; the frames before are to leave nothing to be searched.
+    let work = match is_counted {
+        true => Work::OF_A_FRAME,
+        false => Work::ALL,
+    };
     counting_begins();
-    let measurement = sensor.finish_frame();
+    let mut measurement = sensor.finish_frame();
+    sensor.follow_two_contacts(&mut measurement, work);
     counting_ends();
     Ok(measurement)
 }

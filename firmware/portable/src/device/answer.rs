@@ -5,7 +5,7 @@ use core::fmt::{self, Write};
 use heapless::String;
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::markers::settings::Settings;
-use hivtac_sensor::pipeline::{Measurement, Work};
+use hivtac_sensor::pipeline::Measurement;
 use hivtac_sensor::tare::{Refusal, TareBuilder};
 use hivtac_sensor::temporal::{Followed, Moment};
 use hivtac_terms::geometry::{Geometry, Preset};
@@ -15,10 +15,6 @@ use hivtac_terms::threshold::ByteOrder;
 use hivtac_wire::message::{DeviceHello, Outcome, Sample};
 use hivtac_wire::settings::Name;
 use hivtac_wire::version::HelloPrefix;
-
-/// Steps to two contacts in a frame that one does not explain: with one, a sample takes the time of
-/// two frames.
-pub const STEPS_A_FRAME: Work = Work(1);
 
 /// What identifies a device to a host.
 pub struct Identity<'a> {

@@ -34,6 +34,10 @@ pub enum Start {
     Near(Pose),
     /// At a guess, and nowhere else.
     At(Pose),
+    /// Where the markers moved most, and nowhere else.
+    WhereMost,
+    /// At the nearest of a few presses, and nowhere else.
+    Press,
 }
 
 /// How the markers' images moved since the rest position, and how well that is known.
@@ -117,7 +121,7 @@ pub struct Estimate {
 impl Forward<'_> {
     /// Takes steps from a guess, or without one from where the markers moved most. If they get
     /// stuck, or end at a load that does not explain the markers, also takes steps from where the
-    /// markers moved most, or from the nearest of a few presses, unless [`Start::At`] forbids it.
+    /// markers moved most, or from the nearest of a few presses, unless the start forbids it.
     /// These succeed where the first steps began badly. Returns the better load. Compiled once,
     /// because the near memory is scarce.
     #[inline(never)]
@@ -142,12 +146,13 @@ impl Forward<'_> {
             ..Pose::default()
         };
         let (found, is_done) = descend(match start {
-            Start::Anywhere => where_most(HALF * self.limits.size),
+            Start::Anywhere | Start::WhereMost => where_most(HALF * self.limits.size),
             Start::Near(guess) | Start::At(guess) => guess,
+            Start::Press => self.nearest_press(observed, &mounting.beside_mm),
         });
         let (other, _) = descend(match start {
             _ if is_done => return found,
-            Start::At(_) => return found,
+            Start::At(_) | Start::WhereMost | Start::Press => return found,
             Start::Near(guess) => where_most(guess.size),
             Start::Anywhere => {
                 let wide = observed.wide.as_ref();

@@ -1,6 +1,6 @@
 //! Defines every kernel, in portable Rust.
 
-use super::{Factors, Parts, Sums};
+use super::{APART, Factors, Number, Parts, Sums};
 use crate::force::layer::{Layer, MAX_WIDTH};
 use crate::force::packing::{ROWS_TOGETHER, WeightWidth, unpack8, unpack16};
 use crate::force::rescale::rescale_sum;
@@ -15,6 +15,21 @@ pub fn multiply(layer: &Layer<'_>, inputs: &[i16; MAX_WIDTH], sums: &mut Sums) {
         WeightWidth::Int8 => sum_groups(layer, inputs, sums, unpack8),
         WeightWidth::Int16 => sum_groups(layer, inputs, sums, unpack16),
     }
+}
+
+/// The sums of the products of one vector's numbers with those of each of four vectors, which begin
+/// [`APART`] numbers after each other. Numbers beyond the end count as zero. Not inlined, as
+/// [`multiply`].
+#[cfg_attr(armv7em, inline(never))]
+pub fn products(one: &[Number], four: &[Number]) -> [i64; 4] {
+    [0, 1, 2, 3].map(|nth| {
+        let other = four.get(nth * APART..).unwrap_or_default();
+        let pairs = one.iter().zip(other);
+        pairs.fold(0, |sum, (a, b)| {
+            let [a, b] = [a, b].map(|part| i32::from(i16::from_le_bytes(*part)));
+            sum + i64::from(a * b)
+        })
+    })
 }
 
 /// Sums all terms times their factors. Returns the value, its slopes by size and tilt, by their own

@@ -59,6 +59,26 @@ impl Problem<'_> {
         (self.forward).estimate(self.observed, self.mounting, self.unknown, start)
     }
 
+    /// Returns known contacts with what they leave unexplained of these markers, without a step.
+    #[inline(never)]
+    pub(super) fn held(&self, known: &PairEstimate) -> PairEstimate {
+        let mut here = Point {
+            both: Both::new(known.pair, self.forward),
+            prediction: PairPrediction::default(),
+            left: Column::default(),
+        };
+        here.prediction.moved = self.moved(&known.pair);
+        let pairs = self.observed.moved.iter().zip(here.prediction.moved.iter());
+        here.left = Column::of(pairs.map(|(seen, told)| seen - told));
+        let mut whitening = Whitening::EMPTY;
+        let whole = whitening.set(|sum| here.put_covariance(self, sum));
+        whitening.whiten(&mut here.left);
+        PairEstimate {
+            unexplained: whole.map_or(f32::INFINITY, |()| square(&here.left)),
+            ..*known
+        }
+    }
+
     /// Takes a step from two contacts.
     #[inline(never)]
     pub(super) fn step(&self, pair: Pair) -> Stepped {

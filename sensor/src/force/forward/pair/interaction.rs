@@ -8,11 +8,12 @@ use super::film::Both;
 use crate::force::forward::covariance::{Covariance, triangle};
 use crate::force::forward::mounting::RestImage;
 use crate::force::forward::solve::Column;
+use crate::force::kernels::{APART, Number, products};
 
 /// Inputs ([`Both::inputs`]).
 pub const INPUTS: usize = 10;
-/// Most neurons of a hidden layer.
-pub const MOST_WIDTH: usize = 192;
+/// Neurons of a hidden layer.
+pub const WIDTH: usize = 192;
 /// Layers.
 pub const LAYERS: usize = 3;
 /// Markers of the layout.
@@ -41,6 +42,18 @@ pub struct Interaction<'a> {
     left: &'a [[u8; 4]],
 }
 
+/// Values of a hidden layer and their slopes by the inputs, each in units of its own, and one more
+/// so that [`products`] has whole fours.
+type Hidden = [[Number; APART]; LANES];
+const LANES: usize = 12;
+/// Largest number of a [`Hidden`].
+const LARGEST: f32 = 32_767.0;
+/// Bits of a sum of products that are left out, so that 32 are enough: |Σ| ≤ 192 · 2³⁰ < 2³⁸.
+const LEFT_OUT: u32 = 7;
+/// What 1 is worth in a sum of products with values.
+const UNIT: f32 = (1 << LEFT_OUT) as f32 / LARGEST;
+const _: () = assert!(2 * APART == row(WIDTH) && WIDTH as u64 <= 1 << (31 + LEFT_OUT - 30));
+
 /// A layer: an output's bias, step and weights after those of the one before.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Layer<'a> {
@@ -49,10 +62,10 @@ struct Layer<'a> {
 }
 
 /// Bias, step and weights of an output.
-type Row<'a> = (f32, f32, &'a [[u8; 2]]);
+type Row<'a> = (f32, f32, &'a [Number]);
 
-/// Values of a layer, and their slopes by the inputs.
-type Values = [[f32; 1 + INPUTS]; MOST_WIDTH];
+/// A value with its slopes by the inputs.
+type Value = [f32; 1 + INPUTS];
 
 impl Interaction<'static> {
     /// That of a layout, if there is one. `rest` has its markers' places.
@@ -62,13 +75,13 @@ impl Interaction<'static> {
 }
 
 impl<'a> Interaction<'a> {
-    /// Takes a file. Returns `None` if its length is not what its widths say, or a width is 0 or
-    /// more than [`MOST_WIDTH`].
+    /// Takes a file. Returns `None` if its length is not what its widths say, or a width is not
+    /// [`WIDTH`].
     pub fn new(bytes: &'a [u8]) -> Option<Interaction<'a>> {
         let (head, mut rest) = bytes.split_first_chunk::<HEAD>()?;
         let [first, second, dots, _, ..] = head.map(usize::from);
         let widths = [INPUTS, first, second, COORDINATES];
-        if dots != DOTS || !widths.iter().all(|width| (1..=MOST_WIDTH).contains(width)) {
+        if dots != DOTS || [first, second] != [WIDTH; 2] {
             return None;
         }
         let mut layers = [Layer {
@@ -139,45 +152,55 @@ impl<'a> Interaction<'a> {
     /// The motion of the images that the mean of single contacts leaves, focal lengths.
     #[inline(never)]
     pub fn moved(&self, both: &Both) -> Column {
-        let mut values = [[0.0; MOST_WIDTH]; 2];
-        let [mut now, mut next] = values.each_mut();
-        now[..INPUTS].copy_from_slice(&self.scaled(both));
-        for (nth, layer) in self.layers.iter().enumerate() {
-            for (value, (bias, step, weights)) in next.iter_mut().zip(layer.rows()) {
-                let sum = (weights.iter().zip(&*now)).fold(0.0, |sum, (weight, value)| {
-                    sum + f32::from(i16::from_le_bytes(*weight)) * value
-                });
-                let sum = bias + step * sum;
-                *value = if nth + 1 < LAYERS { bent(sum)[0] } else { sum };
+        let [first, second, last] = &self.layers;
+        let inputs = self.scaled(both);
+        let mut hidden = [[0; 2]; APART];
+        for (number, (bias, step, weights)) in hidden.iter_mut().zip(first.rows()) {
+            let [value, _] = bent(bias + step * sum(weights, &inputs));
+            *number = rounded(LARGEST * value);
+        }
+        let hidden = hidden.get(..WIDTH).unwrap_or_default();
+        let mut outputs = [0.0; COORDINATES];
+        for (nth, four) in second.fours().enumerate() {
+            let sums = products(hidden, four.numbers);
+            for (k, (bias, step)) in four.scales.into_iter().enumerate() {
+                let [value, _] = bent(bias + step * UNIT * short(sums[k]));
+                for (output, (_, _, weights)) in outputs.iter_mut().zip(last.rows()) {
+                    let weight = weights.get(4 * nth + k).copied().unwrap_or_default();
+                    *output += number(weight) * value;
+                }
             }
-            core::mem::swap(&mut now, &mut next);
         }
         let [factor, ..] = self.factor(both);
-        Column::of(now.iter().take(COORDINATES).map(|value| factor * value))
+        let outputs = outputs.iter().zip(last.rows());
+        Column::of(outputs.map(|(sum, (bias, step, _))| factor * (step * sum + bias)))
     }
 
     /// Adds that motion to a prediction, and its slopes by the inputs to `slopes`.
     #[inline(never)]
     pub fn add_to(&self, both: &Both, moved: &mut Column, slopes: &mut [Column; INPUTS]) {
-        let [first, second, last] = &self.layers;
-        let mut inputs = [[0.0; 1 + INPUTS]; INPUTS];
-        for (nth, (value, input)) in inputs.iter_mut().zip(self.scaled(both)).enumerate() {
-            value[0] = input;
-            if let Some(slope) = value.get_mut(1 + nth) {
-                [_, *slope] = self.scale(nth);
-            }
-        }
-        let mut hidden: Values = [[0.0; 1 + INPUTS]; MOST_WIDTH];
-        for (value, row) in hidden.iter_mut().zip(first.rows()) {
-            *value = neuron(row, &inputs);
-        }
+        let [_, second, last] = &self.layers;
+        let (hidden, units) = self.hidden(both);
         // A value of the second layer is used at once: there is no room for two layers' values.
         let mut outputs = [[0.0; 1 + INPUTS]; COORDINATES];
-        for (nth, row) in second.rows().enumerate() {
-            let value = neuron(row, &hidden);
+        for (nth, (bias, step, weights)) in second.rows().enumerate() {
+            let mut sums = [0.0; LANES];
+            let fours = hidden.as_chunks::<4>().0.iter();
+            for (sums, four) in sums.as_chunks_mut().0.iter_mut().zip(fours) {
+                *sums = products(weights, four.as_flattened()).map(short);
+            }
+            let mut value: Value = [0.0; 1 + INPUTS];
+            for ((value, sum), unit) in value.iter_mut().zip(sums).zip(units) {
+                *value = step * unit * sum;
+            }
+            let [bent, slope] = bent(bias + value[0]);
+            value = value.map(|part| slope * part);
+            value[0] = bent;
             for (output, (_, _, weights)) in outputs.iter_mut().zip(last.rows()) {
-                let weight = weights.get(nth).copied().unwrap_or_default();
-                add(output, weight, &value);
+                let weight = number(weights.get(nth).copied().unwrap_or_default());
+                for (sum, value) in output.iter_mut().zip(&value) {
+                    *sum += weight * value;
+                }
             }
         }
         for (output, (bias, step, _)) in outputs.iter_mut().zip(last.rows()) {
@@ -195,6 +218,41 @@ impl<'a> Interaction<'a> {
                 }
             }
         }
+    }
+
+    /// The first layer with its slopes, and the units of its sums.
+    #[inline(never)]
+    fn hidden(&self, both: &Both) -> (Hidden, Value) {
+        let [first, ..] = &self.layers;
+        let inputs = self.scaled(both);
+        // The largest slopes of any pair: the neurons' function is nowhere steeper than 1.
+        let mut steepest = [f32::MIN_POSITIVE; INPUTS];
+        for (_, step, weights) in first.rows() {
+            for (most, weight) in steepest.iter_mut().zip(weights) {
+                *most = most.max((step * number(*weight)).abs());
+            }
+        }
+        let mut hidden = [[[0; 2]; APART]; LANES];
+        let [values, slopes @ ..] = &mut hidden;
+        let per_steepest = steepest.map(|most| LARGEST / most);
+        for (nth, (bias, step, weights)) in first.rows().enumerate() {
+            let [value, slope] = bent(bias + step * sum(weights, &inputs));
+            if let Some(place) = values.get_mut(nth) {
+                *place = rounded(LARGEST * value);
+            }
+            let weights = weights.iter().zip(&per_steepest);
+            for (slopes, (weight, per_steepest)) in slopes.iter_mut().zip(weights) {
+                if let Some(place) = slopes.get_mut(nth) {
+                    *place = rounded(step * number(*weight) * slope * per_steepest);
+                }
+            }
+        }
+        let mut units = [UNIT; 1 + INPUTS];
+        for (nth, (unit, most)) in units.iter_mut().skip(1).zip(steepest).enumerate() {
+            let [_, per_deviation] = self.scale(nth);
+            *unit *= most * per_deviation;
+        }
+        (hidden, units)
     }
 
     /// Adds what the network leaves to a covariance.
@@ -216,7 +274,30 @@ impl<'a> Interaction<'a> {
     }
 }
 
+/// Four outputs of a layer that follow each other.
+struct Four<'a> {
+    /// Bias and step of each.
+    scales: [(f32, f32); 4],
+    /// The weights of the first, and [`APART`] numbers later those of the next.
+    numbers: &'a [Number],
+}
+
 impl<'a> Layer<'a> {
+    /// The outputs in fours. The layer's inputs are [`WIDTH`].
+    fn fours(&self) -> impl Iterator<Item = Four<'a>> {
+        self.bytes.chunks_exact(4 * row(WIDTH)).filter_map(|four| {
+            let scale = |nth: usize| {
+                let (words, _) = four.get(nth * row(WIDTH)..)?.as_chunks::<4>();
+                let ([bias, step], _) = words.split_first_chunk()?;
+                Some((f32::from_le_bytes(*bias), f32::from_le_bytes(*step)))
+            };
+            Some(Four {
+                scales: [scale(0)?, scale(1)?, scale(2)?, scale(3)?],
+                numbers: four.get(8..)?.as_chunks().0,
+            })
+        })
+    }
+
     /// Bias, step and weights of each output.
     fn rows(&self) -> impl Iterator<Item = Row<'a>> {
         let rows = self.bytes.chunks_exact(row(self.inputs).max(1));
@@ -232,26 +313,24 @@ impl<'a> Layer<'a> {
     }
 }
 
-/// Adds a weighted value with its slopes.
-#[inline]
-fn add(sums: &mut [f32; 1 + INPUTS], weight: [u8; 2], values: &[f32; 1 + INPUTS]) {
-    let weight = f32::from(i16::from_le_bytes(weight));
-    for (sum, value) in sums.iter_mut().zip(values) {
-        *sum += weight * value;
-    }
+/// Σ w·x.
+fn sum(weights: &[Number], values: &[f32]) -> f32 {
+    let products = weights.iter().zip(values);
+    products.fold(0.0, |sum, (weight, value)| sum + number(*weight) * value)
 }
 
-/// The value of a hidden neuron with its slopes, from those of the layer before.
-fn neuron((bias, step, weights): Row<'_>, values: &[[f32; 1 + INPUTS]]) -> [f32; 1 + INPUTS] {
-    let mut sums = [0.0; 1 + INPUTS];
-    for (weight, values) in weights.iter().zip(values) {
-        add(&mut sums, *weight, values);
-    }
-    let mut sums = sums.map(|sum| step * sum);
-    let [bent, slope] = bent(sums[0] + bias);
-    sums = sums.map(|sum| slope * sum);
-    sums[0] = bent;
-    sums
+fn number(bytes: Number) -> f32 {
+    f32::from(i16::from_le_bytes(bytes))
+}
+
+/// The nearest number; within ±[`LARGEST`] the value of a [`Number`].
+fn rounded(value: f32) -> Number {
+    ((value + 0.5f32.copysign(value)) as i16).to_le_bytes()
+}
+
+/// A sum of products without its last bits.
+fn short(sum: i64) -> f32 {
+    (sum >> LEFT_OUT) as i32 as f32
 }
 
 /// Bytes of an output of a layer.

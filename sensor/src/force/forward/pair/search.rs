@@ -2,7 +2,7 @@
 //! frame.
 
 use super::descent::{Problem, STEPS};
-use super::{ALONG, APART_MM, DESCENTS, PARTS, Pair, PairEstimate};
+use super::{ALONG, APART_MM, DESCENTS, PARTS, Pair, PairEstimate, has_rival, is_explained};
 use crate::force::forward::pose::Pose;
 
 /// Number of starts, and how many are compared in place of one step.
@@ -16,6 +16,8 @@ pub struct Work(pub u32);
 impl Work {
     /// As many as are of use: for a computer.
     pub const ALL: Work = Work(u32::MAX);
+    /// What a device does in one frame.
+    pub const OF_A_FRAME: Work = Work(1);
 
     /// Takes one; returns whether there was one.
     fn take(&mut self) -> bool {
@@ -104,25 +106,71 @@ impl Search {
         }
     }
 
-    /// Returns the best of what was found, once the search is over.
-    pub fn best(&self, problem: &Problem<'_>) -> Option<PairEstimate> {
-        let mut best = self.nearest.first()?;
+    /// Returns the best contacts that were found, once the search is over, and what they leave
+    /// unexplained.
+    pub fn found(&self) -> Found {
+        let mut best = (f32::INFINITY, [self.one; 2]);
         for found in &self.nearest {
             if found.0 < best.0 {
-                best = found;
+                best = *found;
             }
         }
-        let mut estimate = problem.step(best.1).here;
-        let is_rival = |(unexplained, pair): &(f32, Pair)| estimate.has_rival(*unexplained, pair);
-        estimate.is_only = !self.nearest.iter().any(is_rival);
-        Some(estimate)
+        let (unexplained, pair) = best;
+        let rivals = |other: &(f32, Pair)| has_rival((unexplained, &pair), (other.0, &other.1));
+        Found {
+            pair,
+            unexplained,
+            is_only: !self.nearest.iter().any(rivals),
+        }
+    }
+
+    /// [`found`](Self::found), with how well they are known in the markers of the search.
+    pub fn best(&self, problem: &Problem<'_>) -> PairEstimate {
+        let Found { pair, is_only, .. } = self.found();
+        PairEstimate {
+            is_only,
+            ..problem.step(pair).here
+        }
+    }
+}
+
+/// What a search found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Found {
+    /// The contacts.
+    pub pair: Pair,
+    /// The squared residual, relative to its covariance.
+    pub unexplained: f32,
+    /// Whether no other two contacts were found that explain the markers nearly as well.
+    pub is_only: bool,
+}
+
+impl Found {
+    /// Returns whether the contacts explain the markers; false if the residual is NaN.
+    pub fn is_explained(&self) -> bool {
+        is_explained(self.unexplained)
+    }
+}
+
+impl From<Found> for PairEstimate {
+    /// How well they are known is not known before a step.
+    fn from(found: Found) -> PairEstimate {
+        PairEstimate {
+            pair: found.pair,
+            size: 0.0,
+            unexplained: found.unexplained,
+            is_only: found.is_only,
+            solved: None,
+        }
     }
 }
 
 /// Returns the contacts of the frame before, taken nearer to this frame's by a step, and by more if
-/// there is work left.
-pub fn follow(before: &PairOfFrame, problem: &Problem<'_>, work: &mut Work) -> PairEstimate {
-    work.take();
+/// there is work left. Without work it returns them as they were.
+pub fn follow(before: &PairEstimate, problem: &Problem<'_>, work: &mut Work) -> PairEstimate {
+    if !work.take() {
+        return problem.held(before);
+    }
     let mut stepped = problem.step(before.pair);
     while let Some((next, _)) = stepped.next.filter(|_| work.take()) {
         stepped = problem.step(next);
@@ -134,13 +182,4 @@ pub fn follow(before: &PairOfFrame, problem: &Problem<'_>, work: &mut Work) -> P
     }
     estimate.is_only = before.is_only;
     estimate
-}
-
-/// The contacts of a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PairOfFrame {
-    /// The contacts.
-    pub pair: Pair,
-    /// Whether no others were found that explain it nearly as well.
-    pub is_only: bool,
 }
