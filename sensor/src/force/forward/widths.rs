@@ -15,8 +15,6 @@ use super::predict::Prediction;
 use super::solve::{Rows, Solved, UNKNOWNS, Unknowns, dot, norm, take};
 use super::terms::Limits;
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_terms::layout::EIGHT_V;
-use hivtac_terms::units::SignedMicrometres;
 
 /// Groups of columns: the motion by the width; then by contacts that are longer than wide, along x
 /// and between x and y, that lean towards x and y, and whose middle bears more than the rim.
@@ -66,7 +64,7 @@ const ALONG_TILT_MM: f32 = 0.83;
 /// often do, near the place and the force of the wide one.
 const NARROW: f32 = 0.1;
 const WIDE: f32 = 0.8;
-/// Markers of the layout `8v` are this near to its places, mm.
+/// The markers are this near to those of the layout, mm.
 const NEAR_MM: f32 = 1.0;
 
 /// The table of the nominal film with the layout `8v`, as the example `contact_widths` of
@@ -146,7 +144,7 @@ impl<'a> Widths<'a> {
     /// That of the nominal film, which stands for all films with its markers; `None` if there is
     /// none for these.
     pub fn nominal(rest_image: &RestImage) -> Option<Widths<'static>> {
-        Widths::new(OF_EIGHT_V).filter(|_| is_eight_v(rest_image))
+        Widths::new(OF_EIGHT_V).filter(|_| rest_image.is_eight_v(NEAR_MM))
     }
 
     /// Takes a table; `None` if a number is out of its range.
@@ -489,22 +487,12 @@ impl Mirror {
     }
 }
 
-/// Whether markers are those of the layout `8v`.
-fn is_eight_v(rest_image: &RestImage) -> bool {
-    let near = |(number, place): (usize, &[SignedMicrometres; 2])| {
-        let place_mm = place.map(|part| 1e-3 * part.0 as f32);
-        let mut squares = rest_image.squared_distances_mm(place_mm);
-        let square = squares.nth(number);
-        square.is_some_and(|square| square < NEAR_MM * NEAR_MM)
-    };
-    rest_image.at.len() == EIGHT_V.len() && EIGHT_V.iter().enumerate().all(near)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::force::forward::Markers;
     use crate::force::forward::solve::solve;
+    use hivtac_terms::layout::EIGHT_V;
     use hivtac_terms::units::Micrometres;
     use proptest::prelude::*;
     use std::vec::Vec;

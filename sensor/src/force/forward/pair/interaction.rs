@@ -22,11 +22,11 @@ pub const DOTS: usize = 8;
 pub const COORDINATES: usize = 2 * DOTS;
 /// Bytes of a file before the layers.
 pub const HEAD: usize = 4 + 8 * DOTS + 8 * INPUTS + 4;
-/// How far a marker of a model may be from the file's, mm.
+/// The markers are this near to those of the layout, mm.
 const NEAR_MM: f32 = 0.05;
 
 /// That of the layout `8v` on the nominal film, as the example `pairs` of `calibration/` writes it.
-const EIGHT_V: &[u8] = include_bytes!("../../../../data/pairs-8v.bin");
+const OF_EIGHT_V: &[u8] = include_bytes!("../../../../data/pairs-8v.bin");
 
 /// The interaction of two contacts, borrowed from a file.
 ///
@@ -70,7 +70,7 @@ type Value = [f32; 1 + INPUTS];
 impl Interaction<'static> {
     /// That of a layout, if there is one. `rest` has its markers' places.
     pub fn of_layout(rest: &RestImage) -> Option<Interaction<'static>> {
-        Interaction::new(EIGHT_V).filter(|own| own.is_of(rest))
+        Interaction::new(OF_EIGHT_V).filter(|_| rest.is_eight_v(NEAR_MM))
     }
 }
 
@@ -105,15 +105,6 @@ impl<'a> Interaction<'a> {
     fn number(&self, nth: usize) -> f32 {
         let (words, _) = self.head.as_chunks();
         f32::from_le_bytes(words.get(1 + nth).copied().unwrap_or_default())
-    }
-
-    /// Whether the markers of a rest picture are those of this layout.
-    fn is_of(&self, rest: &RestImage) -> bool {
-        let places = rest.at.iter().zip(rest.film_mm.iter());
-        let mut coordinates = places.flat_map(|([x, y], [_, across])| [across * x, across * y]);
-        let mut own = (0..COORDINATES).map(|nth| self.number(nth));
-        rest.at.len() == DOTS
-            && coordinates.all(|there| own.next().is_some_and(|own| (own - there).abs() < NEAR_MM))
     }
 
     /// The mean and the reciprocal deviation of an input.
@@ -425,12 +416,12 @@ mod tests {
 
     #[test]
     fn other_files_are_refused() {
-        assert!(Interaction::new(EIGHT_V).is_some());
-        for length in [0, HEAD - 1, HEAD, EIGHT_V.len() - 1] {
-            assert_eq!(Interaction::new(&EIGHT_V[..length]), None, "{length}");
+        assert!(Interaction::new(OF_EIGHT_V).is_some());
+        for length in [0, HEAD - 1, HEAD, OF_EIGHT_V.len() - 1] {
+            assert_eq!(Interaction::new(&OF_EIGHT_V[..length]), None, "{length}");
         }
         for (place, wrong) in [(0, 0), (0, 255), (1, 0), (2, 4)] {
-            let mut bytes: Vec<u8> = EIGHT_V.to_vec();
+            let mut bytes: Vec<u8> = OF_EIGHT_V.to_vec();
             bytes[place] = wrong;
             assert_eq!(Interaction::new(&bytes), None, "{place}");
         }
