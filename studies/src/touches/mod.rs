@@ -9,9 +9,11 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
 use hivtac_calibration::forward::pairs::PairFilm;
-use hivtac_sensor::force::forward::pair::{Problem, Search, Work, find};
+use hivtac_sensor::force::forward::pair::{
+    Found, Interaction, PairEstimate, Problem, Search, Work, find, follow,
+};
 use hivtac_sensor::force::forward::{
-    Column, Estimate, Forward, Markers, Mounting, Observed, Start,
+    Column, Estimate, Forward, Markers, Mounting, Observed, Pose, Start, Unknown,
 };
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::lost::Lost;
@@ -29,6 +31,12 @@ const NOISE_PX: f64 = 0.011;
 /// Fineness of the mesh: dots are within 0.002 px of a mesh of half the cells' size.
 const FINENESS: f64 = 1.0;
 
+/// The network of two contacts, and the bytes at its end that say what it leaves.
+const NETWORK: &[u8] = include_bytes!("../../../sensor/data/pairs-8v.bin");
+const LEFT_BYTES: usize = 4 * 16 * 17 / 2;
+/// Frames of each press of one needle or ball.
+const SINGLE_FRAMES: u32 = 10;
+
 /// Press with two needles at once
 #[derive(Args)]
 pub struct Touches {
@@ -44,6 +52,9 @@ pub struct Touches {
     /// Frames of each press: as many draws of noise.
     #[arg(long, default_value_t = 4)]
     frames: u32,
+    /// Presses of each row of one needle or ball, with ten frames each.
+    #[arg(long, default_value_t = 100)]
+    singles: u32,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
@@ -69,6 +80,9 @@ impl Touches {
         let mut text = String::from(PairRow::HEAD);
         text.extend(pairs.iter().map(PairRow::line));
         text += "\n";
+        text += PairRow::BOUNDS;
+        text.extend(pairs.iter().map(PairRow::bounds));
+        text += "\n";
         text += OtherRow::HEAD;
         text.extend(others.iter().map(OtherRow::line));
         print!("{text}");
@@ -91,7 +105,11 @@ impl Touches {
         let film = PairFilm::new(&self.layout.centres_mm(), FINENESS)?;
         let (mut pairs, mut others) = (Vec::new(), Vec::new());
         for kind in Kind::all() {
-            let numbers = (0..self.presses).into_par_iter();
+            let presses = match kind.is_single() {
+                true => self.singles,
+                false => self.presses,
+            };
+            let numbers = (0..presses).into_par_iter();
             let solved = numbers.map(|number| self.outcomes(&bench, &film, kind, number));
             let solved: Vec<Vec<Outcome>> = solved.collect::<Result<_>>()?;
             let outcomes: Vec<Outcome> = solved.into_iter().flatten().collect();
@@ -114,7 +132,10 @@ impl Touches {
         let press = kind.press(number)?;
         let moved = press.moved(film)?;
         let mut random = seeded(u64::from(number) + 7);
-        let frames = 0..self.frames;
+        let frames = match kind.is_single() {
+            true => 0..SINGLE_FRAMES,
+            false => 0..self.frames,
+        };
         Ok(frames
             .map(|_| {
                 let noisy = moved.iter().map(|image| {
@@ -157,7 +178,43 @@ impl Bench<'_> {
             });
         let strength = self.forward.strength(true);
         let is_one = [one.is_explained(), is_one_without_a_dot];
-        Outcome::new(press, &strength, is_one, both)
+        let bound = self.bound(press, &observed);
+        Outcome::new(press, &strength, is_one, (both, bound))
+    }
+
+    /// Two needles where they are, as well as noise alone lets them be known: the bound of Cramér
+    /// and Rao, with the prior of the steps.
+    fn bound(&self, press: &Press, observed: &Observed<'_>) -> Option<PairEstimate> {
+        let [first, second] = press.needles[..] else {
+            return None;
+        };
+        let Forward {
+            stiffness, limits, ..
+        } = &self.forward;
+        let pair = [first, second].map(|(place_mm, force_n)| {
+            let place_mm = place_mm.map(|part| part as f32);
+            Pose::of_force(force_n.map(|part| part as f32), place_mm, stiffness, limits)
+        });
+        let mut exact = NETWORK.to_vec();
+        let end = exact.len();
+        exact[end - LEFT_BYTES..].fill(0);
+        let problem = Problem {
+            forward: &self.forward,
+            interaction: &Interaction::new(&exact)?,
+            observed,
+            mounting: &self.mounting,
+            unknown: Unknown::Nothing,
+        };
+        let truth = PairEstimate::from(Found {
+            pair,
+            unexplained: 0.0,
+            is_only: true,
+        });
+        Some(PairEstimate {
+            pair,
+            unexplained: 0.0,
+            ..follow(&truth, &problem, &mut Work(1))
+        })
     }
 
     fn one(&self, observed: &Observed<'_>, start: Start) -> Estimate {

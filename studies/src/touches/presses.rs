@@ -20,8 +20,12 @@ const APART_MM: [f64; 7] = [0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 6.0];
 const FORCES_MN: [[f64; 2]; 3] = [[50.0, 50.0], [100.0, 100.0], [80.0, 20.0]];
 /// Distance of three needles from their middle, mm.
 const THREE_MM: [f64; 2] = [1.5, 3.0];
-/// Force of a press that is no pair, mN.
+/// Force of three needles together, of an edge and of a disc, mN.
 const TOGETHER_MN: f64 = 120.0;
+/// Forces of one needle, and of one ball, mN.
+const ONE_MN: [f64; 2] = [20.0, 200.0];
+/// Radii within which balls press, mm.
+const BALLS_MM: [f64; 2] = [1.0, 2.0];
 /// Length and half the width of an edge, and a disc's radius, mm.
 const EDGE_MM: [f64; 2] = [6.0, 0.4];
 const DISC_MM: f64 = 2.0;
@@ -31,6 +35,8 @@ const DISC_MM: f64 = 2.0;
 pub enum Kind {
     /// One needle.
     One,
+    /// One soft ball, that presses within this radius, mm.
+    Ball(f64),
     /// Two needles.
     Pair {
         /// Their distance, mm.
@@ -62,8 +68,17 @@ impl Kind {
                 forces_mn,
             })
         });
-        let others = [Kind::One].into_iter().chain(THREE_MM.map(Kind::Three));
-        pairs.chain(others).chain([Kind::Edge, Kind::Disc])
+        let others = THREE_MM.map(Kind::Three).into_iter();
+        let others = others.chain([Kind::Edge, Kind::Disc]);
+        pairs
+            .chain([Kind::One])
+            .chain(BALLS_MM.map(Kind::Ball))
+            .chain(others)
+    }
+
+    /// Whether it is one needle or ball, of which there are many presses.
+    pub fn is_single(self) -> bool {
+        matches!(self, Kind::One | Kind::Ball(_))
     }
 
     /// The press with this number: the same for the same number.
@@ -71,7 +86,13 @@ impl Kind {
     /// # Errors
     /// Never, as long as the sizes are those of patches.
     pub fn press(self, number: u32) -> Result<Press> {
-        let mut random = seeded(1_000 + u64::from(number));
+        // No limit was chosen on those of one contact.
+        let first = if self.is_single() { 50_000 } else { 1_000 };
+        let mut random = seeded(first + u64::from(number));
+        let single_mn = match self.is_single() {
+            true => random.random_range(ONE_MN[0]..ONE_MN[1]),
+            false => TOGETHER_MN,
+        };
         let mut between = |[from, to]: [f64; 2]| random.random_range(from..to);
         let mut force_n = |size_mn: f64| {
             let [x, y] = [(); 2].map(|()| between([-ANGLE_DEG, ANGLE_DEG]).to_radians().tan());
@@ -81,7 +102,7 @@ impl Kind {
         let forces_n: Vec<[f64; 3]> = match self {
             Kind::Pair { forces_mn, .. } => forces_mn.map(&mut force_n).to_vec(),
             Kind::Three(_) => [(); 3].map(|()| force_n(TOGETHER_MN / 3.0)).to_vec(),
-            _ => vec![force_n(TOGETHER_MN)],
+            _ => vec![force_n(single_mn)],
         };
         let around = |middle_mm: [f64; 2], far_mm: f64, turn: f64| {
             [
@@ -113,6 +134,7 @@ impl Kind {
         let patch = |place_mm: [f64; 2]| match self {
             Kind::Edge => Patch::line(place_mm, EDGE_MM[0], EDGE_MM[1], turn.to_degrees()),
             Kind::Disc => Patch::disc(place_mm, DISC_MM),
+            Kind::Ball(radius_mm) => Patch::disc(place_mm, radius_mm),
             _ => Patch::tip(place_mm, NOMINAL_RADIUS_MM),
         };
         let patches = needles
@@ -136,7 +158,12 @@ impl Press {
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Kind::One => write!(f, "one needle, {TOGETHER_MN} mN"),
+            Kind::One => write!(f, "one needle, {} to {} mN", ONE_MN[0], ONE_MN[1]),
+            Kind::Ball(radius_mm) => write!(
+                f,
+                "one ball, within {radius_mm} mm, {} to {} mN",
+                ONE_MN[0], ONE_MN[1]
+            ),
             Kind::Pair {
                 apart_mm,
                 forces_mn: [a, b],

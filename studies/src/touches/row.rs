@@ -22,6 +22,8 @@ pub struct Outcome {
     are_apart: bool,
     /// Errors of both and of their sum, if two needles press and two are found.
     errors: Option<[Error; 3]>,
+    /// The standard uncertainties that noise alone leaves of both.
+    bound: Option<[[f64; 3]; 2]>,
 }
 
 /// Errors of a force and its stated standard uncertainties: direction, degrees; |F|, mN; place, mm.
@@ -48,16 +50,23 @@ pub struct PairRow {
     /// Percentages within the stated 95 %: direction, |F| and place of each, direction and |F| of
     /// the sum.
     within: Option<[f64; 5]>,
+    /// Of each contact that is told apart, root mean squares of what is stated, and of what noise
+    /// alone would leave, as in `each`.
+    stated: Option<[f64; 3]>,
+    by_noise: Option<[f64; 3]>,
 }
 
 /// The results for what is no pair.
 #[derive(Serialize)]
 pub struct OtherRow {
     name: String,
-    /// Percentages: taken for one contact; for one if a dot is left out; for two; refused.
+    frames: usize,
+    /// Percentages: taken for one contact; for one if a dot is left out; for two; told as two, as
+    /// no dot need be left out; refused.
     one: f64,
     without_a_dot: f64,
     two: f64,
+    told_two: f64,
     refused: f64,
 }
 
@@ -67,7 +76,7 @@ impl Outcome {
         press: &Press,
         strength: &Strength,
         is_one: [bool; 2],
-        both: Option<PairEstimate>,
+        (both, bound): (Option<PairEstimate>, Option<PairEstimate>),
     ) -> Outcome {
         let found = both.filter(PairEstimate::is_explained);
         Outcome {
@@ -75,6 +84,10 @@ impl Outcome {
             is_two: found.is_some(),
             are_apart: found.is_some_and(|found| found.are_apart(strength)),
             errors: found.and_then(|found| errors(press, strength, &found)),
+            bound: bound.and_then(|bound| {
+                let [first, second] = bound.contacts(strength);
+                Some([sigma(&first)?, sigma(&second)?])
+            }),
         }
     }
 }
@@ -107,7 +120,7 @@ fn errors(press: &Press, strength: &Strength, found: &PairEstimate) -> Option<[E
     let middle = |i: usize| (first_n * first.0[i] + second_n * second.0[i]) / (first_n + second_n);
     let middle_mm = [0, 1].map(middle);
     let error = |part: &Part, (place_mm, force_n): ([f64; 2], [f64; 3])| {
-        let sigma = part.sigma?;
+        let sigma = sigma(part)?;
         let vector = part.force_n.map(f64::from);
         Some(Error {
             error: [
@@ -115,17 +128,23 @@ fn errors(press: &Press, strength: &Strength, found: &PairEstimate) -> Option<[E
                 1e3 * (length(vector) - length(force_n)).abs(),
                 far(part, place_mm),
             ],
-            sigma: [
-                f64::from(sigma.direction).to_degrees(),
-                1e3 * f64::from(sigma.magnitude_n),
-                f64::from(sigma.place_mm),
-            ],
+            sigma,
         })
     };
     Some([
         error(&one, first)?,
         error(&other, second)?,
         error(&found.sum(strength), (middle_mm, sum_n))?,
+    ])
+}
+
+/// Standard uncertainties: direction, degrees; |F|, mN; place along an axis, mm.
+fn sigma(part: &Part) -> Option<[f64; 3]> {
+    let sigma = part.sigma?;
+    Some([
+        f64::from(sigma.direction).to_degrees(),
+        1e3 * f64::from(sigma.magnitude_n),
+        f64::from(sigma.place_mm),
     ])
 }
 
@@ -181,6 +200,15 @@ impl PairRow {
             let parts = parts(&of_apart, k);
             [rms(&parts), ninetieth(&parts)]
         };
+        // Of the place an uncertainty is along one axis, an error along both.
+        let whole = [1.0, 1.0, std::f64::consts::SQRT_2];
+        let spread = |of: &[[f64; 3]]| {
+            let of = |k: usize| rms(&of.iter().map(|own| whole[k] * own[k]).collect::<Vec<_>>());
+            (!of_apart.is_empty()).then(|| [0, 1, 2].map(of))
+        };
+        let stated: Vec<[f64; 3]> = of_apart.iter().map(|own| own.sigma).collect();
+        let apart = outcomes.iter().filter(|own| own.are_apart);
+        let bounds: Vec<[f64; 3]> = apart.filter_map(|own| own.bound).flatten().collect();
         let within = |of: &[&Error], k: usize| percent(of, |own| own.is_within(k));
         PairRow {
             name: kind.to_string(),
@@ -190,12 +218,31 @@ impl PairRow {
             apart: percent(outcomes, |own| own.are_apart),
             each: (!of_apart.is_empty()).then(|| [0, 1, 2].map(each)),
             sum: (!sums.is_empty()).then(|| [0, 1, 2].map(|k| rms(&parts(&sums, k)))),
+            stated: spread(&stated),
+            by_noise: spread(&bounds),
             within: (!of_apart.is_empty()).then(|| {
                 let each = [0, 1, 2].map(|k| within(&of_apart, k));
                 let sum = [0, 1].map(|k| within(&sums, k));
                 [each[0], each[1], each[2], sum[0], sum[1]]
             }),
         }
+    }
+
+    /// The head of the table of uncertainties.
+    pub const BOUNDS: &str = "| forces | apart | error of each | stated σ | σ by noise alone |\n\
+                              |--:|--:|--:|--:|--:|\n";
+
+    /// A line of that table; empty if none are told apart.
+    pub fn bounds(&self) -> String {
+        let parts = self.each.zip(self.stated).zip(self.by_noise);
+        parts.map_or(String::new(), |((each, stated), by_noise)| {
+            let [error, stated, by_noise] = [each.map(|[rms, _]| rms), stated, by_noise].map(
+                |[direction, magnitude, place]| {
+                    format!("{direction:.2}°, {magnitude:.2} mN, {place:.3} mm")
+                },
+            );
+            format!("| {} | {error} | {stated} | {by_noise} |\n", self.name)
+        })
     }
 
     /// A line of the table.
@@ -233,15 +280,18 @@ impl PairRow {
 
 impl OtherRow {
     /// The head of the table.
-    pub const HEAD: &str = "| press | one contact | a dot left out | two contacts | refused |\n|---|--:|--:|--:|--:|\n";
+    pub const HEAD: &str = "| press | frames | one contact | a dot left out | two contacts | \
+                            told as two | refused |\n|---|--:|--:|--:|--:|--:|--:|\n";
 
     /// The results of a kind.
     pub fn of(kind: Kind, outcomes: &[Outcome]) -> OtherRow {
         OtherRow {
             name: kind.to_string(),
+            frames: outcomes.len(),
             one: percent(outcomes, |own| own.is_one[0]),
             without_a_dot: percent(outcomes, |own| own.is_one[1]),
             two: percent(outcomes, |own| own.is_two),
+            told_two: percent(outcomes, |own| own.is_two && !own.is_one[1]),
             refused: percent(outcomes, Outcome::is_refused),
         }
     }
@@ -253,8 +303,13 @@ impl OtherRow {
             one,
             without_a_dot,
             two,
+            told_two,
             refused,
+            frames,
         } = self;
-        format!("| {name} | {one:.1} % | {without_a_dot:.1} % | {two:.1} % | {refused:.1} % |\n")
+        format!(
+            "| {name} | {frames} | {one:.1} % | {without_a_dot:.1} % | {two:.1} % | \
+             {told_two:.1} % | {refused:.1} % |\n"
+        )
     }
 }
