@@ -4,9 +4,10 @@
 //! over some frames, and then follows them with one step a frame.
 
 use super::again::Look;
-use super::{Measurement, Sensor};
+use super::{Measurement, Prepared, Sensor};
 pub use crate::force::forward::pair::Work;
-use crate::force::{Means, Pairs, TwoContacts};
+use crate::force::model::Model;
+use crate::force::{Means, NoiseLevel, Pairs, TwoContacts};
 use crate::markers::tables::Table;
 use hivtac_terms::force::ContactList;
 use hivtac_terms::marker::{Marker, MarkerList};
@@ -19,7 +20,12 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// lost; if [what presses](Self::set_contact_shape) is not known to be a needle; or if two
     /// contacts on this layout are not known. Known is the layout `8v`.
     pub fn two_contacts(&self, measurement: &Measurement) -> Option<TwoContacts> {
-        self.two_contacts_by(measurement, &mut { Pairs::NONE }, Work::ALL)
+        let seen = Seen {
+            model: self.model.as_ref()?,
+            prepared: self.prepared.as_ref()?,
+            noise: &self.noise,
+        };
+        seen.two_contacts(measurement, &mut { Pairs::NONE }, Work::ALL)
     }
 
     /// Call after each frame, before [`look_again`](Self::look_again). Makes the measurement that
@@ -31,24 +37,38 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             self.pairs.miss();
             return;
         }
-        let mut pairs = self.pairs;
-        if let Some(two) = self.two_contacts_by(measurement, &mut pairs, work) {
+        let Some((model, prepared)) = self.model.as_ref().zip(self.prepared.as_ref()) else {
+            return;
+        };
+        let seen = Seen {
+            model,
+            prepared,
+            noise: &self.noise,
+        };
+        if let Some(two) = seen.two_contacts(measurement, &mut self.pairs, work) {
             measurement.tell(&two);
             self.look = Look::First;
         }
-        self.pairs = pairs;
     }
+}
 
+/// What measurements are made by.
+struct Seen<'a, 'm> {
+    model: &'a Model<'m>,
+    prepared: &'a Prepared,
+    noise: &'a NoiseLevel,
+}
+
+impl Seen<'_, '_> {
     #[inline(never)]
-    fn two_contacts_by(
+    fn two_contacts(
         &self,
         measurement: &Measurement,
         pairs: &mut Pairs,
         work: Work,
     ) -> Option<TwoContacts> {
         let features = measurement.features.filter(|_| is_asked(measurement))?;
-        let model = self.model.as_ref()?;
-        let prepared = self.prepared.as_ref()?;
+        let (model, prepared) = (self.model, self.prepared);
         let resting = prepared.resting.as_ref()?;
         // Where the markers are at one common time.
         let seen = features.centroids.iter().zip(measurement.markers?);
