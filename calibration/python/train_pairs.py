@@ -147,7 +147,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pairs")
     parser.add_argument("out")
-    parser.add_argument("--widths", default="128,128")
+    parser.add_argument("--widths", default="192,192")
     parser.add_argument("--passes", type=int, default=150)
     arguments = parser.parse_args()
     pairs = np.loadtxt(arguments.pairs, delimiter=",")

@@ -135,8 +135,8 @@ fn geometry(poses: Option<&PathBuf>) -> Result<Geometry, Failure> {
 
 /// Show what two fingers feel together: grip force, common wrench, friction margin
 ///
-/// A line for each frame of the first finger, and at the end how late they came. `serve` and
-/// `record` have the same by `--grip`.
+/// A line for each frame of the first finger, and at the end how late they came. `serve`, `record`
+/// and `view` have the same by `--grip`.
 ///
 /// Example: hivtac grip thumb,index --seconds 10
 #[derive(Args)]

@@ -284,11 +284,11 @@ impl Link {
         patience: Duration,
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<bool, Failure> {
+        let end = Instant::now() + patience;
         if self.only_sends {
-            return Err(self.lost("the device sends nothing"));
+            return self.hears(end, other);
         }
         let id = self.command(Request::GetInfo)?;
-        let end = Instant::now() + patience;
         while let Some(message) = self.receive(end)? {
             match message {
                 DeviceMessage::Reply(reply) if reply.id == id => {
@@ -305,6 +305,26 @@ impl Link {
             }
         }
         Err(self.lost("the device sends nothing and does not answer"))
+    }
+
+    /// Whether a line that only sends tells of itself, rather than sends samples.
+    fn hears(
+        &mut self,
+        end: Instant,
+        mut other: impl FnMut(DeviceMessage),
+    ) -> Result<bool, Failure> {
+        while let Some(message) = self.receive(end)? {
+            let tells = match message {
+                DeviceMessage::Hello(_) | DeviceMessage::Stats(_) => Some(true),
+                DeviceMessage::Sample(_) => Some(false),
+                _ => None,
+            };
+            other(message);
+            if let Some(tells) = tells {
+                return Ok(tells);
+            }
+        }
+        Err(self.lost("the device sends nothing"))
     }
 
     /// Requests the device's next whole frame and waits for it; all other messages go to `other`.

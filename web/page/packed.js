@@ -1,6 +1,6 @@
 // Bytes that lie in a script as text: seven bits a character, which is an eighth less than base64.
 
-/** Reads bytes from text, the highest bits first. Characters that no text can hold have 128 added. */
+/** Reads bytes from text, the highest bits first. Characters that no text holds have 128 added. */
 export function bytesOf(text) {
   const bytes = new Uint8Array(Math.floor(text.length * 7 / 8));
   let bits = 0;

@@ -56,8 +56,8 @@ pub extern "C" fn taken() -> *const u8 {
     OUTPUT.with_borrow(|output| output.as_ptr())
 }
 
-/// Starts the simulated sensor with 4 or 8 dots; `epoch_ms` is the time since 1970 at the page's time 0. Returns the
-/// length of a text that says why it cannot, 0 if it can.
+/// Starts the simulated sensor with 4 or 8 dots; `epoch_ms` is the time since 1970 at the page's
+/// time 0. Returns the length of a text that says why it cannot, 0 if it can.
 #[unsafe(no_mangle)]
 pub extern "C" fn simulate(dots: u32, epoch_ms: f64) -> usize {
     std::panic::set_hook(Box::new(|panic| {

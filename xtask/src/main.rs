@@ -35,8 +35,8 @@ enum Task {
     Test(test::Test),
     /// What a frame and an inference cost on the microcontroller, measured in QEMU.
     Bench(bench::Bench),
-    /// Put small mistakes into the firmware, one at a time, and show those that no test notices: two
-    /// to three hours of a core. `cargo xtask test rig` must have built what its tests run.
+    /// Put small mistakes into the firmware, one at a time, and show those that no test notices:
+    /// two to three hours of a core. `cargo xtask test rig` must have built what its tests run.
     Mutants(mutants::Mutants),
     /// Show what the firmware takes of each memory.
     Size,

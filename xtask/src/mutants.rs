@@ -21,7 +21,7 @@ use crate::toolchain::{self, cargo, work_folder};
 const LIST: &str = "tests/mutants/firmware.json";
 /// The settings of cargo-mutants, with the mistakes that change nothing.
 const PORTABLE: &str = "tests/mutants/portable.toml";
-/// Copies the files as they are now, also changes that are not committed.
+/// Copies the files that git knows as they are now, also changes that are not committed.
 const COPY: &str = r#"now=$(git stash create) && git archive "${now:-HEAD}" | tar x -C "$0""#;
 
 /// Options of `cargo xtask mutants`.
@@ -59,19 +59,24 @@ impl Mutants {
         let files = self.files.as_deref().unwrap_or("");
         let mut mutants = list()?;
         mutants.retain(|mutant| mutant.file.contains(files));
+        ensure!(
+            !mutants.is_empty(),
+            "no mistake in {LIST} is in a file whose path contains {files:?}"
+        );
         let bench = Bench::new()?;
         let tests = mutants.iter().flat_map(|mutant| &mutant.tests);
         let passes = bench.passes(tests)?;
         ensure!(passes, "a test fails without a mistake: see above");
         let (mut noticed, mut unexplained) = (0, 0);
         for mutant in &mutants {
-            let result = match bench.survives(mutant)? {
-                false => "noticed",
-                true if mutant.survives.is_empty() => "NOT NOTICED",
-                true => &mutant.survives,
+            let result = match bench.survives(mutant) {
+                Ok(false) => "noticed",
+                Ok(true) if !mutant.survives.is_empty() => &mutant.survives,
+                Ok(true) => "NOT NOTICED",
+                Err(_) => "DOES NOT COMPILE",
             };
             noticed += u32::from(result == "noticed");
-            unexplained += u32::from(result == "NOT NOTICED");
+            unexplained += u32::from(result.starts_with("NOT ") || result.starts_with("DOES "));
             println!("{}: {:?}: {result}", mutant.file, mutant.to);
         }
         println!("{noticed} of {} mistakes noticed", mutants.len());

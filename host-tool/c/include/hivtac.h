@@ -74,8 +74,8 @@ typedef struct hivtac_sample {
 } hivtac_sample;
 
 /* Connects to a sensor, and asks it for samples: to a port (a serial port's name, or
- * tcp:HOST:PORT, or uart:PORT), to the device with a name or serial number, or, if both are NULL, to
- * the only one that is plugged in. timeout_s: longest wait for its answers, also later. NULL on
+ * tcp:HOST:PORT, or uart:PORT), to the device with a name or serial number, or, if both are NULL,
+ * to the only one that is plugged in. timeout_s: longest wait for its answers, also later. NULL on
  * failure. */
 hivtac *hivtac_open(const char *port, const char *device, double timeout_s);
 

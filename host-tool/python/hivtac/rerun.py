@@ -159,7 +159,7 @@ def main() -> None:
         description="Show a sensor or a recording in Rerun; Ctrl-C ends it.",
     )
     parser.add_argument("recording", nargs="?", help="MCAP file of `hivtac record`")
-    parser.add_argument("--port", help="serial port, or tcp:HOST:PORT")
+    parser.add_argument("--port", help="serial port, tcp:HOST:PORT or uart:PORT")
     parser.add_argument("--device", help="name or serial number of a sensor")
     rr.script_add_args(parser)
     arguments = parser.parse_args()

@@ -39,8 +39,8 @@ struct Simulated {
 
 #[pymethods]
 impl Twin {
-    /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does yet. The
-    /// seed decides its noise.
+    /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does
+    /// yet. The seed decides its noise.
     #[new]
     fn start(py: Python<'_>, camera: &str, contact: &str, seed: u64) -> PyResult<Twin> {
         let kinds = [Kind::Ov7725, Kind::Ov5640, Kind::Mt9v034];

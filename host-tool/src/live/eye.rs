@@ -97,7 +97,7 @@ impl std::fmt::Display for NotSeen {
             NotSeen::Size([width, height], [own_width, own_height]) => write!(
                 f,
                 "its frames are {width} × {height}, and this camera's are {own_width} × \
-                 {own_height}: leave width and height out, or choose the other --camera"
+                 {own_height}: leave width and height out, or choose another --camera"
             ),
             NotSeen::Key(key) => write!(
                 f,

@@ -25,8 +25,8 @@ pub struct Simulated {
     /// Forces from a CSV file of `monitor --csv` in place of the scene's, again and again
     #[arg(long, value_name = "FILE")]
     course: Option<String>,
-    /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, ov5640 with
-    /// 119, or mt9v034 with 232
+    /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, ov5640
+    /// with 119, or mt9v034 with 232
     #[arg(long, value_enum)]
     camera: Option<CameraName>,
     /// The dots on the film of a scene by name, and the model for them: 4 when not given, or 8v

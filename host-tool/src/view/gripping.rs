@@ -5,6 +5,10 @@ use hivtac_host::clock::{Arrival, LiveClock};
 use hivtac_host::grip::{Grip, Reading, lines};
 use hivtac_wire::message::DeviceMessage;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Age from which on a grip is not shown.
+const OLD: Duration = Duration::from_secs(1);
 
 /// Two fingers, each with its own thread.
 #[derive(Clone)]
@@ -13,7 +17,7 @@ pub struct Gripping(Arc<Mutex<Both>>);
 struct Both {
     paired: Paired,
     clocks: [LiveClock; 2],
-    newest: Option<Grip>,
+    newest: Option<(Grip, Instant)>,
 }
 
 impl Gripping {
@@ -36,16 +40,19 @@ impl Gripping {
                 let stamp_ns = both.clocks[finger].stamp_ns(sample.time_us, came);
                 let reading = Reading::of(sample, stamp_ns, came.ns);
                 let newest = both.paired.pair.push(finger, reading).pop();
-                both.newest = newest.or(both.newest);
+                both.newest = newest.map(|grip| (grip, Instant::now())).or(both.newest);
             }
             _ => (),
         }
     }
 
-    /// The newest grip for a person; `None` before the first.
+    /// The newest grip for a person; `None` before the first, and when a finger is silent.
     pub fn told(&self) -> Option<String> {
         let both = self.lock();
-        let grip = both.newest.as_ref()?;
+        let (grip, came) = both.newest.as_ref()?;
+        if came.elapsed() > OLD {
+            return None;
+        }
         Some(lines::sentence(grip, &both.paired.names))
     }
 

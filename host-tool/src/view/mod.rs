@@ -43,7 +43,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(50);
 /// Example: hivtac view
 #[derive(Args)]
 pub struct ViewArguments {
-    /// Serial port, pseudo-terminal, or tcp:HOST:PORT; found by its USB id when not given
+    /// Serial port, pseudo-terminal, tcp:HOST:PORT, or uart:PORT with an adapter for the sensor's
+    /// UART; found by its USB id when not given
     #[arg(long, value_name = "PORT")]
     port: Vec<String>,
     #[command(flatten)]

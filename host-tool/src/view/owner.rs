@@ -54,7 +54,7 @@ impl Watched {
     }
 
     fn tell_now_and_then(&mut self) {
-        if self.is_new && self.told.elapsed() >= TELL_EVERY {
+        if (self.is_new || self.grip.is_some()) && self.told.elapsed() >= TELL_EVERY {
             self.tell();
         }
     }

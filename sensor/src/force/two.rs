@@ -98,8 +98,11 @@ impl Pairs {
     fn follow(&mut self, problem: &Problem<'_>, work: &mut Work) -> Option<PairEstimate> {
         let is_wanted = self.search.is_some() || self.must_look();
         let known = self.known.as_ref()?;
-        self.searches = is_wanted && !self.searches;
-        let is_held = self.searches && *work != Work::ALL;
+        // They take turns in frames with work.
+        if *work != Work(0) {
+            self.searches = is_wanted && !self.searches;
+        }
+        let is_held = is_wanted && self.searches && *work != Work::ALL;
         let estimate = match is_held {
             true => follow(known, problem, &mut Work(0)),
             false => follow(known, problem, work),

@@ -250,9 +250,8 @@ struct Seen<'a> {
 
 impl Seen<'_> {
     /// Returns the load that explains the markers best, and the one that it leaves out. A marker is
-    /// left out if a contact explains only the others, and if they are `still`. The load of the
-    /// frame before is tried first, then without the marker that it left out. After a frame that no
-    /// load explained, little is tried in each; less if two contacts explained it.
+    /// left out if a contact explains only the others, and if they are `still`. After a frame that
+    /// no load explained, little is tried in each; less if two contacts explained it.
     fn explained(
         &self,
         before: &Before,
@@ -260,23 +259,50 @@ impl Seen<'_> {
         are_two: bool,
     ) -> (Estimate, Option<usize>) {
         let may_leave_out = is_still && self.placed.may_lose(1);
-        if let Some((load, attempt)) = before.attempt() {
-            let found = self.estimate(None, Start::At(load));
-            let suspect = |nth| least_explained(&found.left, self.placed.lost, nth);
-            let goes_on = match attempt {
-                _ if found.is_explained() => true,
-                _ if are_two => false,
-                Attempt::Same => false,
-                Attempt::Without(nth) => {
-                    let others = |suspect| self.estimate(Some(suspect), Start::At(found.pose));
-                    may_leave_out && others(suspect(nth)).is_explained()
-                }
-                Attempt::From(start) => self.estimate(None, start).is_explained(),
-            };
-            if !goes_on {
-                return (found, None);
-            }
+        let Some((load, attempt)) = before.attempt() else {
+            return self.usual(before, may_leave_out);
+        };
+        let tried = self.tried(load, attempt, may_leave_out, are_two);
+        if !tried.0.is_explained() {
+            return tried;
         }
+        let usual = self.usual(before, may_leave_out);
+        match usual.0.is_explained() {
+            true => usual,
+            false => tried,
+        }
+    }
+
+    /// Tries the load of the frame before, and one thing more.
+    fn tried(
+        &self,
+        load: Pose,
+        attempt: Attempt,
+        may_leave_out: bool,
+        are_two: bool,
+    ) -> (Estimate, Option<usize>) {
+        let found = self.estimate(None, Start::At(load));
+        if found.is_explained() || are_two {
+            return (found, None);
+        }
+        let other = match attempt {
+            Attempt::Without(nth) if may_leave_out => {
+                let suspect = least_explained(&found.left, self.placed.lost, nth);
+                let others = self.estimate(Some(suspect), Start::At(found.pose));
+                (others, Some(suspect))
+            }
+            Attempt::From(start) => (self.estimate(None, start), None),
+            Attempt::Same | Attempt::Without(_) => return (found, None),
+        };
+        match other.0.is_explained() {
+            true => other,
+            false => (found, None),
+        }
+    }
+
+    /// Tries the load of the frame before, then without the marker that it left out, then all
+    /// places, then without each marker that is explained least.
+    fn usual(&self, before: &Before, may_leave_out: bool) -> (Estimate, Option<usize>) {
         if let Some(load) = before.load {
             let found = self.estimate(None, Start::At(load));
             if found.is_explained() {

@@ -65,7 +65,7 @@ fn the_samples_are_those_of_usb() {
     }
 }
 
-/// Without a host, too, each message has one hello and one report of counters a second.
+/// Without a host, too, each second has one hello and one report of counters.
 #[test]
 fn it_needs_no_host() {
     let closed = Setup::new(firmware(), 1_700).at(0, Action::Close);

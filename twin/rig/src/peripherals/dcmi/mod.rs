@@ -30,8 +30,8 @@ const GROUP: u32 = 4 * receiver::FIFO_WORDS as u32;
 /// The longest wait of the DMA for a busy bus, ns. A group of bytes comes every 320 ns at 50 MHz,
 /// and the FIFO holds no more than one.
 const LONGEST_WAIT_NS: u64 = 250;
-/// The same after the last byte of a frame, when no more bytes come: a burst of the MDMA before each
-/// of four words.
+/// The same after the last byte of a frame, when no more bytes come: a burst of the MDMA before
+/// each of four words.
 const LONGEST_LAST_WAIT_NS: u64 = 700;
 /// GPIOB_IDR. A write has no effect on the chip; the rig uses it to make the port look at its pins.
 const VSYNC_PORT_INPUT: u64 = 0x5802_0410;
