@@ -3,12 +3,13 @@
 //! # Design
 //! It is always on and only sends, so it needs neither a host nor a setting. The messages and
 //! frames are USB's. A hello and the statistics go out once a second each; in between goes every
-//! sample, without markers. So a reader may join at any time, and knows device and version a second later.
+//! sample, without markers. So a reader may join at any time, and knows device and version a second
+//! later.
 //!
 //! # Note
-//! The line takes 200,000 bytes a second; samples need less than a tenth of that. A sample that finds
-//! the queue full is dropped. Samples have numbers of their own here, so the reader counts it as a
-//! gap.
+//! The line takes 200,000 bytes a second; samples need less than a tenth of that. A sample that
+//! finds the queue full is dropped. Samples have numbers of their own here, so the reader counts it
+//! as a gap.
 
 use crate::board::UartPort;
 use crate::{info, stats};

@@ -382,7 +382,7 @@ mod tests {
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::status::Status;
     use hivtac_wire::frame::MAX_DEVICE_FRAME;
-    use hivtac_wire::message::Sample;
+    use hivtac_wire::message::{Sample, Stats};
     use std::io::{Read, Write};
 
     /// A port that takes no byte at first, and then as many as it shall at a time.
@@ -464,9 +464,8 @@ mod tests {
             contacts: ContactList::default(),
             markers: MarkerList::default(),
         });
-        let mut buffer = [0; MAX_DEVICE_FRAME];
-        let frame = encode(&sample, &mut buffer).unwrap().to_vec();
-        let probed = |sent: Vec<u8>| {
+        let frame = framed(&sample);
+        let probed = |only_sends: bool, sent: Vec<u8>| {
             let mut link = Link {
                 port: Box::new(Sending(io::Cursor::new(sent))),
                 name: "sending".to_owned(),
@@ -475,13 +474,24 @@ mod tests {
                 came: 0,
                 decoded: 0,
                 last_id: 0,
-                only_sends: false,
+                only_sends,
             };
             let mut seen = Vec::new();
             let result = link.probe(Duration::from_millis(20), |message| seen.push(message));
             (result.map_err(|failure| failure.kind), seen)
         };
-        assert_eq!(probed(frame), (Ok(false), vec![sample]));
-        assert_eq!(probed(Vec::new()), (Err(Kind::Lost), Vec::new()));
+        for only_sends in [false, true] {
+            let probed = |sent| probed(only_sends, sent);
+            assert_eq!(probed(frame.clone()), (Ok(false), vec![sample.clone()]));
+            assert_eq!(probed(Vec::new()), (Err(Kind::Lost), Vec::new()));
+        }
+        // On a line on which it only sends, its statistics say that it is there.
+        let stats = DeviceMessage::Stats(Stats::default());
+        assert_eq!(probed(true, framed(&stats)), (Ok(true), vec![stats]));
+    }
+
+    fn framed(message: &DeviceMessage) -> Vec<u8> {
+        let mut buffer = [0; MAX_DEVICE_FRAME];
+        encode(message, &mut buffer).unwrap().to_vec()
     }
 }

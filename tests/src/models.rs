@@ -18,6 +18,19 @@ use hivtac_terms::units::{MicroNewtons, Micrometres, MilliDegrees, Px};
 
 use crate::pictures::Random;
 
+/// How the dots of `8v` move under two needles of 50 mN, 4 mm apart, mm: as the sensing's model has
+/// it.
+pub const UNDER_TWO_MM: [[f64; 3]; 8] = [
+    [-0.0416, -0.0186, -2.4960],
+    [0.0795, -0.0470, -2.3924],
+    [0.0847, 0.0770, -2.4918],
+    [-0.1164, 0.0968, -2.6532],
+    [-0.1098, -0.0247, -4.0313],
+    [0.0040, -0.0228, -3.6958],
+    [0.1502, -0.0105, -3.8936],
+    [0.0081, 0.0931, -3.9629],
+];
+
 /// The source of a layer's weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weights {

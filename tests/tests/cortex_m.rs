@@ -15,7 +15,7 @@ use hivtac_tests::models::{self, Weights};
 use hivtac_tests::pictures::{self, Random};
 use hivtac_tests::qemu::{self, Core};
 use hivtac_tests::script::Script;
-use hivtac_twin::{Format, Load, Options, Preset, Scene};
+use hivtac_twin::{Dots, Format, Load, Options, Preset, Scene};
 
 /// Runs a script on this computer and on each emulated core, and compares their output, byte for
 /// byte. Returns the text for further checks.
@@ -87,6 +87,36 @@ fn frames_of_the_scene_give_the_same_forces() {
         .filter(|line| line.contains("force: Some"))
         .count();
     assert_eq!(forces, 7 * frames.len(), "every frame has a force:\n{text}");
+}
+
+/// Three frames of one needle on eight dots, then three of two.
+#[test]
+fn frames_of_eight_dots_give_the_same_contacts() {
+    let scene = Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
+    let with_dots = |moved_mm| {
+        let options = Options {
+            layout: "8v".parse().unwrap(),
+            moved_mm,
+            ..scene.options().clone()
+        };
+        scene.clone().with_options(options).unwrap()
+    };
+    let load = Load::from_angles(0.1, 4.0, -3.0).unwrap();
+    let load = load.with_offset_mm([1.5, -2.25]).unwrap();
+    let one = with_dots(None);
+    let two = with_dots(Some(Dots::of(models::UNDER_TWO_MM)));
+    let one = (0..3).map(|number| one.render_load(&load, number).unwrap().pixels);
+    let two = (3..6).map(|number| two.frame(number, 1.0).pixels);
+    let frames: Vec<_> = one.chain(two).collect();
+    let frames: Vec<&[u16]> = frames.iter().map(Vec::as_slice).collect();
+    let mut script = Script::new();
+    script.model(&models::eight_dots());
+    red(&mut script, ByteOrder::Swapped);
+    script.sense(320, &frames);
+    let text = same_on_all(&script);
+    let count = |what: &str| text.lines().filter(|line| line.contains(what)).count();
+    assert_eq!(count("force: Some"), frames.len(), "{text}");
+    assert_eq!(count("contacts: []"), 3, "{text}");
 }
 
 #[test]

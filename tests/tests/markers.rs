@@ -161,6 +161,7 @@ fn reaching_in(paint: Paint, depths_mm: &[f64]) -> Vec<Options> {
 }
 
 #[test]
+#[ignore = "10 s"]
 fn a_covered_marker_is_refused_before_it_moves() {
     let depths = [0.02, 0.05, 0.08, 0.11, 0.15, 0.2, 0.3, 0.5, 1.0];
     for paint in [Paint::Film, Paint::Glare] {
@@ -220,6 +221,7 @@ fn stand_ins() -> Vec<(Options, f64)> {
 }
 
 #[test]
+#[ignore = "6 s"]
 fn a_disc_in_place_of_a_marker_is_refused() {
     for (view, farthest_mm) in [(WEIGHTED, 0.04), (BINARY, 0.11)] {
         let mut sensor = view.sensor().unwrap();

@@ -76,6 +76,7 @@ fn focus_finds_the_nominal_sensor_right() {
 /// The device begins with a threshold that finds no marker. `threshold auto` finds one with which
 /// the device has forces again.
 #[test]
+#[ignore = "6 s"]
 fn a_wrong_threshold_is_mended() {
     let rig = Rig::start(&["--scene", "static", "--seed", "1"]).unwrap();
     let run = |command, options: &[&str]| {

@@ -174,6 +174,7 @@ fn an_interrupted_hand_goes_on_with_the_time_that_is_left() {
 /// The guided command does both and writes the loads. The test does not wait for its fit, which is
 /// long for a film that is a formula.
 #[test]
+#[ignore = "13 s"]
 fn a_unit_is_led_from_presses_anywhere_to_its_loads() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();

@@ -46,6 +46,11 @@ impl Gripping {
         }
     }
 
+    /// Forgets the grip: a finger is lost.
+    pub fn lost(&self) {
+        self.lock().newest = None;
+    }
+
     /// The newest grip for a person; `None` before the first, and when a finger is silent.
     pub fn told(&self) -> Option<String> {
         let both = self.lock();

@@ -199,6 +199,9 @@ impl Follower for Owner {
 
     fn lost(&mut self, failure: Failure, rejected: Rejected) {
         self.watched.state.tally.rejected(rejected);
+        if let Some((_, grip)) = &self.watched.grip {
+            grip.lost();
+        }
         self.watched.trouble(failure.to_string());
         self.watched.recorder.end(Err(failure));
         self.watched.tell();

@@ -203,6 +203,7 @@ fn on_the_other_board_it_breaks_a_rule_of_the_chip() {
 /// In one bug DCMI takes blank rows for a frame; in the other a camera without binning sends four
 /// times the data.
 #[test]
+#[ignore = "7 s: as on the other board"]
 fn seeded_bugs_are_noticed() {
     for bug in [Bug::Polarities, Bug::CameraRegister] {
         let setup = Setup {

@@ -148,6 +148,7 @@ fn an_erase_that_fails_is_noticed() {
 
 /// USB's handler and the stamp of a frame have one priority: some stamps are late.
 #[test]
+#[ignore = "8 s"]
 fn a_stamp_that_usb_delays_is_late() {
     let busy = |elf: PathBuf| {
         let mut setup = Setup::new(elf, 500);

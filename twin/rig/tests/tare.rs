@@ -154,6 +154,7 @@ fn a_first_tare_of_a_pressed_film_is_refused() {
 /// The rest position has an error of 0.1 px. A second of the untouched film shows it, and
 /// re-zeroing moves towards it.
 #[test]
+#[ignore = "8 s"]
 fn a_rest_position_that_is_off_is_seen_and_followed() {
     let mut rest = report(&tared("rest", 200)).rest;
     for marker in &mut rest.markers {

@@ -30,18 +30,6 @@ const SIZE: [u16; 2] = [320, 240];
 /// How many frames may be without a force before one has one.
 const ATTEMPTS: u64 = 16;
 
-/// How the dots of `8v` move under two needles of 50 mN, 4 mm apart, mm: as the sensing's model has
-/// it.
-const UNDER_TWO_MM: [[f64; 3]; 8] = [
-    [-0.0416, -0.0186, -2.4960],
-    [0.0795, -0.0470, -2.3924],
-    [0.0847, 0.0770, -2.4918],
-    [-0.1164, 0.0968, -2.6532],
-    [-0.1098, -0.0247, -4.0313],
-    [0.0040, -0.0228, -3.6958],
-    [0.1502, -0.0105, -3.8936],
-    [0.0081, 0.0931, -3.9629],
-];
 /// Dots that move further by this, mm: then neither one contact nor two explain them.
 const TORN: [usize; 3] = [1, 4, 6];
 const TORN_MM: f64 = 0.2;
@@ -159,8 +147,12 @@ fn cases() -> Result<Vec<Case>> {
     }
     cases.push(pressed("one step", "4", models::anywhere(1))?);
     cases.push(pressed("eight dots", "8v", models::eight_dots())?);
-    cases.push(pressed_by_two("two contacts", "force: Some", UNDER_TWO_MM)?);
-    let mut torn_mm = UNDER_TWO_MM;
+    cases.push(pressed_by_two(
+        "two contacts",
+        "force: Some",
+        models::UNDER_TWO_MM,
+    )?);
+    let mut torn_mm = models::UNDER_TWO_MM;
     for dot in TORN {
         torn_mm[dot][0] += TORN_MM;
     }
