@@ -138,8 +138,8 @@ fn rest(link: &mut Link, others: Others<'_>, patience: Duration) -> Result<RestN
 #[pymethods]
 impl Connection {
     /// Connects to a port (`tcp:HOST:PORT`, `uart:PORT` or a serial port's name), to the sensor
-    /// with a name or serial number, or to the only sensor. `timeout`: longest wait for its answers,
-    /// s.
+    /// with a name or serial number, or to the only sensor. `timeout`: longest wait for its
+    /// answers, s.
     #[new]
     fn open(
         py: Python<'_>,
