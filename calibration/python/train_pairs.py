@@ -12,6 +12,8 @@ import time
 
 import numpy as np
 
+# Neurons of a hidden layer: the sensor's network has no others.
+WIDTH = 192
 # The dots of the layout 8v, mm.
 PLACES = np.array([
     [-7.0, -4.5], [7.0, -4.5], [7.0, 4.5], [-7.0, 4.5], [-2.5, 0.0], [0.0, -2.4], [2.5, 0.0],
@@ -147,7 +149,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("pairs")
     parser.add_argument("out")
-    parser.add_argument("--widths", default="192,192")
     parser.add_argument("--passes", type=int, default=150)
     arguments = parser.parse_args()
     pairs = np.loadtxt(arguments.pairs, delimiter=",")
@@ -158,7 +159,7 @@ def main():
     factors = [factor_of(one) for one in (inputs, unseen)]
     times = np.sqrt(np.mean((motions / factors[0][:, None]) ** 2))
     columns = [(times * one)[:, None].astype(np.float32) for one in factors]
-    widths = [10, *[int(width) for width in arguments.widths.split(",")], 16]
+    widths = [10, WIDTH, WIDTH, 16]
     network = Network(widths, np.random.default_rng(0))
     # The loss is in px, so that gradients are neither tiny nor huge.
     in_px = [np.float32(FOCAL_PX) * one.astype(np.float32) for one in (motions, wanted)]

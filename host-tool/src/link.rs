@@ -416,16 +416,7 @@ mod tests {
     #[test]
     fn a_port_that_takes_nothing_for_a_moment_is_not_lost() {
         let (taken, bytes) = std::sync::mpsc::channel();
-        let mut link = Link {
-            port: Box::new(Slow { refusals: 3, taken }),
-            name: "slow".to_owned(),
-            decoder: Decoder::new(),
-            inbox: Vec::new(),
-            came: 0,
-            decoded: 0,
-            last_id: 0,
-            only_sends: false,
-        };
+        let mut link = link_at(Slow { refusals: 3, taken }, false);
         link.write(&[1, 2, 3]).unwrap();
         drop(link);
         assert_eq!(bytes.iter().collect::<Vec<_>>(), [1, 2, 3]);
@@ -466,16 +457,7 @@ mod tests {
         });
         let frame = framed(&sample);
         let probed = |only_sends: bool, sent: Vec<u8>| {
-            let mut link = Link {
-                port: Box::new(Sending(io::Cursor::new(sent))),
-                name: "sending".to_owned(),
-                decoder: Decoder::new(),
-                inbox: Vec::new(),
-                came: 0,
-                decoded: 0,
-                last_id: 0,
-                only_sends,
-            };
+            let mut link = link_at(Sending(io::Cursor::new(sent)), only_sends);
             let mut seen = Vec::new();
             let result = link.probe(Duration::from_millis(20), |message| seen.push(message));
             (result.map_err(|failure| failure.kind), seen)
@@ -488,6 +470,19 @@ mod tests {
         // On a line on which it only sends, its statistics say that it is there.
         let stats = DeviceMessage::Stats(Stats::default());
         assert_eq!(probed(true, framed(&stats)), (Ok(true), vec![stats]));
+    }
+
+    fn link_at(port: impl Port + 'static, only_sends: bool) -> Link {
+        Link {
+            port: Box::new(port),
+            name: "a port".to_owned(),
+            decoder: Decoder::new(),
+            inbox: Vec::new(),
+            came: 0,
+            decoded: 0,
+            last_id: 0,
+            only_sends,
+        }
     }
 
     fn framed(message: &DeviceMessage) -> Vec<u8> {

@@ -1,6 +1,6 @@
 //! The camera: its settings, the light that it needs, and its times.
 
-use hivtac_portable::device::camera::{Rolling, mt9v034, ov5640, ov7725};
+use hivtac_portable::device::camera::{Facts, Rolling, mt9v034, ov5640, ov7725};
 use hivtac_portable::device::model::Fitting;
 use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, CameraSettings, LEAST_GAIN, MOST_GAIN, Rate};
@@ -25,13 +25,17 @@ pub enum Kind {
 }
 
 impl Kind {
+    fn facts(self) -> &'static Facts {
+        match self {
+            Kind::Ov7725 => &ov7725::FACTS,
+            Kind::Ov5640 => &ov5640::FACTS,
+            Kind::Mt9v034 => &mt9v034::FACTS,
+        }
+    }
+
     /// Its name in the device's hello.
     pub fn name(self) -> &'static str {
-        match self {
-            Kind::Ov7725 => ov7725::NAME,
-            Kind::Ov5640 => ov5640::NAME,
-            Kind::Mt9v034 => mt9v034::NAME,
-        }
+        self.facts().name
     }
 
     /// Its lens and pixels.
@@ -79,11 +83,7 @@ impl Kind {
 
     /// When its rows are exposed.
     pub fn motion(self) -> Motion {
-        match self {
-            Kind::Ov7725 => ov7725::MOTION,
-            Kind::Ov5640 => ov5640::MOTION,
-            Kind::Mt9v034 => mt9v034::MOTION,
-        }
+        self.facts().motion
     }
 
     /// The model of the nominal unit with these dots; with others than four and `8v` the one that
@@ -117,20 +117,12 @@ impl Kind {
     }
 
     fn limits(self) -> CameraLimits {
-        match self {
-            Kind::Ov7725 => ov7725::LIMITS,
-            Kind::Ov5640 => ov5640::LIMITS,
-            Kind::Mt9v034 => mt9v034::LIMITS,
-        }
+        self.facts().limits
     }
 
     /// Time from frame to frame, µs.
     pub fn frame_us(self, rate: Rate) -> u32 {
-        match self {
-            Kind::Ov7725 => ov7725::frame_us(rate),
-            Kind::Ov5640 => ov5640::frame_us(rate),
-            Kind::Mt9v034 => mt9v034::frame_us(rate),
-        }
+        (self.facts().frame_us)(rate)
     }
 
     /// Exposure at which the simulated light exposes the film well with a gain of one, µs: as in

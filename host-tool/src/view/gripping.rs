@@ -5,7 +5,7 @@ use hivtac_host::clock::{Arrival, LiveClock};
 use hivtac_host::grip::{Grip, Reading, lines};
 use hivtac_wire::message::DeviceMessage;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Age from which on a grip is not shown.
 const OLD: Duration = Duration::from_secs(1);
@@ -17,7 +17,7 @@ pub struct Gripping(Arc<Mutex<Both>>);
 struct Both {
     paired: Paired,
     clocks: [LiveClock; 2],
-    newest: Option<(Grip, Instant)>,
+    newest: Option<(Grip, Arrival)>,
 }
 
 impl Gripping {
@@ -40,7 +40,7 @@ impl Gripping {
                 let stamp_ns = both.clocks[finger].stamp_ns(sample.time_us, came);
                 let reading = Reading::of(sample, stamp_ns, came.ns);
                 let newest = both.paired.pair.push(finger, reading).pop();
-                both.newest = newest.map(|grip| (grip, Instant::now())).or(both.newest);
+                both.newest = newest.map(|grip| (grip, came)).or(both.newest);
             }
             _ => (),
         }
@@ -55,7 +55,7 @@ impl Gripping {
     pub fn told(&self) -> Option<String> {
         let both = self.lock();
         let (grip, came) = both.newest.as_ref()?;
-        if came.elapsed() > OLD {
+        if came.at.elapsed() > OLD {
             return None;
         }
         Some(lines::sentence(grip, &both.paired.names))
