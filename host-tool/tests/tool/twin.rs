@@ -250,25 +250,25 @@ fn truth_of(log: &str, sample: &Value) -> Value {
     own.unwrap_or_else(|| panic!("no truth of {sample}"))
 }
 
+/// A tip wanders, as the error of one place alone may be larger than its σ.
 #[test]
-fn forces_of_a_press_are_within_three_sigma_of_the_truth() {
+fn forces_of_presses_are_within_three_sigma_of_the_truth() {
     for camera in ["ov7725", "ov5640", "mt9v034"] {
-        let size = format!("[camera]\npreset = \"{camera}\"\n");
         let folder = tempfile::tempdir().unwrap();
-        let [scene, log] = ["press.toml", "truth.jsonl"].map(|name| text(&folder, name));
-        std::fs::write(&scene, format!("{size}{PRESSED}")).unwrap();
+        let [scene, log] = ["demo.toml", "truth.jsonl"].map(|name| text(&folder, name));
+        let wanders = format!("[camera]\npreset = \"{camera}\"\n[load]\nmotion = \"demo\"\n");
+        std::fs::write(&scene, wanders).unwrap();
         let own = ["--camera", camera, "--scene", &scene, "--truth", &log];
         let twin = Twin::in_folder(folder, &own);
         twin.done(&["settings", "set", "contact", "needle"]);
-        let samples = twin.samples(&["--frames", "150"]);
+        let samples = twin.samples(&["--frames", "300"]);
         let pressed = samples
             .iter()
-            .skip(30)
-            .filter(|sample| sample["force"].is_object());
+            .filter(|sample| sample["force"]["place_x_mm"].is_number());
         let ratios: Vec<f64> = pressed
             .flat_map(|sample| ratios(sample, &truth_of(&log, sample)))
             .collect();
-        assert!(ratios.len() > 5 * 100, "{camera}: {}", ratios.len());
+        assert!(ratios.len() > 5 * 270, "{camera}: {}", ratios.len());
         let within = ratios.iter().filter(|ratio| **ratio < 3.0).count();
         // 99.7 % of a normal distribution.
         assert!(

@@ -10,14 +10,15 @@ use crate::force::forward::{Column, residual, square};
 use crate::force::kernels::sqrt;
 use hivtac_terms::units::Px;
 
-/// Time constant of the mean variance, in frames: 0.1 s at 156 frames a second.
+/// Time constants of the mean variances, in frames: 0.1 s and 1.6 s at 156 frames a second.
 const FRAMES: f32 = 16.0;
+const LASTING_FRAMES: f32 = 256.0;
 /// Limit of a single frame's variance, relative to the mean: an object that falls onto the film
 /// moves a marker once.
 const MOST_AT_ONCE: f32 = 8.0;
-/// The mean's scatter over this many frames nearly always stays below this: 3 of its standard
-/// deviations.
+/// The means' scatter nearly always stays below these: 3 of their standard deviations.
 const SCATTER: f32 = 0.6;
+const LASTING_SCATTER: f32 = 0.15;
 /// Largest variance that is accepted, relative to the modelled one. Beyond it the residual no
 /// longer separates good frames from bad. A camera with 4 times the noise reaches 7.
 const LARGEST: f32 = 10.0;
@@ -48,6 +49,9 @@ pub struct NoiseLevel {
     now: Option<Column>,
     /// Mean variance of the residual, relative to the modelled one.
     variance: f32,
+    /// The same over more frames, within the scatter of `variance`: it shows noise that is a little
+    /// larger than modelled.
+    lasting: f32,
 }
 
 impl NoiseLevel {
@@ -56,6 +60,7 @@ impl NoiseLevel {
         before: None,
         now: None,
         variance: 1.0,
+        lasting: 1.0,
     };
 
     /// Call before a frame that does not immediately follow the previous one.
@@ -70,7 +75,8 @@ impl NoiseLevel {
 
     /// Returns the noise to expect of a frame, at least the model's, with this additional blur.
     pub fn of_frame(&self, blur: Px) -> FrameNoise {
-        let variance = (self.variance - SCATTER).clamp(1.0, LARGEST);
+        let variance = (self.variance - SCATTER).max(self.lasting - LASTING_SCATTER);
+        let variance = variance.clamp(1.0, LARGEST);
         FrameNoise {
             times: sqrt(variance),
             blur,
@@ -91,6 +97,10 @@ impl NoiseLevel {
         let seen = variance.min(MOST_AT_ONCE * self.variance);
         let mean = self.variance + (seen - self.variance) / FRAMES;
         self.variance = mean.clamp(1.0 / LARGEST, 2.0 * LARGEST);
+        let lasting = self.lasting + (seen - self.lasting) / LASTING_FRAMES;
+        self.lasting = lasting
+            .max(self.variance - SCATTER)
+            .min(self.variance + SCATTER);
     }
 }
 
@@ -160,6 +170,17 @@ mod tests {
                 pushed(&mut level, &left(&mut state, 1.0, 3.0));
             }
             assert!(level.of_frame(Px(0)).times < 1.3);
+        }
+    }
+
+    /// Noise of 1.4 times the modelled one, as a camera with smaller pixels has, is known to 10 %
+    /// after some seconds.
+    #[test]
+    fn noise_a_little_larger_is_known_after_a_while() {
+        let (mut level, mut state) = (NoiseLevel::AS_MODELLED, 4);
+        for k in 0..FOLLOWING {
+            let told = pushed(&mut level, &left(&mut state, 1.4, 3.0));
+            assert!(k < 512 || told > 1.25, "{k}: {told}");
         }
     }
 
