@@ -3,7 +3,7 @@
 //! Connection: addresses ([`port`]), conversation ([`link`]), replies in words ([`reply`]), samples
 //! read in a thread of their own ([`reader`]), sensors by name ([`named`]), interruption
 //! ([`stop`]), errors ([`failure`]). Pictures: of the device ([`frame`], [`look`]), sensed
-//! ([`one_picture`]), their faults ([`focus`]), in files ([`picture`], [`raw`], [`files`]).
+//! ([`one_picture`]), their faults ([`focus`]), in files ([`picture`], [`raw`], [`files`]). Models, as they are sent ([`model_file`]).
 //! Values: direction of gravity ([`down`]), shape of what presses ([`contact_shape`]), thresholds
 //! ([`threshold`]), forces ([`force_fields`], [`decimal`]), markers ([`marker_fields`]), texts
 //! ([`shown`]), the usual tare ([`usual_tare`]), counts ([`tally`]), true forces ([`truth`]), times
@@ -31,6 +31,8 @@ pub mod link;
 pub mod live;
 pub mod look;
 pub mod marker_fields;
+#[cfg(not(target_family = "wasm"))]
+pub mod model_file;
 #[cfg(not(target_family = "wasm"))]
 pub mod named;
 pub mod one_picture;
