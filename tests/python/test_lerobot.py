@@ -60,19 +60,23 @@ class PretendedArmConfig(RobotConfig):
     pass
 
 
+# LeRobot replays no action of one number alone.
+JOINTS = ["joint.pos", "gripper.pos"]
+
+
 class PretendedArm(Connected, Robot):
-    """An arm of one joint, which is where it was told to be."""
+    """An arm, which is where it was told to be."""
 
     config_class = PretendedArmConfig
     name = "pretended_arm"
-    observation_features = action_features = {"joint.pos": float}
-    at = 0.0
+    observation_features = action_features = dict.fromkeys(JOINTS, float)
+    at = dict.fromkeys(JOINTS, 0.0)
 
     def get_observation(self):
-        return {"joint.pos": self.at}
+        return self.at
 
     def send_action(self, action):
-        self.at = action["joint.pos"]
+        self.at = {name: float(action[name]) for name in JOINTS}
         return action
 
 
@@ -87,13 +91,13 @@ class PretendedLeader(Connected, Teleoperator):
 
     config_class = PretendedLeaderConfig
     name = "pretended_leader"
-    action_features = {"joint.pos": float}
+    action_features = dict.fromkeys(JOINTS, float)
     feedback_features = {}
     at = 0.0
 
     def get_action(self):
         self.at += 1.0
-        return {"joint.pos": self.at}
+        return {"joint.pos": self.at, "gripper.pos": -self.at}
 
     def send_feedback(self, feedback):
         pass
@@ -171,7 +175,7 @@ class Recorded(unittest.TestCase):
         sent, send = [], PretendedArm.send_action
 
         def spy(arm, action):
-            sent.append(float(action["joint.pos"]))
+            sent.append([float(action[name]) for name in JOINTS])
             return send(arm, action)
 
         with mock.patch.object(PretendedArm, "send_action", spy):
@@ -191,16 +195,16 @@ class Recorded(unittest.TestCase):
             self.check_forces(loaded, true[max(true)])
             self.check_statistics(loaded.meta.stats["observation.state"])
             sent = self.replay(thumb.port, index.port, folder)
-            self.assertEqual(sent, [float(row + 1) for row in range(len(loaded))])
+            self.assertEqual(sent, [[row + 1, -row - 1] for row in range(len(loaded))])
 
     def check_names(self, features):
         from lerobot_robot_hivtac import FIELDS
 
         felt = [f"{finger}.{field}" for finger in ("thumb", "index") for field in FIELDS]
-        self.assertEqual(features["observation.state"]["names"], ["joint.pos", *felt])
+        self.assertEqual(features["observation.state"]["names"], [*JOINTS, *felt])
         self.assertEqual(tuple(features["observation.images.thumb"]["shape"]), (240, 320, 3))
         self.assertNotIn("observation.images.index", features)
-        self.assertEqual(features["action"]["names"], ["joint.pos"])
+        self.assertEqual(features["action"]["names"], JOINTS)
         self.names = features["observation.state"]["names"]
 
     def check_numbers(self, loaded, observed):
@@ -213,7 +217,7 @@ class Recorded(unittest.TestCase):
             # A video is near its pictures.
             picture = loaded[row]["observation.images.thumb"].numpy().transpose(1, 2, 0) * 255
             self.assertLess(np.abs(picture - seen["thumb"]).mean(), 5)
-        self.assertEqual(loaded[3]["action"].ravel().tolist(), [4.0])
+        self.assertEqual(loaded[3]["action"].tolist(), [4.0, -4.0])
         pictures = {seen["thumb"].tobytes() for seen in observed}
         self.assertGreater(len(pictures), 1)
 
@@ -271,7 +275,9 @@ class Live(unittest.TestCase):
         each = [[seen[f"tip.contact{n}_{it}"] for it in numbers] for n in (1, 2)]
         true = [[0, 0, -0.05, -2.5e-3, 1e-3], [0, 0, -0.06, 1.5e-3, -0.5e-3]]
         for found, wanted in zip(sorted(each, key=lambda it: it[3]), true, strict=True):
-            np.testing.assert_allclose(found[:3], wanted[:3], atol=1e-2)
+            # The directions of two are known to some degrees (docs/results/touches.md).
+            np.testing.assert_allclose(found[:2], wanted[:2], atol=2e-2)
+            np.testing.assert_allclose(found[2], wanted[2], atol=6e-3)
             np.testing.assert_allclose(found[3:], wanted[3:], atol=3e-4)
         total = sum(np.array(it[:3]) for it in each)
         np.testing.assert_allclose(
