@@ -42,9 +42,9 @@ try:
     )
 except ImportError as failure:
     raise ImportError(
-        f"the compiled part of hivtac does not load here ({failure}): it was installed for another "
-        "computer, such as one with glibc in place of musl (Alpine), or for another Python. Install "
-        "it anew on this one: pip install --force-reinstall --no-cache-dir hivtac"
+        f"the compiled part of hivtac does not load here ({failure}): it was installed for "
+        "another computer, such as one with glibc in place of musl (Alpine), or for another "
+        "Python. Install it anew on this one: pip install --force-reinstall --no-cache-dir hivtac"
     ) from failure
 
 __all__ = [

@@ -44,8 +44,8 @@ struct Simulated {
 #[pymethods]
 impl Twin {
     /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does
-    /// yet. The seed decides its noise, the number which unit it is of those that are drawn, and the
-    /// model file what it goes by.
+    /// yet. The seed decides its noise, the number which unit it is of those that are drawn; it
+    /// goes by the model in the file.
     #[new]
     fn start(
         py: Python<'_>,
