@@ -46,6 +46,9 @@ impl Release {
     /// Writes the files to `target/xtask/release/VERSION/`, then installs those that this computer
     /// runs.
     pub fn run(&self) -> Result<()> {
+        if self.tag {
+            may_be_tagged()?;
+        }
         let folder = toolchain::work_folder("release")?.join(VERSION);
         if folder.exists() {
             std::fs::remove_dir_all(&folder)?;
@@ -54,9 +57,6 @@ impl Release {
         let changes = process::read(&toolchain::at("CHANGELOG.md"))?;
         let notes_file = folder.join("notes.md");
         std::fs::write(&notes_file, notes(&changes, VERSION)?)?;
-        if self.tag {
-            may_be_tagged()?;
-        }
         let python = BUILDERS.ready()?.0;
         let mut names: Vec<&str> = self.target.iter().map(String::as_str).collect();
         if names.is_empty() {
