@@ -5,6 +5,7 @@ use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
 use hivtac_host::marker_fields::MarkerJson;
 use hivtac_host::shown::to_json;
 use hivtac_sensor::markers::blob::Blob;
+use hivtac_sensor::markers::rules::pattern::{LARGEST_STRAIN, LARGEST_TURN, SCALE};
 use hivtac_sensor::markers::rules::{Finder, Unlike};
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::Measurement;
@@ -39,6 +40,9 @@ pub struct Finding<'a> {
     /// Median of the picture's value or luma if nothing passes the threshold.
     #[serde(skip)]
     brightness: Option<u8>,
+    /// By which rule there is no force, where blobs are there.
+    #[serde(skip)]
+    rule: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -88,14 +92,40 @@ fn unlike(why: Unlike) -> String {
     }
 }
 
+/// By which rule of the markers there is no force.
+fn rule(status: Status, is_square: bool) -> Option<String> {
+    let turn_deg = LARGEST_TURN.atan().to_degrees();
+    let ((least, most), strain) = (SCALE, 100.0 * LARGEST_STRAIN);
+    Some(match status {
+        _ if status.contains(Status::MARKERS_MISSING) => {
+            "fewer blobs can be markers than the film has dots".to_owned()
+        }
+        _ if status.contains(Status::MARKERS_AMBIGUOUS) && is_square => format!(
+            "no four blobs, or more than one four, lie as dots do: a square around the picture's \
+             middle,\n            turned by at most {turn_deg:.0}°, strained by {strain:.1} %, \
+             {least} to {most} times as large as --preset has it at rest"
+        ),
+        _ if status.contains(Status::MARKERS_AMBIGUOUS) => {
+            "the blobs do not lie as the dots of the model's film do".to_owned()
+        }
+        _ if status.contains(Status::MARKERS_IMPLAUSIBLE) => {
+            "they lie as dots do, but their sizes or shapes do not fit each other: one may be cut, \
+             stained, in glare, or no dot"
+                .to_owned()
+        }
+        _ => return None,
+    })
+}
+
 impl<'a> Finding<'a> {
-    /// Of the picture `image`.
+    /// Of the picture `image`, by a model of a film with so many dots.
     pub fn new(
         image: &'a str,
         settings: &Settings,
         blobs: &[Blob],
         measurement: Measurement,
         brightness: u8,
+        dots: usize,
     ) -> Finding<'a> {
         let markers = measurement.markers.as_deref().map(|markers| {
             let mut all = MarkerJson::all(markers);
@@ -131,6 +161,7 @@ impl<'a> Finding<'a> {
             focal_px: settings.geometry.focal.to_f64(),
             overflow: measurement.status.contains(Status::BLOB_OVERFLOW),
             brightness: (measurement.status.contains(Status::IMAGE_DARK)).then_some(brightness),
+            rule: rule(measurement.status, dots == CORNERS.len()),
         }
     }
 
@@ -169,6 +200,7 @@ impl<'a> Finding<'a> {
             status_text(&self.status, self.force.is_some())
         ));
         lines.extend(self.brightness_line());
+        lines.extend(self.rule.iter().map(|rule| format!("            {rule}")));
         lines.join("\n")
     }
 

@@ -3,13 +3,13 @@
 //! Connection: addresses ([`port`]), conversation ([`link`]), replies in words ([`reply`]), samples
 //! read in a thread of their own ([`reader`]), sensors by name ([`named`]), interruption
 //! ([`stop`]), errors ([`failure`]). Pictures: of the device ([`frame`], [`look`]), sensed
-//! ([`one_picture`]), their faults ([`focus`]), in files ([`picture`], [`raw`], [`files`]).
-//! Values: direction of gravity ([`down`]), shape of what presses ([`contact_shape`]), thresholds
-//! ([`threshold`]), forces ([`force_fields`], [`decimal`]), markers ([`marker_fields`]), texts
-//! ([`shown`]), the usual tare ([`usual_tare`]), counts ([`tally`]), true forces ([`truth`]), times
-//! ([`clock`]), what two fingers feel together ([`grip`]). Also the live page ([`page`]), and
-//! recordings: written ([`bag`], [`ros`]) and read ([`recording`]). With the feature `twin`, the
-//! simulated sensor in real time (`live`).
+//! ([`one_picture`]), their faults ([`focus`]), in files ([`picture`], [`raw`], [`files`]). Values:
+//! models as they are sent ([`model_file`]), direction of gravity ([`down`]), shape of what presses
+//! ([`contact_shape`]), thresholds ([`threshold`]), forces ([`force_fields`], [`decimal`]), markers
+//! ([`marker_fields`]), texts ([`shown`]), the usual tare ([`usual_tare`]), counts ([`tally`]),
+//! true forces ([`truth`]), times ([`clock`]), what two fingers feel together ([`grip`]). Also the
+//! live page ([`page`]), and recordings: written ([`bag`], [`ros`]) and read ([`recording`]). With
+//! the feature `twin`, the simulated sensor in real time (`live`).
 //!
 //! In a browser (`web/`) there are neither ports nor files: what needs them is left out there.
 
@@ -31,6 +31,8 @@ pub mod link;
 pub mod live;
 pub mod look;
 pub mod marker_fields;
+#[cfg(not(target_family = "wasm"))]
+pub mod model_file;
 #[cfg(not(target_family = "wasm"))]
 pub mod named;
 pub mod one_picture;

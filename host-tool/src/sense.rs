@@ -188,7 +188,8 @@ impl<'a> Bench<'a> {
             measurement.tell(&two);
         }
         let settings = sensor.settings();
-        let finding = Finding::new(path, settings, &blobs, measurement, brightness);
+        let dots = self.model.rest.areas.len();
+        let finding = Finding::new(path, settings, &blobs, measurement, brightness, dots);
         Ok(if self.arguments.json {
             finding.json()
         } else {

@@ -4,17 +4,15 @@ use crate::device::Device;
 use crate::firmware::{self, FirmwareArguments};
 use crate::info;
 use crate::output;
-use crate::request::{send, show_log};
+use crate::request::show_log;
 use clap::{Args, Subcommand};
 use hivtac_host::failure::{Failure, Kind};
-use hivtac_host::files::read_at_most;
 use hivtac_host::link::Link;
+use hivtac_host::model_file;
 use hivtac_host::reply::KEEP_PATIENCE;
 use hivtac_host::shown::shown;
 use hivtac_sensor::force::model::Model;
-use hivtac_wire::message::{
-    DeviceHello, MODEL_BYTES, MODEL_PART_BYTES, ModelIdentity, ModelPart, ModelSource, Request,
-};
+use hivtac_wire::message::{DeviceHello, ModelIdentity, ModelSource, Request};
 use serde::Serialize;
 use std::time::{Duration, Instant};
 
@@ -65,20 +63,17 @@ pub fn run(command: &UpdateCommand) -> Result<(), Failure> {
 pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
     let device = &arguments.device;
     let address = device.address()?;
-    let file = read(path)?;
+    let file = model_file::read(path)?;
     let model = Model::parse(&file).map_err(|error| Failure::of_file(path, error))?;
     let begun = Instant::now();
     let (mut link, hello) = Link::connect(&address, device.timeout)?;
-    let bytes = file.len() as u32;
-    send(&mut link, Request::BeginModel { bytes }, device.timeout)?;
-    for part in parts(&file) {
-        send(&mut link, Request::ModelPart(part), device.timeout)?;
+    for request in model_file::requests(&file) {
+        let patience = match request {
+            Request::UseModel => device.timeout.max(KEEP_PATIENCE),
+            _ => device.timeout,
+        };
+        link.request(request, patience, show_log)?;
     }
-    link.request(
-        Request::UseModel,
-        device.timeout.max(KEEP_PATIENCE),
-        show_log,
-    )?;
     let (hello, _) = info::ask(&mut link, device.timeout, hello)?;
     let used = in_use(&link, hello, |used| {
         used.source == ModelSource::Kept && used.crc == model.crc()
@@ -103,28 +98,6 @@ pub fn built_in_model(arguments: &ModelArguments) -> Result<(), Failure> {
     let (hello, _) = info::ask(&mut link, device.timeout, hello)?;
     let used = in_use(&link, hello, |used| used.source == ModelSource::BuiltIn)?;
     say(arguments, &used, begun.elapsed())
-}
-
-fn read(path: &str) -> Result<Vec<u8>, Failure> {
-    let file =
-        read_at_most(path, MODEL_BYTES as u64).map_err(|error| Failure::of_file(path, error))?;
-    file.ok_or_else(|| {
-        Failure::of_file(
-            path,
-            format!("a model for a device has at most {MODEL_BYTES} bytes"),
-        )
-    })
-}
-
-fn parts(file: &[u8]) -> impl Iterator<Item = ModelPart> + '_ {
-    let chunks = (0..)
-        .step_by(MODEL_PART_BYTES)
-        .zip(file.chunks(MODEL_PART_BYTES));
-    chunks.map(|(offset, chunk)| ModelPart {
-        offset,
-        // A chunk is at most as long as a part.
-        bytes: chunk.iter().copied().collect(),
-    })
 }
 
 /// The model that the device now reports; an error if it is not the wanted one.

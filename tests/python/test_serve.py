@@ -349,7 +349,7 @@ class OfARecording(unittest.TestCase):
             fingers = ["--grip", f"{one.port[1]},{other.port[1]}"]
             with Serve(*ROS2, *FOXGLOVE, *fingers) as serve:
                 with connect(serve.told["foxglove"], subprotocols=["foxglove.sdk.v1"]) as it:
-                    channels = advertised(it, 19)
+                    channels = advertised(it, 21)
                     data = messages(it, channels["/hivtac/grip/force"])
                     known = next(it.data for it in data if not math.isnan(it.data))
                 self.assertLess(abs(known), 0.3)
@@ -469,13 +469,13 @@ def wrenches_of(serve):
     with connect(serve.told["foxglove"], subprotocols=["foxglove.sdk.v1"]) as socket:
         channels = advertised(socket)
         unit = b"hivtac-rig-1".hex()
-        names = ["contact", "markers", "place", "slip", "status", "wrench"]
+        names = ["contact", "contacts", "markers", "place", "slip", "status", "wrench"]
         expected = {"/diagnostics", *(f"/hivtac/unit_{unit}/{name}" for name in names)}
         assert set(channels) == expected, channels
         yield from messages(socket, channels[f"/hivtac/unit_{unit}/wrench"])
 
 
-def advertised(socket, count=7):
+def advertised(socket, count=8):
     """As many channels that a server of Foxglove's protocol tells of, by their topics."""
     channels = {}
     while len(channels) < count:

@@ -7,11 +7,14 @@
 
 import sys
 import unittest
+from pathlib import Path
 
 import hivtac
 import mujoco
 import numpy as np
 from hivtac.twin import Twin, contact_on
+
+MODELS = Path(__file__).parents[2] / "calibration/models"
 
 # A ball of 8 g falls onto a film that looks up, beside its middle: z of the film is the world's, y
 # the world's backwards.
@@ -65,8 +68,27 @@ class Alone(unittest.TestCase):
         self.assertEqual(runs[0], runs[1])
         self.assertNotEqual(runs[0], runs[2])
 
+    def test_a_unit_is_another_one_and_goes_by_the_model_it_is_given(self):
+        forces = []
+        for options in ({}, {"unit": 7}, {"unit": 7, "model": MODELS / "yuv422/default.hvtm"}):
+            twin = Twin(**options)
+            twin.press([0, 0, -0.1], [0.001, 0])
+            last = twin.advance(0.1)[-1]
+            self.assertTrue(last.contact)
+            forces.append(last.force)
+        self.assertGreater(np.abs(forces[0] - forces[1]).max(), 1e-3)
+        self.assertFalse((forces[1] == forces[2]).all())
+
     def test_what_cannot_be_is_refused_and_the_press_before_stays(self):
-        with self.assertRaisesRegex(hivtac.Error, "ov7725 or mt9v034"):
+        for words, options in [
+            ("from 1 to 1000000", {"unit": 0}),
+            ("no-such.hvtm", {"model": "no-such.hvtm"}),
+            ("test_twin.py", {"model": __file__}),
+            ("another camera than ov7725", {"model": MODELS / "mt9v034/default.hvtm"}),
+        ]:
+            with self.assertRaisesRegex(hivtac.Error, words):
+                Twin(**options)
+        with self.assertRaisesRegex(hivtac.Error, "ov7725, ov5640 or mt9v034"):
             Twin("webcam")
         with self.assertRaisesRegex(hivtac.Error, "0.25 to 4 mm"):
             Twin(contact="flat:9")

@@ -22,16 +22,28 @@ hold_s = 600.0
 """
 
 
-class Twin:
-    """A twin (`HIVTAC_TOOL`) at a TCP port of its own, with a scene by its name or its text."""
+# Two needles that stay, as a course: the sum, and each with its force and place.
+PAIR = """time_s,x_n,y_n,z_n,\
+contact1_x_n,contact1_y_n,contact1_z_n,contact1_place_x_mm,contact1_place_y_mm,\
+contact2_x_n,contact2_y_n,contact2_z_n,contact2_place_x_mm,contact2_place_y_mm
+0,0,0,-0.11,0,0,-0.05,-2.5,1.0,0,0,-0.06,1.5,-0.5
+"""
 
-    def __init__(self, scene="rest", camera="ov7725"):
+
+class Twin:
+    """A twin (`HIVTAC_TOOL`) at a TCP port of its own, with a scene by its name or its text, and
+    other options of the tool. The text of a course goes into a file, too."""
+
+    def __init__(self, scene="rest", camera="ov7725", course=None, options=()):
         self._folder = tempfile.TemporaryDirectory()
         folder = Path(self._folder.name)
         self._truth_file = folder / "truth"
         if "\n" in scene:
             (folder / "scene.toml").write_text(scene)
             scene = folder / "scene.toml"
+        if course:
+            (folder / "course.csv").write_text(course)
+            options = [*options, "--course", folder / "course.csv"]
         self.process = subprocess.Popen(
             [
                 os.environ["HIVTAC_TOOL"],
@@ -43,6 +55,7 @@ class Twin:
                 camera,
                 "--truth",
                 self._truth_file,
+                *options,
             ],
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

@@ -18,6 +18,9 @@ pub struct Release {
     /// 2.17 and with musl.
     #[arg(long, value_name = "TARGET")]
     target: Vec<String>,
+    /// Tag this commit at the end, as `v0.2.0`, with the notes. Pushed, the tag publishes.
+    #[arg(long)]
+    tag: bool,
 }
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -43,13 +46,17 @@ impl Release {
     /// Writes the files to `target/xtask/release/VERSION/`, then installs those that this computer
     /// runs.
     pub fn run(&self) -> Result<()> {
+        if self.tag {
+            may_be_tagged()?;
+        }
         let folder = toolchain::work_folder("release")?.join(VERSION);
         if folder.exists() {
             std::fs::remove_dir_all(&folder)?;
         }
         std::fs::create_dir_all(&folder)?;
         let changes = process::read(&toolchain::at("CHANGELOG.md"))?;
-        std::fs::write(folder.join("notes.md"), notes(&changes, VERSION)?)?;
+        let notes_file = folder.join("notes.md");
+        std::fs::write(&notes_file, notes(&changes, VERSION)?)?;
         let python = BUILDERS.ready()?.0;
         let mut names: Vec<&str> = self.target.iter().map(String::as_str).collect();
         if names.is_empty() {
@@ -78,8 +85,34 @@ impl Release {
         )?;
         std::fs::write(folder.join("SHA256SUMS"), &sums)?;
         process::print(&sums);
-        Ok(())
+        match self.tag {
+            // Lines with `#` are notes, too.
+            true => {
+                let mut mark = git("tag --annotate --cleanup=verbatim --file");
+                process::run(mark.arg(notes_file).arg(tag()))
+            }
+            false => Ok(()),
+        }
     }
+}
+
+fn tag() -> String {
+    format!("v{VERSION}")
+}
+
+fn git(words: &str) -> Command {
+    let mut git = process::command(&format!("git {words}"));
+    git.current_dir(toolchain::at(""));
+    git
+}
+
+/// Checks that a tag of this version would mark what is built.
+fn may_be_tagged() -> Result<()> {
+    let changed = process::output(&mut git("status --porcelain"))?;
+    ensure!(changed.is_empty(), "not committed yet:\n{changed}");
+    let taken = process::output(git("tag --list").arg(tag()))?;
+    ensure!(taken.is_empty(), "the tag {} is there already", tag());
+    Ok(())
 }
 
 /// The newest section of the changelog `text`, which must be that of `version`.

@@ -29,16 +29,23 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from hivtac._hivtac import (
-    Connection,
-    Error,
-    Grips as _Grips,
-    LostError,
-    NoDeviceError,
-    Reader,
-    RefusedError,
-    VersionError,
-)
+try:
+    from hivtac._hivtac import (
+        Connection,
+        Error,
+        Grips as _Grips,
+        LostError,
+        NoDeviceError,
+        Reader,
+        RefusedError,
+        VersionError,
+    )
+except ImportError as failure:
+    raise ImportError(
+        f"the compiled part of hivtac does not load here ({failure}): it was installed for "
+        "another computer, such as one with glibc in place of musl (Alpine), or for another "
+        "Python. Install it anew on this one: pip install --force-reinstall --no-cache-dir hivtac"
+    ) from failure
 
 __all__ = [
     "Contact",

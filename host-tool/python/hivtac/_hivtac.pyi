@@ -79,7 +79,14 @@ class Reader:
     def damage(self) -> list[str]: ...
 
 class Twin:
-    def __init__(self, camera: str, contact: str, seed: int) -> None: ...
+    def __init__(
+        self,
+        camera: str,
+        contact: str,
+        seed: int,
+        unit: Optional[int],
+        model: Optional[str],
+    ) -> None: ...
     def press(
         self,
         touch: Optional[tuple[tuple[float, float], float, tuple[float, float]]],

@@ -12,6 +12,7 @@ of the simulated sensor. Nothing runs in real time, and the same presses give th
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Sequence
 from typing import Any
 
@@ -27,12 +28,23 @@ class Twin:
     """A simulated sensor whose tare was taken; nothing touches it. `camera`: "ov7725" with 156
     frames a second, "ov5640" with 119, or "mt9v034" with 232. `contact`: what presses, as of
     `Sensor.set_contact`; the simulated film is pressed by a needle. `seed`: decides the noise.
+    `unit`: 1 to 1000000, that of `hivtac twin --unit`; without it the nominal one. `model`: the
+    file of a model, which was made for this unit; without it the built-in one.
 
-    Raises `hivtac.Error` when there is no such camera or shape.
+    Raises `hivtac.Error` when there is no such camera, shape or unit, or the model does not fit.
     """
 
-    def __init__(self, camera: str = "ov7725", *, contact: str = "needle", seed: int = 1) -> None:
-        self._twin = _hivtac.Twin(camera, contact, seed)
+    def __init__(
+        self,
+        camera: str = "ov7725",
+        *,
+        contact: str = "needle",
+        seed: int = 1,
+        unit: int | None = None,
+        model: str | os.PathLike[str] | None = None,
+    ) -> None:
+        file = None if model is None else os.fspath(model)
+        self._twin = _hivtac.Twin(camera, contact, seed, unit, file)
 
     def press(
         self, force: Sequence[float] | hivtac.Floats, place: Sequence[float] | hivtac.Floats

@@ -1,7 +1,7 @@
 //! The simulated sensor in a program's own time: it is pressed as the program says, and gives the
 //! samples of the frames that are whole by then.
 
-use crate::error::Error;
+use crate::error::{Error, raised};
 use crate::told::{self, SampleNumbers};
 use hivtac_host::contact_shape;
 use hivtac_host::live::camera::Kind;
@@ -9,15 +9,19 @@ use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::{Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, device_id};
-use hivtac_twin::Layout;
+use hivtac_host::shown::shown;
+use hivtac_host::{model_file, reply};
+use hivtac_twin::{Layout, units};
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
-use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request};
+use hivtac_wire::message::{Command, DeviceMessage, HostMessage, LogLevel, Request};
 use hivtac_wire::version::HelloPrefix;
 use pyo3::prelude::*;
+use std::ops::RangeInclusive;
 use std::sync::{Mutex, PoisonError};
 
-/// Number of the nominal unit.
+/// Number of the nominal unit, and those of units that are drawn.
 const NOMINAL: u64 = 0;
+const UNITS: RangeInclusive<u64> = 1..=1_000_000;
 /// Frames of the tare that it begins with.
 const TARE_FRAMES: u16 = 32;
 /// Time for the tare and what is untouched before it, µs.
@@ -40,17 +44,33 @@ struct Simulated {
 #[pymethods]
 impl Twin {
     /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does
-    /// yet. The seed decides its noise.
+    /// yet. The seed decides its noise, the number which unit it is of those that are drawn; it
+    /// goes by the model in the file.
     #[new]
-    fn start(py: Python<'_>, camera: &str, contact: &str, seed: u64) -> PyResult<Twin> {
+    fn start(
+        py: Python<'_>,
+        camera: &str,
+        contact: &str,
+        seed: u64,
+        unit: Option<u64>,
+        model: Option<&str>,
+    ) -> PyResult<Twin> {
         let kinds = [Kind::Ov7725, Kind::Ov5640, Kind::Mt9v034];
         let kind = kinds.into_iter().find(|kind| kind.name() == camera);
         let no_camera =
             || Error::new_err(format!("camera {camera:?}: use ov7725, ov5640 or mt9v034"));
         let kind = kind.ok_or_else(no_camera)?;
         let shape = contact_shape::parse(contact).map_err(Error::new_err)?;
+        if unit.is_some_and(|unit| !UNITS.contains(&unit)) {
+            return Err(Error::new_err("a unit's number is from 1 to 1000000"));
+        }
+        let model = model.map(model_file::read).transpose();
+        let model = model.map_err(raised)?;
         let started = py.detach(|| {
-            let mut twin = Simulated::start(kind, seed)?;
+            let mut twin = Simulated::start(kind, seed, unit)?;
+            for request in model.iter().flat_map(|file| model_file::requests(file)) {
+                twin.ask(request)?;
+            }
             twin.command(Request::SetContactShape(shape));
             twin.command(Request::Tare {
                 frames: TARE_FRAMES,
@@ -100,15 +120,24 @@ impl Twin {
 }
 
 impl Simulated {
-    fn start(kind: Kind, seed: u64) -> Result<Simulated, String> {
-        let scene = kind
-            .scene("rest", Layout::default(), seed)
-            .map_err(|error| error.to_string())?;
+    fn start(kind: Kind, seed: u64, unit: Option<u64>) -> Result<Simulated, String> {
+        let layout = Layout::default();
+        let scene = kind.scene("rest", layout, seed);
+        let scene = scene.and_then(|scene| match unit {
+            Some(unit) => {
+                let usual = scene.options().clone();
+                let options = units::with_unit(unit, scene.camera(), usual);
+                scene.with_options(options)
+            }
+            None => Ok(scene),
+        });
+        let scene = scene.map_err(|error| error.to_string())?;
         let hand = Hand::at_once();
         let usual = Disturbances::default();
         let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
             .map_err(|error| error.to_string())?;
-        let device = Device::new(kind, Layout::default(), device_id(kind, NOMINAL), 1.0);
+        let id = device_id(kind, unit.unwrap_or(NOMINAL));
+        let device = Device::new(kind, layout, id, 1.0);
         let frames = Frames::new(eye, &device.camera(), 0);
         let mut twin = Simulated {
             device,
@@ -137,25 +166,57 @@ impl Simulated {
         self.send(&HostMessage::Command(Command { id, request }));
     }
 
-    /// Takes each frame when it is whole; what else the device says is left out.
-    fn advance(&mut self, to_us: u64) -> Vec<SampleNumbers> {
-        let mut samples = Vec::new();
+    /// Sends a command that is answered at once, or with the next frames, and waits for that.
+    fn ask(&mut self, request: Request) -> Result<(), String> {
+        let what = reply::name_of(&request);
+        self.command(request);
+        let mut why = String::new();
+        for _ in 0..TARE_FRAMES {
+            while let Some(message) = self.device.message() {
+                match message {
+                    DeviceMessage::Log(line) if line.level == LogLevel::Error => {
+                        why = format!(": {}", shown(&line.text));
+                    }
+                    DeviceMessage::Reply(reply) if reply.id == self.last_id => {
+                        let judged = reply::judge(what, reply.outcome);
+                        return judged.map_err(|failure| format!("{failure}{why}"));
+                    }
+                    _ => {}
+                }
+            }
+            self.frame(u64::MAX);
+        }
+        Err(format!("the simulated sensor did not answer \"{what}\""))
+    }
+
+    /// Takes the next frame if it is whole by then.
+    fn frame(&mut self, to_us: u64) -> bool {
         loop {
             let camera = self.device.camera();
             match self.frames.due(&camera, self.now_us) {
-                Due::In(wait_us) if self.now_us + wait_us > to_us => break,
+                Due::In(wait_us) if self.now_us + wait_us > to_us => return false,
                 Due::In(wait_us) => self.now_us += wait_us,
-                Due::Now(_) => self.take(&mut samples),
+                Due::Now(_) => break,
             }
+        }
+        let (captured, _, missed) = self.frames.take(self.device.camera());
+        let now_us = self.now_us;
+        self.device.frame(&captured, missed, || now_us);
+        true
+    }
+
+    /// Takes each frame when it is whole; what else the device says is left out.
+    fn advance(&mut self, to_us: u64) -> Vec<SampleNumbers> {
+        let mut samples = Vec::new();
+        while self.frame(to_us) {
+            self.tell(&mut samples);
         }
         self.now_us = self.now_us.max(to_us);
         samples
     }
 
-    fn take(&mut self, samples: &mut Vec<SampleNumbers>) {
-        let (captured, _, missed) = self.frames.take(self.device.camera());
+    fn tell(&mut self, samples: &mut Vec<SampleNumbers>) {
         let now_us = self.now_us;
-        self.device.frame(&captured, missed, || now_us);
         while let Some(message) = self.device.message() {
             if let DeviceMessage::Sample(mut sample) = message {
                 sample.time_us = sample.time_us.saturating_sub(self.begun_us);

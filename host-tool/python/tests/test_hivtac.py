@@ -7,6 +7,7 @@
 
 import json
 import os
+import shutil
 import signal
 import socket
 import subprocess
@@ -198,6 +199,22 @@ class OnTheRig(unittest.TestCase):
 
 
 class WithoutASensor(unittest.TestCase):
+    def test_a_package_of_another_system_says_what_to_do(self):
+        with tempfile.TemporaryDirectory() as folder:
+            package = Path(folder) / "hivtac"
+            shutil.copytree(Path(hivtac.__file__).parent, package)
+            [compiled] = package.glob("_hivtac*.so")
+            compiled.write_bytes(b"compiled for another system")
+            run = subprocess.run(
+                [sys.executable, "-c", "import hivtac"],
+                cwd=folder,
+                capture_output=True,
+                text=True,
+            )
+        self.assertEqual(run.returncode, 1)
+        self.assertRegex(run.stderr, r"does not load here \(.*_hivtac.*\): it was installed for")
+        self.assertIn("pip install --force-reinstall", run.stderr)
+
     def test_errors_have_the_tools_text(self):
         with silent() as port:
             with self.assertRaisesRegex(hivtac.NoDeviceError, "no hello from"):

@@ -1,5 +1,6 @@
 //! A recorded course: forces in time from a CSV file, such as `hivtac monitor --csv` writes.
 
+use super::hand::Touch;
 use hivtac_twin::Load;
 use std::fmt;
 
@@ -18,12 +19,41 @@ struct Row {
     time_s: f64,
     /// `None` where there was no force.
     force: Option<Force>,
+    /// Each contact where there were two; `force` is their sum.
+    contacts: Option<[Force; 2]>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Force {
     vector_n: [f64; 3],
     place_mm: [f64; 2],
+}
+
+impl Force {
+    /// The force after a part of the way to another one.
+    fn toward(self, after: Force, part: f64) -> Force {
+        let between = |a: f64, b: f64| a + (b - a) * part;
+        Force {
+            vector_n: [0, 1, 2].map(|i| between(self.vector_n[i], after.vector_n[i])),
+            place_mm: [0, 1].map(|i| between(self.place_mm[i], after.place_mm[i])),
+        }
+    }
+
+    fn load(self) -> Option<Load> {
+        let load = Load::from_vector(self.vector_n);
+        load.and_then(|load| load.with_offset_mm(self.place_mm))
+            .ok()
+    }
+
+    fn touch(self) -> Option<Touch> {
+        let load = self.load()?;
+        let touch = Touch {
+            place_mm: load.offset_mm(),
+            force_n: load.magnitude_n(),
+            angles_deg: [load.alpha_deg(), load.beta_deg()],
+        };
+        touch.in_range()
+    }
 }
 
 /// Why a text is no course.
@@ -43,11 +73,17 @@ impl fmt::Display for NoCourse {
 
 impl std::error::Error for NoCourse {}
 
-/// The columns: one of the times, the force, and the place if there is one.
+/// The columns: one of the times, the force, and each of two contacts if there are such columns.
 struct Columns {
     time: usize,
     /// Seconds in the unit of the time.
     unit_s: f64,
+    force: Place,
+    contacts: Option<[Place; 2]>,
+}
+
+/// The columns of a force, and of where it presses if there are such columns.
+struct Place {
     force: [usize; 3],
     place: Option<[usize; 2]>,
 }
@@ -69,12 +105,24 @@ impl Columns {
             Some(time) => (time, 1.0),
             None => (needed("time_us")?, 1e-6),
         };
+        let place = |of: &str| {
+            let [x, y] = ["x", "y"].map(|axis| column(&format!("{of}place_{axis}_mm")));
+            x.zip(y).map(Into::into)
+        };
+        let contact = |of: &str| {
+            let [x, y, z] = ["x", "y", "z"].map(|axis| column(&format!("{of}{axis}_n")));
+            let force = [x?, y?, z?];
+            let place = place(of);
+            Some(Place { force, place })
+        };
+        let force = [needed("x_n")?, needed("y_n")?, needed("z_n")?];
+        let place = place("");
         Ok(Columns {
             time,
             unit_s,
-            force: [needed("x_n")?, needed("y_n")?, needed("z_n")?],
-            place: column("place_x_mm")
-                .zip(column("place_y_mm"))
+            force: Place { force, place },
+            contacts: contact("contact1_")
+                .zip(contact("contact2_"))
                 .map(Into::into),
         })
     }
@@ -82,30 +130,46 @@ impl Columns {
     /// Reads a row; without a force where all of its fields are empty.
     fn row(&self, text: &str) -> Result<Row, String> {
         let fields: Vec<&str> = text.trim().split(',').map(str::trim).collect();
-        let field = |at: usize| fields.get(at).copied().unwrap_or("");
-        let number = |at: usize| {
-            let text = field(at);
-            let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
-            value.ok_or_else(|| format!("\"{text}\" is not a number"))
-        };
-        let time_s = self.unit_s * number(self.time)?;
-        if self.force.iter().all(|at| field(*at).is_empty()) {
-            return Ok(Row {
-                time_s,
-                force: None,
-            });
-        }
-        let [x, y, z] = self.force;
-        let vector_n = [number(x)?, number(y)?, number(z)?];
-        let place_mm = match self.place {
-            Some([x, y]) if !field(x).is_empty() => [number(x)?, number(y)?],
-            _ => [0.0; 2],
+        let contacts = match &self.contacts {
+            Some([first, second]) => first.read(&fields)?.zip(second.read(&fields)?),
+            None => None,
         };
         Ok(Row {
-            time_s,
-            force: Some(Force { vector_n, place_mm }),
+            time_s: self.unit_s * number(&fields, self.time)?,
+            force: self.force.read(&fields)?,
+            contacts: contacts.map(Into::into),
         })
     }
+}
+
+impl Place {
+    /// Reads a force; `None` where all of its fields are empty.
+    fn read(&self, fields: &[&str]) -> Result<Option<Force>, String> {
+        if self.force.iter().all(|at| field(fields, *at).is_empty()) {
+            return Ok(None);
+        }
+        let [x, y, z] = self.force.map(|at| number(fields, at));
+        let place_mm = match self.place {
+            Some([x, y]) if !field(fields, x).is_empty() => {
+                [number(fields, x)?, number(fields, y)?]
+            }
+            _ => [0.0; 2],
+        };
+        Ok(Some(Force {
+            vector_n: [x?, y?, z?],
+            place_mm,
+        }))
+    }
+}
+
+fn field<'a>(fields: &[&'a str], at: usize) -> &'a str {
+    fields.get(at).copied().unwrap_or("")
+}
+
+fn number(fields: &[&str], at: usize) -> Result<f64, String> {
+    let text = field(fields, at);
+    let value = text.parse::<f64>().ok().filter(|value| value.is_finite());
+    value.ok_or_else(|| format!("\"{text}\" is not a number"))
 }
 
 impl Course {
@@ -137,37 +201,37 @@ impl Course {
 
     /// Returns the load at a time, s. After its last row the course begins anew.
     pub fn load(&self, time_s: f64) -> Load {
+        let pressed = self.between(time_s, |row| row.force);
+        pressed.and_then(Force::load).unwrap_or(Load::REST)
+    }
+
+    /// Returns each of two touches at a time, s; `None` unless there are two.
+    pub fn touches(&self, time_s: f64) -> Option<[Touch; 2]> {
+        let contact = |nth: usize| {
+            self.between(time_s, |row| Some(row.contacts?[nth]))?
+                .touch()
+        };
+        Some([contact(0)?, contact(1)?])
+    }
+
+    /// What the rows around a time have, on the way from one to the other.
+    fn between(&self, time_s: f64, of: impl Fn(&Row) -> Option<Force>) -> Option<Force> {
         let length_s = self.rows.last().map_or(0.0, |row| row.time_s);
         let at_s = match length_s > 0.0 && time_s > 0.0 {
             true => time_s % length_s,
             false => 0.0,
         };
         let next = self.rows.partition_point(|row| row.time_s <= at_s);
-        let Some(from) = next.checked_sub(1).and_then(|at| self.rows.get(at)) else {
-            return Load::REST;
-        };
+        let from = self.rows.get(next.checked_sub(1)?)?;
+        let force = of(from)?;
         let to = self.rows.get(next).unwrap_or(from);
-        let Some(force) = from.force else {
-            return Load::REST;
-        };
         let step_s = to.time_s - from.time_s;
-        let Some(after) = to.force.filter(|_| step_s > 0.0 && step_s <= LONGEST_GAP_S) else {
-            return load(force.vector_n, force.place_mm);
-        };
-        let part = (at_s - from.time_s) / step_s;
-        let between = |a: f64, b: f64| a + (b - a) * part;
-        let vector_n = [0, 1, 2].map(|i| between(force.vector_n[i], after.vector_n[i]));
-        load(
-            vector_n,
-            [0, 1].map(|i| between(force.place_mm[i], after.place_mm[i])),
-        )
+        let after = of(to).filter(|_| step_s > 0.0 && step_s <= LONGEST_GAP_S);
+        Some(match after {
+            Some(after) => force.toward(after, (at_s - from.time_s) / step_s),
+            None => force,
+        })
     }
-}
-
-fn load(vector_n: [f64; 3], place_mm: [f64; 2]) -> Load {
-    Load::from_vector(vector_n)
-        .and_then(|load| load.with_offset_mm(place_mm))
-        .unwrap_or(Load::REST)
 }
 
 #[cfg(test)]
@@ -193,6 +257,25 @@ mod tests {
             (course.load(2.15).vector_n()[2] + 0.15).abs() < 1e-9,
             "again"
         );
+    }
+
+    #[test]
+    fn two_contacts_are_two_touches() {
+        let course = Course::parse(
+            "time_s,x_n,y_n,z_n,contact1_x_n,contact1_y_n,contact1_z_n,contact1_place_x_mm,\
+             contact1_place_y_mm,contact2_x_n,contact2_y_n,contact2_z_n,contact2_place_x_mm,\
+             contact2_place_y_mm\n\
+             0,0,0,-0.1,0,0,-0.1,1,0,,,,,\n\
+             1,0,0,-0.2,0,0,-0.08,-2,1,0,0,-0.12,2,0\n\
+             1.2,0,0,-0.1,0,0,-0.04,-2,1,0,0,-0.06,2,0\n",
+        )
+        .unwrap();
+        assert_eq!(course.touches(0.5), None);
+        let [first, second] = course.touches(1.1).unwrap();
+        assert_eq!(first.place_mm, [-2.0, 1.0]);
+        assert!((first.force_n - 0.06).abs() < 1e-9, "{first:?}");
+        assert!((second.force_n - 0.09).abs() < 1e-9, "{second:?}");
+        assert!((course.load(1.1).magnitude_n() - 0.15).abs() < 1e-9);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::camera::{Camera, Kind};
 use super::course::Course;
-use super::hand::{Following, Hand};
+use super::hand::{Following, Hand, Touch};
 use super::pair::{self, PairFilm};
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_twin::{Format, Frame, Load, Paint, Patch, Scene, SceneError, Shutter, Truth};
@@ -171,7 +171,7 @@ impl Eye {
         let number = u64::from(number);
         let [first, second] = self.following.each_mut();
         let hand = [first.advance(time_s), second.advance(time_s)];
-        if let Some(frame) = self.both(number) {
+        if let Some(frame) = self.both(number, time_s) {
             return taken(frame);
         }
         let own = |load: &dyn Fn(f64) -> Load| scene.frame_under(&shutter, number, load);
@@ -188,14 +188,23 @@ impl Eye {
         taken(frame)
     }
 
-    /// The frame under two fingers; `None` if they do not press, or the film is not known under
-    /// both: then the first finger presses alone.
-    fn both(&self, number: u64) -> Option<Frame> {
-        let [first, second] = &self.following;
-        let touches = pair::in_range([first.touch()?, second.touch()?]);
+    /// The frame under two touches; `None` if there are not two, or the film is not known under
+    /// both: then the first finger presses alone, or the course's sum.
+    fn both(&self, number: u64, time_s: f64) -> Option<Frame> {
+        let touches = pair::in_range(self.touches(time_s)?);
         let moved = (self.pair.as_ref()?).displacement(&self.scene, touches)?;
         let sum = pair::sum(touches);
         Some(self.scene.render_film(moved, &sum, number))
+    }
+
+    /// Both touches of two fingers, or of the course when no finger presses.
+    fn touches(&self, time_s: f64) -> Option<[Touch; 2]> {
+        let [first, second] = &self.following;
+        match (first.touch(), second.touch(), &self.presses) {
+            (Some(first), Some(second), _) => Some([first, second]),
+            (None, None, Presses::Course(course)) => course.touches(time_s),
+            _ => None,
+        }
     }
 
     /// Makes the scene that the camera sees now, if it is another one.

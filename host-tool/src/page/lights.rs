@@ -88,9 +88,9 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "give less light and expose anew, or narrow the threshold",
         ),
         Status::IMAGE_DARK => (
-            "nothing passes the threshold",
-            "switch the light on, take the cap off and expose anew, or go back to the model's \
-             threshold",
+            "nothing passes the threshold: the picture is dark, or too bright for colours",
+            "switch the light on and take the cap off, or give less light, and expose anew; or go \
+             back to the model's threshold",
         ),
         Status::FRAME_INCOMPLETE => (
             "the frame came incomplete",

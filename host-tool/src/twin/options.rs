@@ -22,7 +22,8 @@ pub struct Simulated {
     /// scene file (FILE.toml, docs/scene-file.md)
     #[arg(long, value_name = "NAME")]
     scene: Option<String>,
-    /// Forces from a CSV file of `monitor --csv` in place of the scene's, again and again
+    /// Forces from a CSV file of `monitor --csv` in place of the scene's, again and again; two
+    /// contacts with --layout 8v
     #[arg(long, value_name = "FILE")]
     course: Option<String>,
     /// The camera, and with it the rate: ov7725 with 156 frames a second when not given, ov5640

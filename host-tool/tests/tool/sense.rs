@@ -353,6 +353,26 @@ fn a_white_picture_is_not_called_dark() {
     }
 }
 
+/// Four things that each could be a marker, but do not lie as markers do.
+#[test]
+fn the_rule_is_told_by_which_blobs_are_no_markers() {
+    let folder = Folder::new();
+    let mut image = RgbImage::from_pixel(320, 240, Rgb([128; 3]));
+    for [left, top] in [[40, 60], [70, 60], [200, 150], [230, 60]] {
+        for (x, y) in (0..18).flat_map(|x| (0..18).map(move |y| (x, y))) {
+            if (x - 9) * (x - 9) + (y - 9) * (y - 9) < 70 {
+                let (x, y): (i32, i32) = (left + x, top + y);
+                image.put_pixel(x as u32, y as u32, Rgb([200, 10, 10]));
+            }
+        }
+    }
+    let found = run(&["sense", &folder.save("a.png", &image)]);
+    assert!(found.stdout.contains("markers_ambiguous"), "{found:?}");
+    let words = "lie as dots do: a square around the picture's middle";
+    assert!(found.stdout.contains(words), "{found:?}");
+    assert!(found.stdout.contains("turned by at most 20°"), "{found:?}");
+}
+
 /// Decoders paint the missing part of a JPEG file grey.
 #[test]
 fn a_jpeg_that_was_cut_anywhere_is_refused() {

@@ -345,6 +345,39 @@ fn a_recorded_course_is_pressed_again() {
     assert!((force - 0.1).abs() < 0.005, "{force}");
 }
 
+/// A course with both of two contacts, as `monitor --csv` writes them, presses with both.
+#[test]
+fn a_course_of_two_contacts_is_told_as_two() {
+    let folder = tempfile::tempdir().unwrap();
+    let course = text(&folder, "course.csv");
+    let of = |number: u32| {
+        ["x_n", "y_n", "z_n", "place_x_mm", "place_y_mm"]
+            .map(|name| format!(",contact{number}_{name}"))
+            .concat()
+    };
+    let row = "0,0,-0.11,0,0,-0.05,-2.5,1,0,0,-0.06,1.5,-0.5\n";
+    let rows = format!("time_s,x_n,y_n,z_n{}{}\n0,{row}1,{row}", of(1), of(2));
+    std::fs::write(&course, rows).unwrap();
+    let twin = Twin::in_folder(folder, &["--layout", "8v", "--course", &course]);
+    twin.done(&["settings", "set", "contact", "needle"]);
+    let samples = twin.samples(&["--frames", "300"]);
+    let last = &samples[299];
+    assert!(status(last).contains(&"two_contacts"), "{last}");
+    let mut contacts = last["contacts"].as_array().unwrap().clone();
+    contacts.sort_by_key(|contact| contact["place_x_mm"].as_f64().map(|x| (1e3 * x) as i64));
+    assert_eq!(contacts.len(), 2, "{last}");
+    for (contact, (x, force)) in contacts.iter().zip([(-2.5, 0.05), (1.5, 0.06)]) {
+        assert!(
+            (contact["place_x_mm"].as_f64().unwrap() - x).abs() < 0.3,
+            "{contact}"
+        );
+        assert!(
+            (contact["magnitude_n"].as_f64().unwrap() - force).abs() < 0.01,
+            "{contact}"
+        );
+    }
+}
+
 #[test]
 fn a_pseudo_terminal_serves_one_host_after_the_other() {
     let folder = tempfile::tempdir().unwrap();

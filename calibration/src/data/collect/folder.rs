@@ -360,7 +360,12 @@ impl Recording {
             let path = path.join(name);
             fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))
         };
-        Self::parse(&text, &table(SAMPLES)?, &table(GAUGE)?, &table(DOWN)?)
+        // Recordings of earlier programs do not say which way the sensor was held.
+        let down = match path.join(DOWN).try_exists() {
+            Ok(false) => format!("{DOWN_COLUMNS}\n"),
+            _ => table(DOWN)?,
+        };
+        Self::parse(&text, &table(SAMPLES)?, &table(GAUGE)?, &down)
             .with_context(|| path.display().to_string())
     }
 
@@ -707,6 +712,10 @@ mod tests {
         let recording = Recording::read(path).unwrap();
         let near = recording.down.unwrap().into_iter().zip([0.0, 0.6, -0.8]);
         assert!(near.into_iter().all(|(a, b)| (a - b).abs() < 1e-6));
+        let kept = fs::read(path.join(DOWN)).unwrap();
+        fs::remove_file(path.join(DOWN)).unwrap();
+        assert_eq!(Recording::read(path).unwrap().down, None, "not noted");
+        fs::write(path.join(DOWN), kept).unwrap();
         // In a third run the direction is unknown.
         let mut folder = Folder::open(path, &conditions()).unwrap();
         folder.sample(0.5, None, &sample(1, true)).unwrap();

@@ -28,14 +28,14 @@ pub struct Pattern {
 
 /// Limits of a pattern without a rest position, for any lens, mounting and punched film. The
 /// tangent of the largest turn, 20°.
-const LARGEST_TURN: f32 = 0.363_97;
+pub const LARGEST_TURN: f32 = 0.363_97;
 /// Strain (largest seen: 0.065, under a tip 4 mm off the middle).
-const LARGEST_STRAIN: f32 = 0.075;
+pub const LARGEST_STRAIN: f32 = 0.075;
 const LARGEST_TAPER: f32 = 0.15;
 /// Distance of the centre from the picture's middle, relative to the half side at rest.
 const LARGEST_SHIFT: f32 = 0.801;
 /// Size relative to rest: from a film pulled outwards to one that nearly touches the lens.
-const SCALE: (f32, f32) = (0.75, 2.2);
+pub const SCALE: (f32, f32) = (0.75, 2.2);
 
 /// A square's half side over its half diagonal.
 const SQRT_HALF: f32 = core::f32::consts::FRAC_1_SQRT_2;
