@@ -130,12 +130,21 @@ impl PipelineTask {
         {
             defmt::warn!("frame {=u32}: {}", edge.number, defmt::Debug2Format(&how));
         }
+        if let Event::Passed { .. } = event {
+            self.camera_was_set_up();
+        }
         let action = self.follower.event(event);
         // The first event with other pixels means that the camera was set to them.
         if format.pixels() != self.sensor.threshold().format() {
             self.change_format();
         }
         self.act(action);
+    }
+
+    /// Frames before a set-up were exposed otherwise, and may be those of another camera.
+    fn camera_was_set_up(&mut self) {
+        self.sensor.set_motion(camera::fitted().motion);
+        self.sensor.forget_frame();
     }
 
     fn act(&mut self, action: Action) {
@@ -150,11 +159,6 @@ impl PipelineTask {
         stats::DROPPED_OVERRUN.add(tally.overrun);
         stats::DROPPED_SIZE.add(tally.size);
         stats::DROPPED_SETUP.add(tally.passed);
-        if tally.passed > 0 {
-            // Frames of a set-up are exposed otherwise, and may be those of another camera.
-            self.sensor.set_motion(camera::fitted().motion);
-            self.sensor.forget_frame();
-        }
         if tally.overrun + tally.size > 0 {
             condition::set(Condition::NoForce);
         }
@@ -289,6 +293,7 @@ impl PipelineTask {
         while let Ok(CaptureEvent { event, .. }) = CAPTURE_EVENTS.try_receive() {
             missed = true;
             if let Event::Passed { from, .. } = event {
+                self.camera_was_set_up();
                 self.follower.pass_over(from);
                 self.follower.event(event);
             }

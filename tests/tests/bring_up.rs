@@ -88,7 +88,9 @@ fn a_good_board_is_right_up_to_the_press() {
     assert_eq!(child.wait().unwrap().code(), Some(130), "{}", asked());
     rig.finish().unwrap();
     let report = report(&file);
-    let names = ["usb", "camera", "clocks", "white", "markers", "noise"];
+    let names = [
+        "usb", "camera", "clocks", "white", "markers", "film", "noise",
+    ];
     assert_eq!(steps(&report), names.map(|name| (name, true)), "{report}");
     assert_eq!(report["not_done"], serde_json::json!(["press"]));
     assert_eq!(report["right"], false);

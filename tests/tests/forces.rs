@@ -17,6 +17,10 @@ use hivtac_twin::{Format, Options, Preset, Scene, Shutter};
 use serde_json::{Value, json};
 
 const SEED: u64 = 1;
+/// A frame of the OV7725 has 278 lines, of which each exposes a row. One of the OV5640 has 467, of
+/// which 441 expose 240 rows.
+const OV7725: Motion = Motion::rolling(278);
+const OV5640: Motion = Motion::rolling(254);
 
 /// The frame before a frame.
 #[derive(Clone, Copy)]
@@ -31,13 +35,17 @@ enum Before<'a> {
 
 /// Measures a frame after the one before it on this computer, with the firmware's model and the
 /// shape of a new device.
-fn on_this_computer(model: &[u8], before: Before<'_>, pixels: &[u16]) -> Measurement {
+fn on_this_computer(
+    model: &[u8],
+    motion: Motion,
+    before: Before<'_>,
+    pixels: &[u16],
+) -> Measurement {
     let model = Model::parse(model).unwrap();
     let mut sensor = Box::new(Sensor::<64>::new());
     let settings = model.conditions.settings(ByteOrder::Native);
     sensor.configure(settings, Some(model)).unwrap();
-    // A frame of the OV7725 has 278 lines.
-    sensor.set_motion(Motion::rolling(278));
+    sensor.set_motion(motion);
     sensor.set_contact_shape(ContactShape::default());
     match before {
         Before::Nothing => {}
@@ -125,7 +133,7 @@ fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
 }
 
 /// Compares every line of the host tool with the sensing on this computer.
-fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
+fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8], motion: Motion) {
     let truth = rig.truth().unwrap();
     let shown: HashMap<u64, &Value> = truth
         .iter()
@@ -134,7 +142,7 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8]) {
     for (nth, line) in lines.iter().enumerate() {
         let frame = line["frame"].as_u64().unwrap();
         let [before, now] = [frame - 1, frame].map(|frame| exposed(scene, shown[&frame]));
-        let measured = |before| expected(&on_this_computer(model, before, &now));
+        let measured = |before| expected(&on_this_computer(model, motion, before, &now));
         let is = |before| follows(&said(line), &measured(before)) == Ok(());
         // The first line may belong to the first frame after power-on or a change of format.
         let first = nth == 0 && is(Before::Nothing);
@@ -178,7 +186,7 @@ fn compare(name: &str, preset: Preset, frames: usize) -> Vec<Value> {
     let rig = Rig::start(&options).unwrap();
     let lines = monitor(&rig, frames);
     let scene = Scene::preset(name, preset, 320, 240, SEED).unwrap();
-    check_forces(&rig, &lines, &scene, &model_file("default.hvtm"));
+    check_forces(&rig, &lines, &scene, &model_file("default.hvtm"), OV7725);
     check_counting(&lines);
     rig.finish().unwrap();
     lines
@@ -207,6 +215,24 @@ fn a_moving_tip_gives_the_same_forces() {
         (l.min(size), h.max(size))
     });
     assert!(high - low > 0.02, "the force changes: {low} to {high} N");
+}
+
+/// The firmware learns at its set-up which camera is there, and when its rows are exposed. The
+/// scene has an OV7725's noise, which is known in the first frames.
+#[test]
+fn another_camera_has_rows_at_its_own_times() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scene.toml");
+    let text = format!("seed = {SEED}\n[load]\nmotion = \"demo\"\n");
+    fs::write(&file, &text).unwrap();
+    let options = ["--scene", file.to_str().unwrap(), "--camera", "ov5640"];
+    let rig = Rig::start(&options).unwrap();
+    let lines = monitor(&rig, 16);
+    let scene = Scene::from_toml(&text).unwrap();
+    let model = model_file("default.hvtm");
+    check_forces(&rig, &lines, &scene, &model, OV5640);
+    assert!(forces_but_one(&lines), "{lines:?}");
+    rig.finish().unwrap();
 }
 
 #[test]
@@ -258,7 +284,7 @@ fn the_pixel_format_is_chosen_while_frames_are_measured() {
     let model = model_file("yuv422/default.hvtm");
 
     let first = monitor(&rig, FRAMES);
-    check_forces(&rig, &first, &scene, &model);
+    check_forces(&rig, &first, &scene, &model, OV7725);
     assert!(forces_but_one(&first), "{first:?}");
 
     let output = set_threshold(&rig, &["--hsv", "170,10,100,255,45,255"]);
@@ -273,7 +299,7 @@ fn the_pixel_format_is_chosen_while_frames_are_measured() {
         let status = line["status"].as_array_mut().unwrap();
         status.retain(|name| name != "frame_dropped");
     }
-    check_forces(&rig, &last, &scene, &model);
+    check_forces(&rig, &last, &scene, &model, OV7725);
     assert!(forces_but_one(&last), "{last:?}");
 
     let output = tool(&rig, "threshold", &["--luma", "0,88"]).unwrap();

@@ -11,10 +11,13 @@ use hivtac_host::live::device::{Captured, Device};
 use hivtac_host::live::hand::Touch;
 use hivtac_host::live::pair::PairFilm;
 use hivtac_host::port::Address;
+use hivtac_terms::camera::CameraSettings;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
-use hivtac_terms::threshold::HsvBox;
-use hivtac_twin::{Layout, Scene, Shutter};
+use hivtac_terms::threshold::{HsvBox, Mono, Threshold};
+use hivtac_terms::units::{Microseconds, Sixteenths};
+use hivtac_tests::artifact;
+use hivtac_twin::{Format, Layout, Scene, Shutter};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::health::Health;
 use hivtac_wire::message::{
@@ -26,18 +29,43 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 const SEED: u64 = 1;
+/// Columns and rows of an MT9V034's array, binned.
+const MT9V034_ARRAY: [u32; 2] = [376, 240];
 /// Samples that are compared.
 const SAMPLES: usize = 24;
 const PATIENCE: Duration = Duration::from_secs(TIMEOUT_S as u64);
 
-/// What a new device is told. A threshold, though it is the one in use, makes what earlier frames
-/// left be forgotten.
-fn told() -> [Request; 3] {
+/// What a new device is told. A threshold makes what earlier frames left be forgotten. The first
+/// one is not the model's: samples say so, until the first frame under the second.
+fn told(kind: Kind) -> [Request; 4] {
+    let [other, own]: [Threshold; 2] = match kind {
+        Kind::Ov7725 | Kind::Ov5640 => {
+            let [mut other, own] = [HsvBox::RED; 2];
+            other.value_low += 1;
+            [other, own].map(Threshold::Rgb565)
+        }
+        Kind::Mt9v034 => {
+            let [mut other, own] = [Mono::DARK; 2];
+            other.high -= 1;
+            [other, own].map(Threshold::Mono)
+        }
+    };
     [
-        Request::SetContactShape(ContactShape::Needle),
         Request::StartWithMarkers,
-        Request::SetThreshold(HsvBox::RED.into()),
+        Request::SetContactShape(ContactShape::Needle),
+        Request::SetThreshold(other),
+        Request::SetThreshold(own),
     ]
+}
+
+/// The settings of a camera whose automatic exposure ends a row or two off the twin's.
+fn fixed(kind: Kind) -> Option<Request> {
+    let settings = CameraSettings {
+        exposure: Some(Microseconds(2_000)),
+        gain: Some(Sixteenths(16)),
+        ..CameraSettings::default()
+    };
+    (kind == Kind::Mt9v034).then_some(Request::SetCamera(settings))
 }
 
 /// The model of eight dots, and their layout.
@@ -47,11 +75,32 @@ fn eight_dots() -> Layout {
     "8v".parse().unwrap()
 }
 
+/// Returns the next sample, of the model's threshold or of another one.
+fn next_sample(link: &mut Link, is_mismatch: bool) -> Sample {
+    loop {
+        let message = link.receive(Instant::now() + PATIENCE).unwrap();
+        if let DeviceMessage::Sample(sample) = message.expect("samples come")
+            && sample.status.contains(Status::MODEL_MISMATCH) == is_mismatch
+        {
+            return sample;
+        }
+    }
+}
+
 /// Returns what the firmware in a rig says of itself, and the samples of successive frames, from
 /// the first one after what it was told.
-fn from_the_rig(rig: &Rig, count: usize) -> (DeviceHello, SettingsReport, Vec<Sample>) {
+fn from_the_rig(rig: &Rig, kind: Kind, count: usize) -> (DeviceHello, SettingsReport, Vec<Sample>) {
     let address = Address::Tty(rig.port().to_owned());
     let (mut link, hello) = Link::connect(&address, PATIENCE).unwrap();
+    let [start, shape, other, own] = told(kind);
+    for request in [start, shape, other] {
+        link.request(request, PATIENCE, |_| {}).unwrap();
+    }
+    // From the first frame on the camera has its settings.
+    next_sample(&mut link, true);
+    if let Some(request) = fixed(kind) {
+        link.request(request, PATIENCE, |_| {}).unwrap();
+    }
     let mut report = None;
     let ask = link.request(Request::GetSettings, PATIENCE, |message| {
         if let DeviceMessage::Settings(settings) = message {
@@ -59,19 +108,8 @@ fn from_the_rig(rig: &Rig, count: usize) -> (DeviceHello, SettingsReport, Vec<Sa
         }
     });
     ask.unwrap();
-    for request in told() {
-        link.request(request, PATIENCE, |_| {}).unwrap();
-    }
-    let mut samples: Vec<Sample> = Vec::new();
-    while samples.len() < count {
-        let message = link.receive(Instant::now() + PATIENCE).unwrap();
-        if let DeviceMessage::Sample(sample) = message.expect("samples come") {
-            let begins = sample.status.contains(Status::FRAME_DROPPED);
-            if begins || !samples.is_empty() {
-                samples.push(sample);
-            }
-        }
-    }
+    link.request(own, PATIENCE, |_| {}).unwrap();
+    let samples = (0..count).map(|_| next_sample(&mut link, false)).collect();
     (
         hello,
         report.expect("settings come before the reply"),
@@ -101,8 +139,9 @@ impl Twin {
     }
 }
 
-/// Returns the pixels of an exposure as they lie in the device's memory.
-fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
+/// Returns the pixels of an exposure as they lie in the device's memory: of mono two in a word, of
+/// the middle of the array.
+fn exposed(scene: &Scene, kind: Kind, line: &Value) -> Vec<u16> {
     let number = |key: &str| line[key].as_f64().unwrap();
     let shutter = Shutter {
         exposure_s: number("exposure_s"),
@@ -110,11 +149,18 @@ fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
     };
     let exposure = line["exposure"].as_u64().unwrap();
     let frame = scene.frame_by(&shutter, exposure, number("time_s"));
-    frame
-        .pixels
-        .iter()
-        .map(|pixel| pixel.swap_bytes())
-        .collect()
+    if frame.format != Format::Mono {
+        return frame
+            .pixels
+            .iter()
+            .map(|pixel| pixel.swap_bytes())
+            .collect();
+    }
+    let [width, height] = kind.size().map(usize::from);
+    let [left, above] = [frame.width as usize - width, frame.height as usize - height];
+    let rows = frame.mono_rows().skip(above / 2).take(height);
+    let pixels = rows.flat_map(|row| row[left / 2..][..width].as_chunks::<2>().0);
+    pixels.map(|pair| u16::from_le_bytes(*pair)).collect()
 }
 
 fn bytes(sample: Sample) -> Vec<u8> {
@@ -128,12 +174,13 @@ fn bytes(sample: Sample) -> Vec<u8> {
 /// number of the sample counts from the device's start, and is the only difference. Returns how
 /// many had a force.
 fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>) -> usize {
+    let kind = twin.0.camera().kind;
     let lines = rig.truth().unwrap();
     let lines: HashMap<u64, &Value> = lines
         .iter()
         .map(|line| (line["frame"].as_u64().unwrap(), line))
         .collect();
-    for request in told() {
+    for request in told(kind) {
         let (id, outcome) = (1, Outcome::Done);
         assert_eq!(
             twin.ask(request),
@@ -151,12 +198,16 @@ fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>)
         }
         let frame = Captured {
             number: sample.frame,
-            begun_us: sample.time_us - u64::try_from(camera.middle_us()).unwrap(),
+            begun_us: sample.time_us.strict_sub_signed(camera.middle_us().into()),
             camera,
-            words: exposed(scene, lines[&u64::from(sample.frame)]),
+            words: exposed(scene, kind, lines[&u64::from(sample.frame)]),
         };
-        twin.0
-            .frame(&frame, nth == 0 || lost > 0, || sample.time_us);
+        // Whether one was lost before the first is the program's affair.
+        let is_lost = match nth {
+            0 => sample.status.contains(Status::FRAME_DROPPED),
+            _ => lost > 0,
+        };
+        twin.0.frame(&frame, is_lost, || sample.time_us);
         // Counters may come, too.
         let messages: Vec<_> = std::iter::from_fn(|| twin.0.message()).collect();
         let own = messages.into_iter().find_map(|message| match message {
@@ -178,13 +229,10 @@ fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>)
     forces
 }
 
-#[test]
-fn a_twin_sends_the_bytes_of_the_flashed_program() {
-    let kind = Kind::Ov7725;
-    let seed = SEED.to_string();
-    let rig = Rig::start(&["--scene", "demo", "--seed", &seed]).unwrap();
-    let (hello, settings, samples) = from_the_rig(&rig, SAMPLES);
-    let scene = kind.scene("demo", Layout::default(), SEED).unwrap();
+/// A twin with a camera says what the program in the rig says, which has that camera, and makes the
+/// same of the same frames of a scene of the whole array.
+fn a_twin_is_as_the_program(kind: Kind, scene: &Scene, rig: Rig) {
+    let (hello, settings, samples) = from_the_rig(&rig, kind, SAMPLES);
     let mut twin = Twin::new(kind, Layout::default());
     let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
         panic!("a hello comes first");
@@ -195,11 +243,51 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
         ..own
     };
     assert_eq!(same, hello);
+    let [_, shape, other, _] = told(kind);
+    for request in [shape, other].into_iter().chain(fixed(kind)) {
+        twin.ask(request);
+    }
     let report = twin.ask(Request::GetSettings);
     assert_eq!(report[0], DeviceMessage::Settings(settings));
-    let forces = same_samples(&mut twin, &scene, &rig, samples);
+    let forces = same_samples(&mut twin, scene, &rig, samples);
     assert!(forces > SAMPLES / 2, "{forces}");
     rig.finish().unwrap();
+}
+
+#[test]
+fn a_twin_sends_the_bytes_of_the_flashed_program() {
+    let kind = Kind::Ov7725;
+    let rig = Rig::start(&["--scene", "demo", "--seed", &SEED.to_string()]).unwrap();
+    let scene = kind.scene("demo", Layout::default(), SEED).unwrap();
+    a_twin_is_as_the_program(kind, &scene, rig);
+}
+
+/// The scene has an OV7725's noise. With its own, forces depend on whether the program had time for
+/// a second look at an earlier frame.
+#[test]
+#[ignore = "slow: the second of three cameras"]
+fn a_twin_with_an_ov5640_sends_the_bytes_of_the_flashed_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scene.toml");
+    let text = format!("seed = {SEED}\n[load]\nmotion = \"demo\"\n");
+    std::fs::write(&file, &text).unwrap();
+    let options = ["--scene", file.to_str().unwrap(), "--camera", "ov5640"];
+    let rig = Rig::start(&options).unwrap();
+    let scene = Scene::from_toml(&text).unwrap();
+    a_twin_is_as_the_program(Kind::Ov5640, &scene, rig);
+}
+
+#[test]
+#[ignore = "slow: the third of three cameras"]
+fn a_twin_with_an_mt9v034_sends_the_bytes_of_the_flashed_program() {
+    let kind = Kind::Mt9v034;
+    let elf = artifact::named_by("HIVTAC_BUG_ELFS").join("openmv-h7.elf");
+    let seed = SEED.to_string();
+    let options = ["--scene", "demo", "--seed", &seed, "--board", "openmv-h7"];
+    let rig = Rig::start_with(&elf, &options).unwrap();
+    let [width, height] = MT9V034_ARRAY;
+    let scene = Scene::preset("demo", kind.preset(), width, height, SEED).unwrap();
+    a_twin_is_as_the_program(kind, &scene, rig);
 }
 
 /// Gives a device with this flash the model of eight dots.
@@ -221,7 +309,7 @@ fn a_twin_of_eight_dots_sends_the_bytes_of_the_flashed_program() {
     let seed = SEED.to_string();
     let options = ["--scene", "demo", "--seed", &seed, "--layout", "8v"];
     let rig = Rig::start(&[&options[..], &["--flash", flash]].concat()).unwrap();
-    let (hello, _, samples) = from_the_rig(&rig, SAMPLES);
+    let (hello, _, samples) = from_the_rig(&rig, Kind::Ov7725, SAMPLES);
     let scene = Kind::Ov7725.scene("demo", eight_dots(), SEED).unwrap();
     let mut twin = Twin::new(Kind::Ov7725, eight_dots());
     let DeviceMessage::Hello(own) = twin.0.message().unwrap() else {
@@ -281,7 +369,7 @@ fn samples_of(moved_mm: &[[f64; 3]], count: usize) -> (Vec<Sample>, Rig, TempDir
     std::fs::write(&file, &text).unwrap();
     let file = file.to_str().unwrap();
     let rig = Rig::start(&["--scene", file, "--flash", flash]).unwrap();
-    let (_, _, samples) = from_the_rig(&rig, count);
+    let (_, _, samples) = from_the_rig(&rig, Kind::Ov7725, count);
     let mut twin = Twin::new(Kind::Ov7725, eight_dots());
     assert!(matches!(twin.0.message(), Some(DeviceMessage::Hello(_))));
     let scene = Scene::from_toml(&text).unwrap();
@@ -310,7 +398,12 @@ fn two_needles_are_two_contacts_on_the_flashed_program() {
         let off = |um: i32, mm: f64| (1e-3 * f64::from(um) - mm).abs();
         assert!(off(place.x.0, needle.place_mm[0]) < 0.3, "{contact:?}");
         assert!(off(place.y.0, needle.place_mm[1]) < 0.3, "{contact:?}");
-        assert!((contact.magnitude.0 - 50_000).abs() < 4_000, "{contact:?}");
+        let sigma = contact.magnitude_sigma.0 as i32;
+        assert!(
+            (contact.magnitude.0 - 50_000).abs() < 3 * sigma,
+            "{contact:?}"
+        );
+        assert!(sigma < 2_500, "{contact:?}");
     }
     let (health, stats) = health_and_stats(&rig);
     let free = health.stack_bytes - health.stack_used;

@@ -146,6 +146,18 @@ impl Camera {
         self
     }
 
+    /// Returns the same camera with pixels so many times smaller.
+    pub(crate) fn finer(self, times: u32) -> Camera {
+        let factor = f64::from(times);
+        Camera {
+            width: self.width * times,
+            height: self.height * times,
+            focal_px: self.focal_px * factor,
+            axis_px: self.axis_px.map(|at| (at + 0.5) * factor - 0.5),
+            ..self
+        }
+    }
+
     /// The preset.
     pub fn preset(&self) -> Preset {
         self.preset

@@ -85,7 +85,7 @@ impl Disc {
 }
 
 /// Returns the corners of a regular polygon with the circle's area.
-fn rim([x, y]: [f64; 2], radius: f64) -> impl Iterator<Item = [f64; 2]> {
+pub(crate) fn rim([x, y]: [f64; 2], radius: f64) -> impl Iterator<Item = [f64; 2]> {
     let corners = if radius < SPECK_RADIUS_MM {
         SPECK_CORNERS
     } else {

@@ -4,6 +4,7 @@ use crate::camera::centre;
 use crate::disc::Outline;
 use crate::film::{Dots, Film, Pressed};
 use crate::lens::Discs;
+use crate::mirror;
 use crate::{Camera, Disc, FILM_DISTANCE_MM, Lens, Load, MarkerTruth, Mechanics, Shutter};
 
 /// All that decides the places of discs in a picture.
@@ -47,6 +48,27 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
             outlines,
             blur_px: self.blur_px(disc),
         }
+    }
+
+    /// Returns the image of a disc far behind the film, where it is seen on the film at rest.
+    pub(crate) fn far_image(&self, disc: &Disc) -> Image {
+        Image {
+            outlines: vec![disc.image(|_| [0.0; 3], self.camera)],
+            blur_px: self.lens.blur_px_at(f64::INFINITY, self.camera.focal_px()),
+        }
+    }
+
+    /// Returns what the film mirrors of the LEDs of a board at this distance behind the pinhole,
+    /// mm, at the frame's time. A lens that is in focus on the film blurs them as what is twice as
+    /// far.
+    pub(crate) fn leds(&self, board_mm: f64) -> [Image; 4] {
+        let far_mm = 2.0 * FILM_DISTANCE_MM + board_mm;
+        let blur_px = self.lens.blur_px_at(far_mm, self.camera.focal_px());
+        let leds = mirror::images(board_mm, |rest| self.displacement(rest), self.camera);
+        leds.map(|outline| Image {
+            outlines: vec![outline],
+            blur_px,
+        })
     }
 
     /// Returns the outlines during the exposure of the row in which the disc appears at the frame's

@@ -27,8 +27,9 @@
 //! | `disc`, `coverage` | the image of a disc: outline, area, centroid; the part of each pixel that it covers |
 //! | `options` | the conditions that make a frame harder or easier, and their ranges |
 //! | `light`, `patch`, `lens` | light and colours; things on the film; projection, focus, mounting, shutter |
+//! | `room`, `mirror` | what a film shows that lets light through, and one that is glossy |
 //! | `exposure` | the place of a disc while its rows are exposed |
-//! | `noise` | seeded sensor noise |
+//! | `noise`, `bayer` | seeded sensor noise; pixels that see one colour each |
 //! | `format`, `jpeg`, `frame` | RGB565, YUV422, mono and JPEG; the frame and the truth |
 //! | `view` | the motion of a disc, so that the camera sees it where the film has it |
 //! | `mechanics`, `surface` | the film as it is, or simplified |
@@ -38,6 +39,7 @@
 //! | `file` | scenes from TOML files |
 //! | `hard_cases` | scenes in which markers are hard to find (feature `jpeg`) |
 
+mod bayer;
 mod camera;
 mod coverage;
 mod creep;
@@ -56,10 +58,12 @@ mod jpeg;
 mod lens;
 mod light;
 mod mechanics;
+mod mirror;
 mod motion;
 mod noise;
 mod options;
 mod patch;
+mod room;
 mod scene;
 mod surface;
 pub mod units;
@@ -83,6 +87,7 @@ pub use mechanics::{Mechanics, Stiffness};
 pub use motion::{Catch, Drag, Grasp, Motion, Press, Vibration};
 pub use options::{OV5640_NOISE, Options, Salt};
 pub use patch::{Paint, Patch, Specks};
+pub use room::Room;
 pub use scene::Scene;
 pub use surface::Surface;
 pub use view::{disc_motion, seen_motion};

@@ -5,7 +5,7 @@
 
 use crate::camera::centre;
 use crate::camera::radians;
-use crate::{Camera, Options, Paint, noise};
+use crate::{Camera, Options, Paint, Room, noise};
 use hivtac_terms::fixed::Q;
 
 /// A channel in 8-bit levels, before it is rounded to a pixel's code.
@@ -26,6 +26,9 @@ const GLARE_COLOUR: [f64; 3] = [2000.0; 3];
 const BLACK_COLOUR: [f64; 3] = [25.0, 24.0, 22.0];
 /// Blue tape: hue 105, as bright in blue as the red tape is in red.
 const BLUE_COLOUR: [f64; 3] = [30.0, 75.0, 120.0];
+/// Fair skin: it reflects 55, 36 and 28 % of red, green and blue; the film 40 % of green. Hue 9,
+/// saturation 125 of 255: within the default threshold.
+const SKIN_COLOUR: [f64; 3] = [194.0, 127.0, 99.0];
 /// The angle to which [`Options::falloff`] refers, degrees.
 const FALLOFF_ANGLE_DEG: f64 = 75.0;
 
@@ -44,6 +47,7 @@ impl Paint {
             Paint::Glare => GLARE_COLOUR,
             Paint::Black => BLACK_COLOUR,
             Paint::Blue => BLUE_COLOUR,
+            Paint::Skin => SKIN_COLOUR,
         }
     }
 }
@@ -57,6 +61,8 @@ pub(crate) struct Light {
     haze: f64,
     /// Gain of red, green and blue.
     balance: [f64; 3],
+    /// What shows through the film.
+    room: Room,
     /// The film without markers.
     film: Vec<[Channel<i16>; 3]>,
 }
@@ -67,13 +73,18 @@ impl Light {
             brightness: brightness(camera, options, seed),
             haze: options.haze * options.gain,
             balance: options.white_balance,
+            room: options.room.clone(),
             film: Vec::new(),
         };
         let width = camera.width() as usize;
-        let paint = |pixel: usize| board(options.checkerboard_px, pixel % width, pixel / width);
+        let square_px = options.checkerboard_px * options.finer();
+        let paint = |pixel: usize| board(square_px, pixel % width, pixel / width);
         let pixels = light.brightness.iter().enumerate();
         light.film = pixels
-            .map(|(pixel, &brightness)| light.seen(paint(pixel), brightness).map(channel))
+            .map(|(pixel, &brightness)| {
+                let colour = light.colour(paint(pixel));
+                light.seen(colour, brightness).map(channel)
+            })
             .collect();
         light
     }
@@ -83,25 +94,42 @@ impl Light {
         self.film.clone()
     }
 
-    /// Returns the colour of a pixel that `paint` covers by a part (0 to 1).
+    /// Returns the colour of a paint on the film. The film's own includes what shows through it.
+    pub(crate) fn colour(&self, paint: Paint) -> [f64; 3] {
+        match paint {
+            Paint::Film => self.room.through(FILM_COLOUR, FILM_COLOUR),
+            other => other.colour(),
+        }
+    }
+
+    /// Returns the film's colour in front of a thing of this paint in the room.
+    pub(crate) fn before(&self, thing: Paint) -> [f64; 3] {
+        self.room.through(FILM_COLOUR, thing.colour())
+    }
+
+    /// Returns the film's colour where a finger touches it.
+    pub(crate) fn before_a_finger(&self) -> [f64; 3] {
+        self.room.through_to_touching(FILM_COLOUR, SKIN_COLOUR)
+    }
+
+    /// Returns the colour of a pixel of which a part (0 to 1) has another colour.
     pub(crate) fn painted(
         &self,
         pixel: usize,
         below: [Channel<i16>; 3],
-        paint: Paint,
+        colour: [f64; 3],
         part: f64,
     ) -> [Channel<i16>; 3] {
-        let above = self.seen(paint, self.brightness[pixel]);
+        let above = self.seen(colour, self.brightness[pixel]);
         std::array::from_fn(|c| {
             let below = f64::from(below[c].bits());
             channel(below + (above[c] - below) * part)
         })
     }
 
-    /// Returns a paint's colour in light of a brightness, in steps, at most white: a camera clips
-    /// brighter values.
-    fn seen(&self, paint: Paint, brightness: f64) -> [f64; 3] {
-        let colour = paint.colour();
+    /// Returns a colour in light of a brightness, in steps, at most white: a camera clips brighter
+    /// values.
+    fn seen(&self, colour: [f64; 3], brightness: f64) -> [f64; 3] {
         std::array::from_fn(|c| {
             let level = (colour[c] * brightness + self.haze) * self.balance[c];
             (level * STEPS).min(f64::from(WHITE.bits()))
@@ -111,7 +139,8 @@ impl Light {
     /// Returns a paint's colour in the light of the picture's middle.
     pub(crate) fn in_the_middle(&self, paint: Paint) -> [Channel; 3] {
         let middle = self.brightness[self.brightness.len() / 2];
-        self.seen(paint, middle).map(|steps| channel(steps).into())
+        let seen = self.seen(self.colour(paint), middle);
+        seen.map(|steps| channel(steps).into())
     }
 }
 

@@ -1,8 +1,9 @@
 //! The options of a scene, which make a frame harder or easier than the default.
 
+use crate::bayer;
 use crate::film::{Dots, Layout};
 use crate::{Format, Lens, Mechanics, Mounting, Patch, Preset, PresetCamera, SceneError, Shutter};
-use crate::{Paint, Specks};
+use crate::{Paint, Room, Specks};
 
 /// How a scene is lit, mounted, exposed and disturbed. The default is the nominal sensor.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,17 +19,26 @@ pub struct Options {
     /// The part of the light that is lost 75° off the optical axis, 0 to 1. It grows with the
     /// square of the angle. A usual lens loses 0.3, which has no effect on a centroid.
     pub falloff: f64,
-    /// Veiling light on the whole picture, 0 to 255 levels at a gain of 1: stray light that washes
-    /// out colours.
+    /// Veiling light on the whole picture, −64 to 255 levels at a gain of 1: stray light that
+    /// washes out colours. Below 0 it is a black level that the camera has set too high.
     pub haze: f64,
     /// Gain of red, green and blue, 0 to 4 each: (1, 1, 1) is the balance that makes the film
     /// nearly grey.
     pub white_balance: [f64; 3],
+    /// Distance from the pinhole back to a camera board whose LEDs a glossy film mirrors, 4 to 30
+    /// mm; `None` for a matt film, or LEDs that are off.
+    pub board_leds_mm: Option<f64>,
+    /// What shows through the film.
+    pub room: Room,
     /// Standard deviation of a fixed pattern of brightness from pixel to pixel, 0 to 0.5 of the
     /// brightness: the film's grain and the sensor's uneven pixels.
     pub texture: f64,
     /// Standard deviation of the noise of each channel, 0 to 64 of 255 levels.
     pub noise: f64,
+    /// Whether each pixel sees one colour only. The camera has four times as many as a frame: it
+    /// averages four of a colour, and interpolates the others. The noise is then that of an
+    /// average. It has no effect in [`Format::Mono`].
+    pub bayer: bool,
     /// Pixels that show a colour of their own; different ones in each frame.
     pub salt: Salt,
     /// The markers at rest: how many, where and how large.
@@ -80,8 +90,11 @@ impl Default for Options {
             falloff: 0.0,
             haze: 0.0,
             white_balance: [1.0; 3],
+            board_leds_mm: None,
+            room: Room::default(),
             texture: 0.0,
             noise: 2.5,
+            bayer: false,
             salt: Salt {
                 fraction: 0.0,
                 paint: Paint::Red,
@@ -118,6 +131,14 @@ impl Options {
         }
     }
 
+    /// The camera's own pixels along one of the frame.
+    pub(crate) fn finer(&self) -> u32 {
+        match self.bayer && self.format != Format::Mono {
+            true => bayer::FINER,
+            false => 1,
+        }
+    }
+
     /// # Errors
     /// If a value is outside its range or not a number.
     pub(crate) fn check(&self) -> Result<(), SceneError> {
@@ -128,9 +149,13 @@ impl Options {
         within("gain", self.gain, [0.0, 4.0])?;
         all_within("gradient", self.gradient, [-1.0, 1.0])?;
         within("falloff", self.falloff, [0.0, 1.0])?;
-        within("haze", self.haze, [0.0, 255.0])?;
+        within("haze", self.haze, [-64.0, 255.0])?;
         all_within("white_balance", self.white_balance, [0.0, 4.0])?;
         all_within("mono", self.mono, [0.0, 1.0])?;
+        if let Some(board_mm) = self.board_leds_mm {
+            within("board_leds_mm", board_mm, [4.0, 30.0])?;
+        }
+        self.room.check()?;
         within("texture", self.texture, [0.0, 0.5])?;
         within("noise", self.noise, [0.0, 64.0])?;
         within("salt", self.salt.fraction, [0.0, 1.0])?;
@@ -200,7 +225,11 @@ mod tests {
         assert!(said.contains("radius_mm is -1: use 0.01 to 10"), "{said}");
         for (said, name) in [
             (said_of(|o| o.gradient[1] = 1.5), "gradient"),
-            (said_of(|o| o.haze = -1.0), "haze"),
+            (said_of(|o| o.haze = -65.0), "haze"),
+            (said_of(|o| o.board_leds_mm = Some(3.0)), "board_leds_mm"),
+            (said_of(|o| o.room.transmission = 1.1), "transmission"),
+            (said_of(|o| o.room.brightness = -0.1), "brightness"),
+            (said_of(|o| o.room.finger_mm = 11.0), "finger_mm"),
             (said_of(|o| o.white_balance[2] = 5.0), "white_balance"),
             (said_of(|o| o.mono[0] = 1.5), "mono"),
             (said_of(|o| o.texture = f64::INFINITY), "texture"),

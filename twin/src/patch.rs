@@ -31,19 +31,22 @@ pub enum Paint {
     Black,
     /// Blue: a fifth of the film's red, half of its green, nearly all of its blue.
     Blue,
+    /// Skin: a hue near red, and less saturated than the markers.
+    Skin,
 }
 
 impl Paint {
     /// Every paint.
-    pub const ALL: [Paint; 5] = [
+    pub const ALL: [Paint; 6] = [
         Paint::Red,
         Paint::Film,
         Paint::Glare,
         Paint::Black,
         Paint::Blue,
+        Paint::Skin,
     ];
 
-    /// Returns the name in files: `red`, `film`, `glare`, `black` or `blue`.
+    /// Returns the name in files: `red`, `film`, `glare`, `black`, `blue` or `skin`.
     pub fn name(self) -> &'static str {
         match self {
             Paint::Red => "red",
@@ -51,6 +54,7 @@ impl Paint {
             Paint::Glare => "glare",
             Paint::Black => "black",
             Paint::Blue => "blue",
+            Paint::Skin => "skin",
         }
     }
 }

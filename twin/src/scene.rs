@@ -1,5 +1,8 @@
 //! The scene: the load on the sensor, and the camera's frames of it.
 
+use std::borrow::Cow;
+
+use crate::bayer;
 use crate::coverage::Coverage;
 use crate::exposure::{Exposure, Image};
 use crate::film::{Dots, Film, Pressed};
@@ -90,7 +93,8 @@ impl Scene {
         options.check()?;
         self.film = options.film.film(options.layout, options.glued_mm)?;
         self.camera = self.camera.fitted(&options.lens, &options.mounting);
-        self.light = Light::new(&self.camera, &options, self.seed);
+        let seen = self.camera.finer(options.finer());
+        self.light = Light::new(&seen, &options, self.seed);
         self.specks = options.specks.discs(self.seed);
         self.noise = Noise::new(options.noise * STEPS, self.seed);
         let other_film = self.options.film != options.film || self.options.layout != options.layout;
@@ -309,26 +313,72 @@ impl Scene {
         markers: &[Option<Image>],
     ) -> Vec<[Channel<i16>; 3]> {
         let mut picture = self.light.bare_film();
+        let colour = |paint| self.light.colour(paint);
+        self.paint_behind(&mut picture, exposure);
         for speck in &self.specks {
-            self.paint(&mut picture, &exposure.image(speck), Paint::Red);
+            self.paint(&mut picture, &exposure.image(speck), colour(Paint::Red));
         }
         for marker in markers.iter().flatten() {
-            self.paint(&mut picture, marker, self.options.markers);
+            self.paint(&mut picture, marker, colour(self.options.markers));
         }
         for patch in &self.options.patches {
-            self.paint(&mut picture, &exposure.image(&patch.disc()), patch.paint);
+            let image = exposure.image(&patch.disc());
+            self.paint(&mut picture, &image, colour(patch.paint));
+        }
+        for image in self
+            .options
+            .board_leds_mm
+            .iter()
+            .flat_map(|board_mm| exposure.leds(*board_mm))
+        {
+            self.paint(&mut picture, &image, colour(Paint::Glare));
         }
         picture
     }
 
-    fn paint(&self, picture: &mut [[Channel<i16>; 3]], image: &Image, paint: Paint) {
-        let (width, height) = (self.camera.width(), self.camera.height());
-        for (pixel, part) in Coverage::of(image, width, height).pixels(width, height) {
-            picture[pixel] = self.light.painted(pixel, picture[pixel], paint, part);
+    /// Paints what shows through the film: the room's things, and the fingertip that presses.
+    fn paint_behind<L: Fn(f64) -> Load>(
+        &self,
+        picture: &mut [[Channel<i16>; 3]],
+        exposure: &Exposure<'_, L>,
+    ) {
+        let room = &self.options.room;
+        for thing in &room.things {
+            let image = exposure.far_image(&thing.disc());
+            self.paint(picture, &image, self.light.before(thing.paint));
+        }
+        if room.finger_mm > 0.0 && exposure.now.force_n != [0.0; 3] {
+            let finger = Disc {
+                centre_mm: exposure.now.touches_mm,
+                radius_mm: room.finger_mm,
+            };
+            self.paint(
+                picture,
+                &exposure.image(&finger),
+                self.light.before_a_finger(),
+            );
+        }
+    }
+
+    fn paint(&self, picture: &mut [[Channel<i16>; 3]], image: &Image, colour: [f64; 3]) {
+        let finer = self.options.finer();
+        let [width, height] = [self.camera.width(), self.camera.height()].map(|side| side * finer);
+        let image = match finer {
+            1 => Cow::Borrowed(image),
+            _ => Cow::Owned(bayer::finer(image.clone())),
+        };
+        for (pixel, part) in Coverage::of(&image, width, height).pixels(width, height) {
+            picture[pixel] = self.light.painted(pixel, picture[pixel], colour, part);
         }
     }
 
     fn digitize(&self, picture: &[[Channel<i16>; 3]], number: u64) -> Raster {
+        let width = self.camera.width();
+        let is_bayer = self.options.finer() > 1;
+        let picture = match is_bayer {
+            true => Cow::Owned(bayer::binned(bayer::FINER * width, picture)),
+            false => Cow::Borrowed(picture),
+        };
         let salt = self.light.in_the_middle(self.options.salt.paint);
         let salted = (self.options.salt.fraction * f64::from(LOTS)) as u32;
         let noise = self.noise.of_frame(number);
@@ -341,7 +391,12 @@ impl Scene {
             let clean = self.as_seen(clean);
             std::array::from_fn(|channel| clean[channel] + noise[channel])
         });
-        self.options.format.code(self.camera.width(), noisy)
+        if is_bayer {
+            let raw: Vec<[Channel; 3]> = noisy.collect();
+            let colours = bayer::interpolated(width, &raw);
+            return self.options.format.code(width, colours.into_iter());
+        }
+        self.options.format.code(width, noisy)
     }
 
     /// Returns red, green and blue as the camera sees them. A camera without colours gives all

@@ -2,7 +2,7 @@
 
 use hivtac_twin::{
     Contact, Creep, Discs, Frame, Lens, Load, Mechanics, Motion, Mounting, Options, Paint, Patch,
-    Preset, Press, Projection, Salt, Scene, Shutter, Specks,
+    Preset, Press, Projection, Room, Salt, Scene, Shutter, Specks,
 };
 
 fn scene(options: Options) -> Scene {
@@ -74,6 +74,78 @@ fn haze_adds_light_and_balance_scales_channels() {
         ..clear()
     });
     near(colour(&frame, 160, 120), [112, 53, 34]);
+}
+
+/// Returns options of a film that lets this part of the light through.
+fn through(transmission: f64, room: Room) -> Options {
+    Options {
+        room: Room {
+            transmission,
+            ..room
+        },
+        ..clear()
+    }
+}
+
+#[test]
+fn a_film_that_lets_light_through_shows_the_room() {
+    let bright = Room {
+        brightness: 1.5,
+        things: vec![Patch {
+            centre_mm: [-2.0, 0.0],
+            radius_mm: 1.0,
+            paint: Paint::Blue,
+        }],
+        ..Room::default()
+    };
+    let near_to = |transmission, expected: [[i32; 3]; 2]| {
+        let frame = rendered(through(transmission, bright.clone()));
+        near(colour(&frame, 160, 120), expected[0]);
+        // It stays where it was, although the film is pressed.
+        near(colour(&frame, 125, 120), expected[1]);
+    };
+    near_to(0.0, [[150, 141, 128]; 2]);
+    near_to(0.5, [[187, 176, 160], [97, 127, 154]]);
+    near_to(1.0, [[225, 211, 192], [45, 112, 180]]);
+}
+
+#[test]
+fn a_fingertip_is_seen_through_the_film_while_it_presses() {
+    let room = Room {
+        finger_mm: 3.0,
+        brightness: 1.0,
+        ..Room::default()
+    };
+    let seen = scene(through(0.5, room));
+    let pressed = seen.render_load(&press(), 1).unwrap();
+    near(colour(&pressed, 160, 120), [123, 102, 89]);
+    let free = seen.render_load(&Load::REST, 1).unwrap();
+    near(colour(&free, 160, 120), [150, 141, 128]);
+}
+
+#[test]
+fn a_glossy_film_mirrors_the_boards_leds_next_to_the_markers() {
+    let frame = rendered(Options {
+        board_leds_mm: Some(12.0),
+        ..clear()
+    });
+    let white = |pixel: &&u16| **pixel == 0xffff;
+    let count = frame.pixels.iter().filter(white).count();
+    assert!((120..600).contains(&count), "{count}");
+}
+
+#[test]
+fn pixels_of_one_colour_keep_colours_and_blur_edges() {
+    let bayer = Options {
+        bayer: true,
+        ..clear()
+    };
+    let (plain, interpolated) = (rendered(clear()), rendered(bayer));
+    near(colour(&interpolated, 160, 120), [150, 141, 128]);
+    let [plain, interpolated] = [plain, interpolated].map(|frame| spot(&frame, 0));
+    assert!((plain[0] / interpolated[0] - 1.0).abs() < 0.02);
+    assert!((plain[1] - interpolated[1]).abs() < 0.1);
+    assert!(interpolated[3] > plain[3]);
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod clocks;
 pub mod colours;
 mod complaints;
 mod device;
+mod film;
 mod noise;
 mod person;
 mod press;
@@ -17,6 +18,7 @@ use crate::device::Device;
 use crate::output::print;
 use crate::snapshot::snapshot;
 use clap::Args;
+use colours::Middle;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::focus::Focus;
 use hivtac_host::focus::dots::Dots;
@@ -30,10 +32,10 @@ use serde_json::json;
 
 /// Look at everything about a new board, in the order in which things go wrong
 ///
-/// USB, the camera and its registers, clocks, white, the markers as `focus` has them, tare and
-/// noise, and a finger's press; says what is wrong and what to do, and what a person has to do
-/// in between. Ends with the first thing on which others rest. The report is for your own
-/// notes, and to attach to a question.
+/// USB, the camera and its registers, clocks, white, the markers as `focus` has them, whether the
+/// film keeps light out, tare and noise, and a finger's press; says what is wrong and what to do,
+/// and what a person has to do in between. Ends with the first thing on which others rest. The
+/// report is for your own notes, and to attach to a question.
 ///
 /// Example: hivtac bring-up
 #[derive(Args)]
@@ -130,7 +132,9 @@ impl<'a> BringUp<'a> {
         }
         let step = self.white()?;
         show(self.arguments, report, step);
-        let step = self.markers()?;
+        let (step, free) = self.markers()?;
+        show(self.arguments, report, step);
+        let step = self.film(&free)?;
         show(self.arguments, report, step);
         let step = noise::step(&mut self.link, patience, self.hello.threshold.format())?;
         let at_rest = step.is_right();
@@ -149,7 +153,8 @@ impl<'a> BringUp<'a> {
         Ok(colours::step(&taken.frame))
     }
 
-    fn markers(&mut self) -> Result<Step, Failure> {
+    /// Returns the film's middle, too.
+    fn markers(&mut self) -> Result<(Step, Middle), Failure> {
         self.person
             .ask("Take the card away and put the film on; nothing touches it.")?;
         let taken = snapshot(&mut self.link, self.arguments.device.timeout)?;
@@ -159,7 +164,16 @@ impl<'a> BringUp<'a> {
             false => "not as they should be; `hivtac focus` shows them until they are",
         };
         let figures = json!({ "checks": focus.checks });
-        Ok(Step::new("markers", said.to_owned(), focus.wrong, figures))
+        let step = Step::new("markers", said.to_owned(), focus.wrong, figures);
+        Ok((step, Middle::of(&taken.frame)))
+    }
+
+    fn film(&mut self, free: &Middle) -> Result<Step, Failure> {
+        self.person
+            .ask("Hold your hand over the film from outside, and do not touch it.")?;
+        let taken = snapshot(&mut self.link, self.arguments.device.timeout)?;
+        self.person.ask("Take your hand away.")?;
+        Ok(film::judge(free, &Middle::of(&taken.frame)))
     }
 }
 

@@ -5,8 +5,8 @@ use serde::Serialize;
 use serde_json::Value;
 
 /// The names of all steps, in the order in which faults occur.
-const STEPS: [&str; 7] = [
-    "usb", "camera", "clocks", "white", "markers", "noise", "press",
+const STEPS: [&str; 8] = [
+    "usb", "camera", "clocks", "white", "markers", "film", "noise", "press",
 ];
 
 /// The result of one step.

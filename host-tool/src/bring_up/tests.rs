@@ -1,7 +1,8 @@
 //! Tests of the steps' judgements.
 
+use super::colours::Middle;
 use super::report::{Report, Step};
-use super::{camera, clocks, colours, noise, press};
+use super::{camera, clocks, colours, film, noise, press};
 use hivtac_host::frame::Frame;
 use hivtac_terms::fixed::Q;
 use hivtac_terms::force::ContactList;
@@ -136,6 +137,15 @@ fn white_is_neutral_and_neither_dark_nor_saturated() {
     says(&colours::step(&picture(0xB48C)), &["white is not white"]);
 }
 
+#[test]
+fn a_film_that_lets_light_through_is_told() {
+    let [free, same, brighter, redder] = [0x9492, 0x9492, 0x9CD3, 0xAC92].map(picture);
+    let judge = |covered| film::judge(&Middle::of(&free), &Middle::of(covered));
+    says(&judge(&same), &[]);
+    says(&judge(&brighter), &["+5 %", "opaque film"]);
+    says(&judge(&redder), &["+17 %"]);
+}
+
 /// Frames whose first marker jumps by `jump_px`.
 fn jumping(jump_px: f64) -> Vec<MarkerList> {
     let marker = |x: f64| Marker {
@@ -182,7 +192,9 @@ fn the_report_says_what_was_not_looked_at() {
     report.finish();
     let json: Value = serde_json::from_str(&report.json()).unwrap();
     assert_eq!(json["right"], json!(false));
-    let rest = json!(["camera", "clocks", "white", "markers", "noise", "press"]);
+    let rest = json!([
+        "camera", "clocks", "white", "markers", "film", "noise", "press"
+    ]);
     assert_eq!(json["not_done"], rest);
     assert_eq!(json["steps"][0]["wrong"], json!(["no answer"]));
     assert_eq!(report.wrong(), ["usb"]);

@@ -2,6 +2,7 @@
 
 pub mod checks;
 pub mod dots;
+mod glare;
 mod rim;
 pub mod seen;
 #[cfg(test)]
@@ -48,14 +49,17 @@ impl Focus {
     /// When the layout of its dots is unknown.
     pub fn of(frame: &Frame, device: &DeviceHello) -> Result<Focus, Failure> {
         let dots = Dots::of(device)?;
-        let (checks, wrong) = match look(frame, device, dots) {
+        let mut wrong: Vec<String> = glare::advice(frame).into_iter().collect();
+        let checks = match look(frame, device, dots) {
             Ok(seen) => {
                 let checks = checks(frame, &seen);
-                let wrong = ORDER.iter().filter_map(|what| said(&checks, what));
-                let wrong = wrong.collect();
-                (checks, wrong)
+                wrong.extend(ORDER.iter().filter_map(|what| said(&checks, what)));
+                checks
             }
-            Err(not_seen) => (Vec::new(), vec![advice(&not_seen)]),
+            Err(not_seen) => {
+                wrong.push(advice(&not_seen));
+                Vec::new()
+            }
         };
         Ok(Focus {
             frame: frame.number,

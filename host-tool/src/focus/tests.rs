@@ -198,3 +198,22 @@ fn a_person_sees_a_table_with_the_limits() {
     );
     assert!(lines[8].starts_with("  wrong    rim of marker"), "{text}");
 }
+
+/// LEDs of the camera's own board, on the markers and beside them.
+#[test]
+fn leds_that_the_film_mirrors_are_told() {
+    for board_mm in [5.0, 7.0, 9.0, 12.0, 18.0] {
+        for format in [Format::Rgb565, Format::Yuv422] {
+            let frame = frame(|options| {
+                options.format = format;
+                options.board_leds_mm = Some(board_mm);
+            });
+            let focus = Focus::of(&frame, &device()).unwrap();
+            assert!(
+                !focus.right && focus.wrong[0].contains("LEDs off"),
+                "{}",
+                focus.text()
+            );
+        }
+    }
+}

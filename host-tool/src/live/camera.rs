@@ -208,7 +208,7 @@ impl Camera {
         };
         self.gain = settings.gain.unwrap_or_else(|| {
             let sixteenths = 16.0 * wanted_us / f64::from(self.exposed().0.max(1));
-            Sixteenths((sixteenths as u16).clamp(LEAST_GAIN.0, MOST_GAIN.0))
+            Sixteenths((sixteenths.round() as u16).clamp(LEAST_GAIN.0, MOST_GAIN.0))
         });
     }
 

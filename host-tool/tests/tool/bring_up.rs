@@ -50,7 +50,7 @@ fn felt(frame: u32, place: Option<[i32; 2]>) -> DeviceMessage {
 /// A board without faults that is pressed at these places, in µm, one after the other.
 fn board(presses: [[i32; 2]; 2]) -> FakeDevice {
     FakeDevice::on_tcp([Box::new(move |device: &mut Conversation| {
-        device.snapshots = [crate::snapshot::rest_frame(), crate::snapshot::rest_frame()].into();
+        device.snapshots = vec![crate::snapshot::rest_frame(); 3].into();
         let mut starts = 0;
         let mut frame = 1;
         while let Some(message) = device.next() {
@@ -96,7 +96,7 @@ fn a_board_on_which_all_is_right_is_so() {
         (&report["right"], &report["not_done"]),
         (&true.into(), &Value::Array(vec![]))
     );
-    assert_eq!(finished.stdout.lines().count(), 8, "{finished:?}");
+    assert_eq!(finished.stdout.lines().count(), 9, "{finished:?}");
     assert!(
         finished
             .stdout

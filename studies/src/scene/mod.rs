@@ -2,6 +2,7 @@
 
 mod canvas;
 mod dimensions;
+mod effects;
 mod render;
 mod tolerances;
 
@@ -15,6 +16,8 @@ pub enum SceneCommand {
     Render(render::RenderArgs),
     /// Print the lengths that `hardware/` shares with the simulated sensor, as JSON.
     Dimensions(dimensions::DimensionsArgs),
+    /// Measure with a film that lets light through, LEDs mirrored, a colour camera's pixels.
+    Effects(effects::Effects),
     /// Build units with one dimension of the kit off by its tolerance; measure after ten loads.
     Tolerances(tolerances::Tolerances),
 }
@@ -25,6 +28,7 @@ impl SceneCommand {
         match self {
             SceneCommand::Render(args) => args.run(),
             SceneCommand::Dimensions(args) => args.run(),
+            SceneCommand::Effects(study) => study.run(),
             SceneCommand::Tolerances(study) => study.run(),
         }
     }

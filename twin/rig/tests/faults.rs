@@ -132,6 +132,15 @@ fn a_short_frame_costs_itself_and_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
+/// Before the first sample there is none since which a frame could be missing.
+#[test]
+fn frames_lost_before_the_first_sample_are_not_told() {
+    let run = Setup::new(firmware(), 300).fault("frame-short@0-230").run();
+    assert!(run.stats().dropped_size >= 3, "{:?}", run.stats());
+    assert!(run.samples().len() >= 3, "{}", run.log());
+    assert_eq!(run.frames_after_a_loss(), Vec::<u32>::new());
+}
+
 /// The camera sends rows after the last one. The frame counts as too long, whether it was already
 /// measured or, on a slow core, not yet. The next sample reports it, and that frame is whole.
 #[test]

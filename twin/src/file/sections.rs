@@ -6,8 +6,8 @@ use serde::{Deserialize, Deserializer};
 use crate::film::{Dots, Layout};
 use crate::{
     Catch, Drag, Format, Grasp, JPEG_QUALITY, Lens, Load, Mechanics, Motion, Mounting,
-    OV5640_NOISE, Options, Paint, Patch, Preset, PresetCamera, Press, Salt, Scene, SceneError,
-    Shutter, Specks, Vibration,
+    OV5640_NOISE, Options, Paint, Patch, Preset, PresetCamera, Press, Room, Salt, Scene,
+    SceneError, Shutter, Specks, Vibration,
 };
 
 /// A whole file.
@@ -22,6 +22,7 @@ pub(super) struct SceneFile {
     mounting: Mounting,
     shutter: Shutter,
     light: LightSection,
+    room: Room,
     noise: NoiseSection,
     marks: MarksSection,
     load: LoadSection,
@@ -36,6 +37,7 @@ struct CameraSection {
     height: Option<u32>,
     format: Option<FormatName>,
     jpeg_quality: Option<u8>,
+    bayer: bool,
 }
 
 /// A camera by its name: its geometry, and the noise of its picture.
@@ -90,6 +92,7 @@ struct LightSection {
     haze: f64,
     white_balance: [f64; 3],
     mono: [f64; 3],
+    board_leds_mm: Option<f64>,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -158,6 +161,18 @@ impl SceneFile {
             .with_motion(self.load.motion(self.seed)?)
     }
 
+    /// Returns the room. Its keys would have no effect, silently, behind an opaque film.
+    fn room(&self) -> Result<Room, SceneError> {
+        let unseen = self.room.transmission == 0.0 && self.room != Room::default();
+        match unseen {
+            false => Ok(self.room.clone()),
+            true => Err(SceneError::Key {
+                key: "room",
+                why: "nothing is seen through an opaque film: give a `transmission`".to_owned(),
+            }),
+        }
+    }
+
     fn options(&self) -> Result<Options, SceneError> {
         let LightSection {
             gain,
@@ -166,6 +181,7 @@ impl SceneFile {
             haze,
             white_balance,
             mono,
+            board_leds_mm,
         } = self.light;
         Ok(Options {
             format: self.camera.format()?,
@@ -175,6 +191,9 @@ impl SceneFile {
             haze,
             white_balance,
             mono,
+            board_leds_mm,
+            room: self.room()?,
+            bayer: self.camera.bayer()?,
             markers: (self.marks.paint).unwrap_or(self.camera.preset.preset.usual_markers()),
             texture: self.noise.texture,
             noise: self.noise.noise.unwrap_or(self.camera.preset.noise),
@@ -205,6 +224,16 @@ impl CameraSection {
     fn size(&self) -> [u32; 2] {
         let [width, height] = self.preset.preset.usual_size();
         [self.width.unwrap_or(width), self.height.unwrap_or(height)]
+    }
+
+    fn bayer(&self) -> Result<bool, SceneError> {
+        match self.bayer && self.format()? == Format::Mono {
+            false => Ok(self.bayer),
+            true => Err(SceneError::Key {
+                key: "bayer",
+                why: "a camera without colours has no pixels for one colour each".to_owned(),
+            }),
+        }
     }
 
     fn format(&self) -> Result<Format, SceneError> {
@@ -316,6 +345,7 @@ impl Default for CameraSection {
             height: None,
             format: None,
             jpeg_quality: None,
+            bayer: false,
         }
     }
 }
@@ -330,6 +360,7 @@ impl Default for LightSection {
             haze: usual.haze,
             white_balance: usual.white_balance,
             mono: usual.mono,
+            board_leds_mm: usual.board_leds_mm,
         }
     }
 }
