@@ -47,10 +47,12 @@ fn line(solved: &SolvedPair) -> String {
         .as_flattened()
         .iter()
         .chain(pair.places_mm.as_flattened());
-    let images = both.as_flattened().iter().chain(mean.as_flattened());
+    let motions = [both, mean].map(|motion| [&motion.moved].into_iter().chain(&motion.slopes));
+    let images = motions.into_iter().flatten();
+    let images = images.flat_map(|images| images.as_flattened());
     let all: Vec<String> = loads
         .chain(images)
-        .map(|part| format!("{part:.9e}"))
+        .map(|part| format!("{part:.7e}"))
         .collect();
     all.join(",")
 }
