@@ -2,8 +2,9 @@
 
     python calibration/python/train_pairs.py pairs.csv sensor/data/pairs-8v.bin
 
-Needs NumPy. The last tenth of the pairs is held out: the covariance that the network leaves comes
-from them. `sensor/src/force/forward/pair/interaction.rs` has the network and the file's format.
+Needs NumPy. The last tenth of the pairs is held out. Then the example `pairs_left` puts into the
+file what the sensor's model leaves. `sensor/src/force/forward/pair/` has the network and the file's
+format.
 """
 
 import argparse
@@ -312,8 +313,8 @@ def row_bytes(bias, weights):
     return struct.pack("<ff", bias, step) + np.round(weights / step).astype("<i2").tobytes()
 
 
-def file_bytes(network, data, unit, left):
-    """The network as the sensor takes it; `left`: lower factor of what it leaves, px."""
+def file_bytes(network, data, unit):
+    """The network as the sensor takes it, with nothing left."""
     in_first, first_bias, in_second, second_bias, in_last, last_bias = network.parameters
     head = np.stack([data.middle, 1 / data.deviation], axis=1).ravel()
     parts = [bytes([*CHANNELS, DOTS, 0]), np.array([*head, FAR_MM], "<f4").tobytes()]
@@ -326,7 +327,7 @@ def file_bytes(network, data, unit, left):
     biases = times * np.concatenate([last_bias[0], np.zeros(12)])
     parts.append(np.stack([biases, steps], axis=1).astype("<f4").tobytes())
     parts.append(np.round(weights / steps).astype("<i2").tobytes())
-    parts.append((left[np.tril_indices(16)] / FOCAL_PX).astype("<f4").tobytes())
+    parts.append(bytes(4 * 16 * 17 // 2))
     return b"".join(parts)
 
 
@@ -353,14 +354,10 @@ def main():
             )
 
     train(network, data, unit, arguments.steps, report)
-    off = unseen.left(network, unit)
-    print(f"held out: median {np.median(np.abs(off)):.4f} px, worst {np.abs(off).max():.3f} px")
-    # What is left grows as the squared size of both, and hardly with their parts and distance.
-    size = unseen.inputs[:, :1] * data.deviation[0] + data.middle[0]
-    ratio = off / size**2
-    left = np.linalg.cholesky(ratio.T @ ratio / len(ratio))
+    off = np.abs(unseen.left(network, unit))
+    print(f"held out: median {np.median(off):.4f} px, worst {off.max():.3f} px")
     with open(arguments.out, "wb") as file:
-        file.write(file_bytes(network, data, unit, left))
+        file.write(file_bytes(network, data, unit))
 
 
 if __name__ == "__main__":

@@ -358,6 +358,41 @@ mod tests {
         assert!(bench.seen(&[LEFT, RIGHT]).1.is_none());
     }
 
+    /// By each force's z and each place's x, of both and of the mean.
+    #[test]
+    fn slopes_are_differences() {
+        let film = PairFilm::new(&[[2.5, 0.0], [-7.0, 4.5]], 0.4).unwrap();
+        let pair = Pair {
+            forces_n: [LEFT.1, RIGHT.1],
+            places_mm: [LEFT.0, RIGHT.0],
+        };
+        let here = film.solved(&pair).unwrap();
+        for (number, step) in [(2, 1e-4), (5, 1e-4), (6, 1e-2), (8, 1e-2)] {
+            let [back, forth] = [-step, step].map(|step| {
+                let mut pair = pair;
+                match number {
+                    0..6 => pair.forces_n.as_flattened_mut()[number] += step,
+                    _ => pair.places_mm.as_flattened_mut()[number - 6] += step,
+                }
+                film.solved(&pair).unwrap()
+            });
+            for motion in [|of: &SolvedPair| of.both.clone(), |of| of.mean.clone()] {
+                let [back, forth, here] = [&back, &forth, &here].map(motion);
+                for (dot, slope) in here.slopes[number].iter().enumerate() {
+                    for axis in 0..2 {
+                        let off = forth.moved[dot][axis] - back.moved[dot][axis];
+                        let (difference, slope) = (off / (2.0 * step), slope[axis]);
+                        let limit = 1e-3 * slope.abs() + 1e-5;
+                        assert!(
+                            (difference - slope).abs() < limit,
+                            "{number} {dot} {axis}: {difference} {slope}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn draws_are_within_their_ranges() {
         for number in 0..50 {

@@ -25,7 +25,8 @@ const OF_EIGHT_V: &[u8] = include_bytes!("../../../../data/pairs-8v.bin");
 /// The file has the channels of both hidden layers (u8), the number of markers (u8) and a zero.
 /// Then f32: the mean and the reciprocal deviation of each input, and the distance at which the
 /// factor is half of the largest, mm. The [`Network`] follows. Then comes a lower factor of the
-/// covariance that it leaves, f32: for a size of 1. What it leaves grows as the squared size.
+/// covariance that the model leaves, f32, for a size of both of 1: what it leaves grows as the
+/// squared size. It has the errors of the single contacts' tables for pairs, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interaction<'a> {
     head: &'a [u8; HEAD],
