@@ -376,8 +376,8 @@ mod tests {
                 }
                 film.solved(&pair).unwrap()
             });
-            let all = [&back, &forth, &here];
-            for [back, forth, here] in [all.map(|of| &of.both), all.map(|of| &of.mean)] {
+            for motion in [|of: &SolvedPair| of.both.clone(), |of| of.mean.clone()] {
+                let [back, forth, here] = [&back, &forth, &here].map(motion);
                 for (dot, slope) in here.slopes[number].iter().enumerate() {
                     for axis in 0..2 {
                         let off = forth.moved[dot][axis] - back.moved[dot][axis];
