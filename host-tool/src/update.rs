@@ -11,7 +11,6 @@ use hivtac_host::link::Link;
 use hivtac_host::model_file;
 use hivtac_host::reply::KEEP_PATIENCE;
 use hivtac_host::shown::shown;
-use hivtac_sensor::force::model::Model;
 use hivtac_wire::message::{DeviceHello, ModelIdentity, ModelSource, Request};
 use serde::Serialize;
 use std::time::{Duration, Instant};
@@ -63,8 +62,7 @@ pub fn run(command: &UpdateCommand) -> Result<(), Failure> {
 pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
     let device = &arguments.device;
     let address = device.address()?;
-    let file = model_file::read(path)?;
-    let model = Model::parse(&file).map_err(|error| Failure::of_file(path, error))?;
+    let (file, crc) = model_file::read(path)?;
     let begun = Instant::now();
     let (mut link, hello) = Link::connect(&address, device.timeout)?;
     for request in model_file::requests(&file) {
@@ -76,7 +74,7 @@ pub fn model(arguments: &ModelArguments, path: &str) -> Result<(), Failure> {
     }
     let (hello, _) = info::ask(&mut link, device.timeout, hello)?;
     let used = in_use(&link, hello, |used| {
-        used.source == ModelSource::Kept && used.crc == model.crc()
+        used.source == ModelSource::Kept && used.crc == crc
     })?;
     say(arguments, &used, begun.elapsed())
 }

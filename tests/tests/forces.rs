@@ -221,12 +221,8 @@ fn a_moving_tip_gives_the_same_forces() {
 /// scene has an OV7725's noise, which is known in the first frames.
 #[test]
 fn another_camera_has_rows_at_its_own_times() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("scene.toml");
     let text = format!("seed = {SEED}\n[load]\nmotion = \"demo\"\n");
-    fs::write(&file, &text).unwrap();
-    let options = ["--scene", file.to_str().unwrap(), "--camera", "ov5640"];
-    let rig = Rig::start(&options).unwrap();
+    let rig = Rig::start_under(&text, &["--camera", "ov5640"]).unwrap();
     let lines = monitor(&rig, 16);
     let scene = Scene::from_toml(&text).unwrap();
     let model = model_file("default.hvtm");

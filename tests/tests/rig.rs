@@ -47,6 +47,18 @@ impl Rig {
         Rig::start_with(&artifact::named_by("HIVTAC_ELF"), options)
     }
 
+    /// As [`Rig::start`], with a scene by its text.
+    ///
+    /// # Errors
+    /// If it does not become ready.
+    pub fn start_under(scene: &str, options: &[&str]) -> Result<Rig> {
+        let folder = tempfile::tempdir().context("creating a temporary folder")?;
+        let file = folder.path().join("scene.toml");
+        fs::write(&file, scene).context("writing the scene")?;
+        let file = file.to_str().context("a path in UTF-8")?;
+        Rig::start(&[&["--scene", file], options].concat())
+    }
+
     /// As [`Rig::start`], with another firmware.
     ///
     /// # Errors

@@ -267,12 +267,8 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
 #[test]
 #[ignore = "slow: the second of three cameras"]
 fn a_twin_with_an_ov5640_sends_the_bytes_of_the_flashed_program() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("scene.toml");
     let text = format!("seed = {SEED}\n[load]\nmotion = \"demo\"\n");
-    std::fs::write(&file, &text).unwrap();
-    let options = ["--scene", file.to_str().unwrap(), "--camera", "ov5640"];
-    let rig = Rig::start(&options).unwrap();
+    let rig = Rig::start_under(&text, &["--camera", "ov5640"]).unwrap();
     let scene = Scene::from_toml(&text).unwrap();
     a_twin_is_as_the_program(Kind::Ov5640, &scene, rig);
 }
@@ -364,11 +360,8 @@ fn samples_of(moved_mm: &[[f64; 3]], count: usize) -> (Vec<Sample>, Rig, TempDir
     let flash = folder.path().join("flash");
     let flash = flash.to_str().unwrap();
     give_eight_dots(flash);
-    let file = folder.path().join("scene.toml");
     let text = format!("layout = \"8v\"\n[marks]\nmoved_mm = {moved_mm:?}\n");
-    std::fs::write(&file, &text).unwrap();
-    let file = file.to_str().unwrap();
-    let rig = Rig::start(&["--scene", file, "--flash", flash]).unwrap();
+    let rig = Rig::start_under(&text, &["--flash", flash]).unwrap();
     let (_, _, samples) = from_the_rig(&rig, Kind::Ov7725, count);
     let mut twin = Twin::new(Kind::Ov7725, eight_dots());
     assert!(matches!(twin.0.message(), Some(DeviceMessage::Hello(_))));

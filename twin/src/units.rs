@@ -2,7 +2,8 @@
 
 use crate::film::reduced::Unit;
 use crate::film::{Dots, Layout};
-use crate::{Camera, Lens, Mechanics, Mounting, Options, PresetCamera, noise};
+use crate::{Camera, Lens, Mechanics, Mounting, Options, PresetCamera, Scene, SceneError, noise};
+use std::ops::RangeInclusive;
 
 /// ln of the film's Young's modulus.
 pub const STIFFNESS: f64 = 0.2;
@@ -70,9 +71,23 @@ pub fn random_unit(
     }
 }
 
-/// Returns these options with what unit `number` differs in: camera, film and glued markers. The
-/// same number is the same unit everywhere, under the nominal tip.
-pub fn with_unit(number: u64, camera: &Camera, options: Options) -> Options {
+/// Number of the nominal unit.
+pub const NOMINAL: u64 = 0;
+/// Numbers of the units that are drawn.
+pub const DRAWN: RangeInclusive<u64> = 1..=1_000_000;
+
+/// Returns the scene of unit `number`. The same number is the same unit everywhere, under the
+/// nominal tip.
+///
+/// # Errors
+/// Those of [`Scene::with_options`].
+pub fn as_unit(number: u64, scene: Scene) -> Result<Scene, SceneError> {
+    let options = with_unit(number, scene.camera(), scene.options().clone());
+    scene.with_options(options)
+}
+
+/// Returns these options with what unit `number` differs in: camera, film and glued markers.
+fn with_unit(number: u64, camera: &Camera, options: Options) -> Options {
     let mut random = noise::uniform(noise::mix(number));
     // The sum of twelve uniform numbers: nearly normal, with variance 1.
     let normal = || random.by_ref().take(12).map(|part| part - 0.5).sum();
@@ -96,7 +111,7 @@ pub fn with_unit(number: u64, camera: &Camera, options: Options) -> Options {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Preset, Scene};
+    use crate::Preset;
 
     #[test]
     fn units_differ_by_their_number_alone_and_can_be_simulated() {

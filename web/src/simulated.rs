@@ -5,14 +5,13 @@ use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::{Fingers, Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, Told, device_id};
-use hivtac_twin::Layout;
+use hivtac_twin::{Layout, units};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 
 /// Most frames of one turn, so that the page's other work is not late.
 const AT_ONCE: usize = 4;
-/// Seed of the noise, and number of the nominal unit.
+/// Seed of the noise.
 const SEED: u64 = 1;
-const NOMINAL: u64 = 0;
 
 /// A simulated sensor with a film at rest.
 pub struct Simulated {
@@ -34,7 +33,7 @@ impl Simulated {
         let usual = Disturbances::default();
         let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
             .map_err(|error| error.to_string())?;
-        let device = Device::new(kind, layout, device_id(kind, NOMINAL), 1.0);
+        let device = Device::new(kind, layout, device_id(kind, units::NOMINAL), 1.0);
         let frames = Frames::new(eye, &device.camera(), now_us);
         Ok(Simulated {
             device,

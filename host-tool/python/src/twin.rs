@@ -16,12 +16,8 @@ use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, LogLevel, Request};
 use hivtac_wire::version::HelloPrefix;
 use pyo3::prelude::*;
-use std::ops::RangeInclusive;
 use std::sync::{Mutex, PoisonError};
 
-/// Number of the nominal unit, and those of units that are drawn.
-const NOMINAL: u64 = 0;
-const UNITS: RangeInclusive<u64> = 1..=1_000_000;
 /// Frames of the tare that it begins with.
 const TARE_FRAMES: u16 = 32;
 /// Time for the tare and what is untouched before it, µs.
@@ -61,14 +57,17 @@ impl Twin {
             || Error::new_err(format!("camera {camera:?}: use ov7725, ov5640 or mt9v034"));
         let kind = kind.ok_or_else(no_camera)?;
         let shape = contact_shape::parse(contact).map_err(Error::new_err)?;
-        if unit.is_some_and(|unit| !UNITS.contains(&unit)) {
+        if unit.is_some_and(|unit| !units::DRAWN.contains(&unit)) {
             return Err(Error::new_err("a unit's number is from 1 to 1000000"));
         }
         let model = model.map(model_file::read).transpose();
         let model = model.map_err(raised)?;
         let started = py.detach(|| {
             let mut twin = Simulated::start(kind, seed, unit)?;
-            for request in model.iter().flat_map(|file| model_file::requests(file)) {
+            for request in model
+                .iter()
+                .flat_map(|(file, _)| model_file::requests(file))
+            {
                 twin.ask(request)?;
             }
             twin.command(Request::SetContactShape(shape));
@@ -124,11 +123,7 @@ impl Simulated {
         let layout = Layout::default();
         let scene = kind.scene("rest", layout, seed);
         let scene = scene.and_then(|scene| match unit {
-            Some(unit) => {
-                let usual = scene.options().clone();
-                let options = units::with_unit(unit, scene.camera(), usual);
-                scene.with_options(options)
-            }
+            Some(unit) => units::as_unit(unit, scene),
             None => Ok(scene),
         });
         let scene = scene.map_err(|error| error.to_string())?;
@@ -136,7 +131,7 @@ impl Simulated {
         let usual = Disturbances::default();
         let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
             .map_err(|error| error.to_string())?;
-        let id = device_id(kind, unit.unwrap_or(NOMINAL));
+        let id = device_id(kind, unit.unwrap_or(units::NOMINAL));
         let device = Device::new(kind, layout, id, 1.0);
         let frames = Frames::new(eye, &device.camera(), 0);
         let mut twin = Simulated {

@@ -12,9 +12,6 @@ use hivtac_twin::units;
 use hivtac_twin::{Layout, Scene};
 use std::ops::RangeInclusive;
 
-/// Number of the nominal unit.
-const NOMINAL: u64 = 0;
-
 /// What is simulated.
 #[derive(Args, Default, PartialEq)]
 pub struct Simulated {
@@ -35,7 +32,7 @@ pub struct Simulated {
     layout: Option<Layout>,
     /// Unit N of those that are drawn as people build them, 1 to 1000000; without it the nominal
     /// one, that of the built-in model
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(units::DRAWN))]
     unit: Option<u64>,
     /// Decides the noise, and where the demo starts, of a scene by name; 1 when not given
     #[arg(long, value_name = "N")]
@@ -112,7 +109,7 @@ impl Simulated {
         let device = Device::new(
             kind,
             layout,
-            device_id(kind, self.unit.unwrap_or(NOMINAL)),
+            device_id(kind, self.unit.unwrap_or(units::NOMINAL)),
             1.0,
         );
         Ok((device, eye))
@@ -137,13 +134,10 @@ impl Simulated {
     }
 
     fn as_unit(&self, name: &str, scene: Scene) -> Result<Scene, Failure> {
-        let Some(unit) = self.unit else {
-            return Ok(scene);
-        };
-        let options = units::with_unit(unit, scene.camera(), scene.options().clone());
-        scene
-            .with_options(options)
-            .map_err(|error| refused(name, error))
+        match self.unit {
+            Some(unit) => units::as_unit(unit, scene).map_err(|error| refused(name, error)),
+            None => Ok(scene),
+        }
     }
 }
 

@@ -10,6 +10,7 @@ use hivtac_host::recording::Recording;
 use hivtac_wire::message::DeviceMessage;
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
+use std::collections::HashMap;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
 use std::process::Child;
@@ -238,16 +239,15 @@ fn ratios(sample: &Value, truth: &Value) -> Vec<f64> {
     ]
 }
 
-/// Returns the line of a sample's frame in a truth log.
-fn truth_of(log: &str, sample: &Value) -> Value {
+/// Returns the lines of a truth log by their frames.
+fn truths(log: &str) -> HashMap<u64, Value> {
     let lines = std::fs::read_to_string(log).unwrap();
     let lines = lines
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).unwrap());
-    let own = lines
-        .into_iter()
-        .find(|line| line["frame"] == sample["frame"]);
-    own.unwrap_or_else(|| panic!("no truth of {sample}"))
+    lines
+        .map(|line| (line["frame"].as_u64().unwrap(), line))
+        .collect()
 }
 
 /// A tip wanders, as the error of one place alone may be larger than its σ.
@@ -262,13 +262,14 @@ fn forces_of_presses_are_within_three_sigma_of_the_truth() {
         let twin = Twin::in_folder(folder, &own);
         twin.done(&["settings", "set", "contact", "needle"]);
         let samples = twin.samples(&["--frames", "300"]);
+        let truths = truths(&log);
         let pressed = samples
             .iter()
             .filter(|sample| sample["force"]["place_x_mm"].is_number());
         let ratios: Vec<f64> = pressed
-            .map(|sample| (sample, truth_of(&log, sample)))
+            .map(|sample| (sample, &truths[&sample["frame"].as_u64().unwrap()]))
             .filter(|(_, truth)| truth["place_x_mm"].is_number())
-            .flat_map(|(sample, truth)| ratios(sample, &truth))
+            .flat_map(|(sample, truth)| ratios(sample, truth))
             .collect();
         assert!(ratios.len() > 5 * 200, "{camera}: {}", ratios.len());
         let within = ratios.iter().filter(|ratio| **ratio < 3.0).count();
