@@ -115,7 +115,7 @@ pub struct Response {
     /// The tip's displacement, mm per unit.
     pub tip_mm: V3,
     /// The change; `None` for several changes of the load at once.
-    change: Option<Change>,
+    pub(crate) change: Option<Change>,
 }
 
 impl Response {

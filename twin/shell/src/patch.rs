@@ -7,7 +7,7 @@ use crate::design::{gauss, tip_points};
 use crate::film::{Touched, finite, mean, point_shares, weighted};
 use crate::newton::Problem;
 use crate::point::dot;
-use crate::{Contact, Equilibrium, Film, ShellError};
+use crate::{Contact, Equilibrium, Film, Response, ShellError};
 
 /// Rays of the points of an ellipse and of a rim.
 const RAYS: usize = 48;
@@ -259,6 +259,37 @@ impl Film {
         let solution = from(start).or_else(|_| from(&self.rest()))?;
         let tip_mm = mean(&self.shares_of(&touched), &solution.unknowns);
         Ok(self.equilibrium(solution, sum_n, &[], (touched, tip_mm)))
+    }
+
+    /// Returns a state's derivatives by loads that are added to those that press it: each is of
+    /// forces, N, that are spread over patches. The stiffness is factored once.
+    ///
+    /// # Errors
+    /// As [`Film::linearize`].
+    pub fn answers_to_patches(
+        &self,
+        state: &Equilibrium,
+        loads: &[Vec<(Patch, [f64; 3])>],
+    ) -> Result<Vec<Response>, ShellError> {
+        self.fits(state)?;
+        let factors = self.factors_at(state)?;
+        let mut sides = vec![0.0; loads.len() * self.unknowns()];
+        for (side, load) in sides.chunks_mut(self.unknowns()).zip(loads) {
+            for (patch, force_n) in load {
+                let shares = point_shares(self.shell().grid(), &patch.points);
+                for (sum, part) in side.iter_mut().zip(weighted(&shares, force_n)) {
+                    *sum += part;
+                }
+            }
+        }
+        factors.solve(&mut sides, loads.len());
+        let tip = self.shares_of(&state.touched);
+        let answers = sides.chunks(self.unknowns()).map(|unknowns| Response {
+            unknowns: unknowns.to_vec(),
+            tip_mm: mean(&tip, unknowns),
+            change: None,
+        });
+        Ok(answers.collect())
     }
 }
 
