@@ -1,20 +1,20 @@
 //! Solves pairs of contacts on the nominal film with the dots of `8v`, for `python/train_pairs.py`:
-//! `cargo run --release -p hivtac-calibration --example pairs -- pairs.csv 3000`, half an hour of
-//! two cores. A line has the forces and the places of both, and the motion of the dots and of the
-//! mirrored layout's dots: by both, and the mean of single contacts.
+//! `cargo run --release -p hivtac-calibration --example pairs -- pairs.csv 7600`, 25 minutes of one
+//! core. A line has the forces and the places of both, and the motion of the dots and of the
+//! mirrored layout's dots, each with its slopes by these numbers: by both, and the mean of single
+//! contacts. With `unseen` after the number, the pairs are others, on a fine mesh.
 
 use std::fs::File;
 use std::io::Write;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use hivtac_calibration::forward::pairs::{Pair, PairFilm, SolvedPair, places_and_mirrored};
 use rayon::prelude::*;
 
-/// The seed of the draws.
-const SEED: u64 = 1;
-/// Fineness of the mesh. Pair and single contacts have the same error: their difference is within
-/// 0.005 px of a fine mesh.
-const FINENESS: f64 = 0.5;
+/// The seed of the draws, and the fineness of the mesh. Pair and single contacts have the same
+/// error on a coarse one.
+const USUAL: (u64, f64) = (1, 0.5);
+const UNSEEN: (u64, f64) = (2, 1.0);
 /// Pairs that are solved between two writes.
 const AT_ONCE: u64 = 100;
 
@@ -25,13 +25,18 @@ fn main() -> Result<()> {
         .next()
         .context("give a number of pairs")?
         .parse()?;
+    let (seed, fineness) = match arguments.next().as_deref() {
+        None => USUAL,
+        Some("unseen") => UNSEEN,
+        Some(other) => bail!("{other:?} is neither nothing nor `unseen`"),
+    };
     let layout = "8v".parse()?;
-    let film = PairFilm::new(&places_and_mirrored(&layout), FINENESS)?;
+    let film = PairFilm::new(&places_and_mirrored(&layout), fineness)?;
     let mut file = File::create(path)?;
     for first in (0..count).step_by(AT_ONCE as usize) {
         let numbers = (first..count.min(first + AT_ONCE)).into_par_iter();
         // A pair beyond the film's reach is left out.
-        let solved = numbers.filter_map(|number| film.solved(&Pair::draw(SEED, number)).ok());
+        let solved = numbers.filter_map(|number| film.solved(&Pair::draw(seed, number)).ok());
         for line in solved.map(|pair| line(&pair)).collect::<Vec<_>>() {
             writeln!(file, "{line}")?;
         }
@@ -47,10 +52,12 @@ fn line(solved: &SolvedPair) -> String {
         .as_flattened()
         .iter()
         .chain(pair.places_mm.as_flattened());
-    let images = both.as_flattened().iter().chain(mean.as_flattened());
+    let motions = [both, mean].map(|motion| [&motion.moved].into_iter().chain(&motion.slopes));
+    let images = motions.into_iter().flatten();
+    let images = images.flat_map(|images| images.as_flattened());
     let all: Vec<String> = loads
         .chain(images)
-        .map(|part| format!("{part:.9e}"))
+        .map(|part| format!("{part:.7e}"))
         .collect();
     all.join(",")
 }

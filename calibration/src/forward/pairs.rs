@@ -28,21 +28,36 @@ const TILT_DEG: f64 = 9.0;
 const REACH_MM: f64 = 6.0;
 /// The largest distance from the middle that a tip's disc reaches, mm.
 const TIP_REACH_MM: f64 = 6.5;
+/// Steps for slopes: of a force, N, and of a place, mm.
+const FORCE_STEP_N: f64 = 1e-4;
+const PLACE_STEP_MM: f64 = 1e-2;
 
 /// Images of dots, focal lengths from where they rest.
 pub type Images = Vec<[f64; 2]>;
 
+/// A motion of dots, with its slopes by numbers of what presses.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// The motion, focal lengths.
+    pub moved: Images,
+    /// Its slopes, focal lengths per N or mm.
+    pub slopes: Vec<Images>,
+}
+
 /// A pair with the motion of dots: by the pair, and the mean of single contacts by their parts,
-/// each with the size of both.
+/// each with the size of both. Slopes are by the components of both forces, then of both places.
 #[derive(Clone, Debug)]
 pub struct SolvedPair {
     /// The pair.
     pub pair: Pair,
     /// The motion under both.
-    pub both: Images,
+    pub both: Motion,
     /// The mean of the motions under one.
-    pub mean: Images,
+    pub mean: Motion,
 }
+
+/// A needle's place, mm, and its force, N.
+type Needle = ([f64; 2], [f64; 3]);
 
 impl Pair {
     /// Draws pair `number` of a seed.
@@ -72,6 +87,41 @@ impl Pair {
                 ],
                 places_mm,
             };
+        }
+    }
+
+    /// The parts of both forces.
+    fn parts(&self) -> [f64; 2] {
+        let sizes_n = self.forces_n.map(length);
+        sizes_n.map(|size_n| size_n / (sizes_n[0] + sizes_n[1]))
+    }
+
+    /// The mean of single contacts by their parts.
+    fn mean(&self, [first, second]: &[Motion; 2]) -> Motion {
+        let [a, b] = self.parts();
+        let together_n: f64 = self.forces_n.map(length).iter().sum();
+        // What the first contact's part has to do with the mean: as it grows, its single force
+        // falls.
+        let mut by_part = vec![(1.0, &first.moved), (-1.0, &second.moved)];
+        for axis in 0..3 {
+            by_part.push((-self.forces_n[0][axis] / a, &first.slopes[axis]));
+            by_part.push((self.forces_n[1][axis] / b, &second.slopes[axis]));
+        }
+        let by_part = sum(&by_part);
+        let mut slopes = Vec::new();
+        for (number, (own, per_n)) in [(first, b), (second, -a)].into_iter().enumerate() {
+            let force_n = self.forces_n[number];
+            for axis in 0..3 {
+                let grows = per_n * force_n[axis] / length(force_n) / together_n;
+                slopes.push(sum(&[(1.0, &own.slopes[axis]), (grows, &by_part)]));
+            }
+        }
+        for (own, part) in [(first, a), (second, b)] {
+            slopes.extend(own.slopes[3..].iter().map(|slope| sum(&[(part, slope)])));
+        }
+        Motion {
+            moved: sum(&[(a, &first.moved), (b, &second.moved)]),
+            slopes,
         }
     }
 }
@@ -113,18 +163,6 @@ impl PairFilm {
         self.discs.iter().map(image).collect()
     }
 
-    /// Solves a pair.
-    ///
-    /// # Errors
-    /// If the film finds no equilibrium.
-    fn both(&self, pair: &Pair) -> Result<Images> {
-        let mut patches = Vec::new();
-        for (place, force) in pair.places_mm.iter().zip(pair.forces_n) {
-            patches.push((Patch::tip(*place, NOMINAL_RADIUS_MM)?, force));
-        }
-        self.pressed(&patches)
-    }
-
     /// Solves forces, N, that are spread over patches.
     ///
     /// # Errors
@@ -154,29 +192,68 @@ impl PairFilm {
     /// # Errors
     /// If the film finds no equilibrium.
     pub fn solved(&self, pair: &Pair) -> Result<SolvedPair> {
-        let both = self.both(pair)?;
-        let sizes_n = pair.forces_n.map(length);
-        let together_n = sizes_n[0] + sizes_n[1];
-        let mut mean = vec![[0.0; 2]; both.len()];
-        for k in [0, 1] {
-            let part = sizes_n[k] / together_n;
-            let force_n = pair.forces_n[k].map(|own| own / part);
-            let place_mm = pair.places_mm[k];
-            let state = self
-                .film
-                .press_force(place_mm, force_n, &self.film.rest())?;
-            for (mean, own) in mean.iter_mut().zip(self.seen(&state)) {
-                for (mean, own) in mean.iter_mut().zip(own) {
-                    *mean += part * own;
-                }
-            }
-        }
+        let needles = [0, 1].map(|k| (pair.places_mm[k], pair.forces_n[k]));
+        let parts = pair.parts();
+        let [first, second] = [0, 1].map(|k| {
+            let force_n = pair.forces_n[k].map(|own| own / parts[k]);
+            self.needles(&[(pair.places_mm[k], force_n)])
+        });
         Ok(SolvedPair {
             pair: *pair,
-            both,
-            mean,
+            both: self.needles(&needles)?,
+            mean: pair.mean(&[first?, second?]),
         })
     }
+
+    /// Solves needles that press at once. Slopes are by the components of all forces, then of all
+    /// places.
+    fn needles(&self, needles: &[Needle]) -> Result<Motion> {
+        let tip = |place_mm| Patch::tip(place_mm, NOMINAL_RADIUS_MM);
+        let (mut patches, mut by_forces, mut by_places) = (Vec::new(), Vec::new(), Vec::new());
+        for (place_mm, force_n) in needles {
+            patches.push((tip(*place_mm)?, *force_n));
+            for axis in 0..3 {
+                let mut step_n = [0.0; 3];
+                step_n[axis] = FORCE_STEP_N;
+                by_forces.push(vec![(tip(*place_mm)?, step_n)]);
+            }
+            for axis in 0..2 {
+                let mut beside = [*place_mm; 2];
+                beside[0][axis] -= PLACE_STEP_MM;
+                beside[1][axis] += PLACE_STEP_MM;
+                let [back_n, forth_n] = [-0.5, 0.5].map(|half| force_n.map(|part| half * part));
+                by_places.push(vec![(tip(beside[0])?, back_n), (tip(beside[1])?, forth_n)]);
+            }
+        }
+        let state = self.film.press_patches(&patches, &self.film.rest())?;
+        let steps = [FORCE_STEP_N].repeat(by_forces.len()).into_iter();
+        let steps = steps.chain([PLACE_STEP_MM].repeat(by_places.len()));
+        let loads = [by_forces, by_places].concat();
+        let answers = self.film.answers_to_patches(&state, &loads)?;
+        let slopes = answers.iter().zip(steps).map(|(answer, step)| {
+            let [back, forth] =
+                [-1.0, 1.0].map(|way| self.seen(&self.film.beside(&state, answer, way)));
+            sum(&[(-0.5 / step, &back), (0.5 / step, &forth)])
+        });
+        Ok(Motion {
+            slopes: slopes.collect(),
+            moved: self.seen(&state),
+        })
+    }
+}
+
+/// A sum of motions, each times a factor.
+fn sum(terms: &[(f64, &Images)]) -> Images {
+    let mut sum = Images::new();
+    for (factor, images) in terms {
+        sum.resize(images.len(), [0.0; 2]);
+        for (sum, image) in sum.iter_mut().zip(images.iter()) {
+            for (sum, part) in sum.iter_mut().zip(image) {
+                *sum += factor * part;
+            }
+        }
+    }
+    sum
 }
 
 fn length(vector: [f64; 3]) -> f64 {
@@ -204,7 +281,6 @@ mod tests {
 
     const MODEL: &[u8] = include_bytes!("../../models/8v/default.hvtm");
 
-    type Needle = ([f64; 2], [f64; 3]);
     const LEFT: Needle = ([-2.5, 1.0], [0.003, -0.002, -0.05]);
     const RIGHT: Needle = ([1.5, 0.5], [-0.001, 0.004, -0.05]);
     const THIRD: Needle = ([0.0, -3.5], [0.0, 0.0, -0.05]);
@@ -280,6 +356,41 @@ mod tests {
         // A wide contact would be taken for two.
         bench.sensor.set_contact_shape(ContactShape::Unknown);
         assert!(bench.seen(&[LEFT, RIGHT]).1.is_none());
+    }
+
+    /// By each force's z and each place's x, of both and of the mean.
+    #[test]
+    fn slopes_are_differences() {
+        let film = PairFilm::new(&[[2.5, 0.0], [-7.0, 4.5]], 0.4).unwrap();
+        let pair = Pair {
+            forces_n: [LEFT.1, RIGHT.1],
+            places_mm: [LEFT.0, RIGHT.0],
+        };
+        let here = film.solved(&pair).unwrap();
+        for (number, step) in [(2, 1e-4), (5, 1e-4), (6, 1e-2), (8, 1e-2)] {
+            let [back, forth] = [-step, step].map(|step| {
+                let mut pair = pair;
+                match number {
+                    0..6 => pair.forces_n.as_flattened_mut()[number] += step,
+                    _ => pair.places_mm.as_flattened_mut()[number - 6] += step,
+                }
+                film.solved(&pair).unwrap()
+            });
+            let all = [&back, &forth, &here];
+            for [back, forth, here] in [all.map(|of| &of.both), all.map(|of| &of.mean)] {
+                for (dot, slope) in here.slopes[number].iter().enumerate() {
+                    for axis in 0..2 {
+                        let off = forth.moved[dot][axis] - back.moved[dot][axis];
+                        let (difference, slope) = (off / (2.0 * step), slope[axis]);
+                        let limit = 1e-3 * slope.abs() + 1e-5;
+                        assert!(
+                            (difference - slope).abs() < limit,
+                            "{number} {dot} {axis}: {difference} {slope}"
+                        );
+                    }
+                }
+            }
+        }
     }
 
     #[test]
