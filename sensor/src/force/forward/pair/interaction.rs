@@ -5,67 +5,34 @@
 //! network's output times a factor that vanishes there.
 
 use super::film::Both;
+use super::network::{self, COORDINATES, DOTS, FIRST, Network, SECOND};
 use crate::force::forward::covariance::{Covariance, triangle};
 use crate::force::forward::mounting::RestImage;
 use crate::force::forward::solve::Column;
-use crate::force::kernels::{APART, Number, products};
 
-/// Inputs ([`Both::inputs`]).
-pub const INPUTS: usize = 10;
-/// Neurons of a hidden layer.
-pub const WIDTH: usize = 192;
-/// Layers.
-pub const LAYERS: usize = 3;
-/// Markers of the layout.
-pub const DOTS: usize = 8;
-/// Coordinates of their images.
-pub const COORDINATES: usize = 2 * DOTS;
-/// Bytes of a file before the layers.
-pub const HEAD: usize = 4 + 8 * DOTS + 8 * INPUTS + 4;
+pub use super::network::INPUTS;
+
+/// Bytes of a file before the network.
+const HEAD: usize = 4 + 8 * INPUTS + 4;
 /// The markers are this near to those of the layout, mm.
 const NEAR_MM: f32 = 0.05;
 
-/// That of the layout `8v` on the nominal film, as the example `pairs` of `calibration/` writes it.
+/// That of the layout `8v` on the nominal film, as `train_pairs.py` of `calibration/` writes it.
 const OF_EIGHT_V: &[u8] = include_bytes!("../../../../data/pairs-8v.bin");
 
 /// The interaction of two contacts, borrowed from a file.
 ///
-/// The file has the widths of both hidden layers (u8), the number of markers (u8) and a zero. Then
-/// f32: the places of the markers at rest, mm; the mean and the reciprocal deviation of each
-/// input; and the distance at which the factor is half of the largest, mm. For each layer, and in
-/// it for each output, follow f32 bias and step, and the weights in units of the step, i16. Then
-/// comes a lower factor of the covariance that the network leaves, in units of the factor, f32.
+/// The file has the channels of both hidden layers (u8), the number of markers (u8) and a zero.
+/// Then f32: the mean and the reciprocal deviation of each input, and the distance at which the
+/// factor is half of the largest, mm. The [`Network`] follows. Then comes a lower factor of the
+/// covariance that the model leaves, f32, for a size of both of 1: what it leaves grows as the
+/// squared size. It has the errors of the single contacts' tables for pairs, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interaction<'a> {
     head: &'a [u8; HEAD],
-    layers: [Layer<'a>; LAYERS],
+    network: Network<'a>,
     left: &'a [[u8; 4]],
 }
-
-/// Values of a hidden layer and their slopes by the inputs, each in units of its own, and one more
-/// so that [`products`] has whole fours.
-type Hidden = [[Number; APART]; LANES];
-const LANES: usize = 12;
-/// Largest number of a [`Hidden`].
-const LARGEST: f32 = 32_767.0;
-/// Bits of a sum of products that are left out, so that 32 are enough: |Σ| ≤ 192 · 2³⁰ < 2³⁸.
-const LEFT_OUT: u32 = 7;
-/// What 1 is worth in a sum of products with values.
-const UNIT: f32 = (1 << LEFT_OUT) as f32 / LARGEST;
-const _: () = assert!(2 * APART == row(WIDTH) && WIDTH as u64 <= 1 << (31 + LEFT_OUT - 30));
-
-/// A layer: an output's bias, step and weights after those of the one before.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Layer<'a> {
-    inputs: usize,
-    bytes: &'a [u8],
-}
-
-/// Bias, step and weights of an output.
-type Row<'a> = (f32, f32, &'a [Number]);
-
-/// A value with its slopes by the inputs.
-type Value = [f32; 1 + INPUTS];
 
 impl Interaction<'static> {
     /// That of a layout, if there is one. `rest` has its markers' places.
@@ -75,30 +42,22 @@ impl Interaction<'static> {
 }
 
 impl<'a> Interaction<'a> {
-    /// Takes a file. Returns `None` if its length is not what its widths say, or a width is not
-    /// [`WIDTH`].
+    /// Takes a file. Returns `None` if it has other channels or markers than a [`Network`], or not
+    /// its length.
     pub fn new(bytes: &'a [u8]) -> Option<Interaction<'a>> {
-        let (head, mut rest) = bytes.split_first_chunk::<HEAD>()?;
+        let (head, rest) = bytes.split_first_chunk::<HEAD>()?;
+        let (network, left) = rest.split_at_checked(network::BYTES)?;
         let [first, second, dots, _, ..] = head.map(usize::from);
-        let widths = [INPUTS, first, second, COORDINATES];
-        if dots != DOTS || [first, second] != [WIDTH; 2] {
-            return None;
-        }
-        let mut layers = [Layer {
-            inputs: 0,
-            bytes: &[],
-        }; LAYERS];
-        for (layer, pair) in layers.iter_mut().zip(widths.windows(2)) {
-            let [inputs, outputs] = *pair else {
-                return None;
-            };
-            let (own, others) = rest.split_at_checked(outputs * row(inputs))?;
-            *layer = Layer { inputs, bytes: own };
-            rest = others;
-        }
-        let (left, over) = rest.as_chunks();
-        let sound = over.is_empty() && left.len() == triangle(COORDINATES);
-        sound.then_some(Interaction { head, layers, left })
+        let (left, over) = left.as_chunks();
+        let sound = [first, second, dots] == [FIRST, SECOND, DOTS]
+            && over.is_empty()
+            && left.len() == triangle(COORDINATES);
+        let network = Network::new(network).filter(|_| sound)?;
+        Some(Interaction {
+            head,
+            network,
+            left,
+        })
     }
 
     /// A number of the head.
@@ -109,12 +68,12 @@ impl<'a> Interaction<'a> {
 
     /// The mean and the reciprocal deviation of an input.
     fn scale(&self, input: usize) -> [f32; 2] {
-        [2 * input, 2 * input + 1].map(|nth| self.number(COORDINATES + nth))
+        [2 * input, 2 * input + 1].map(|nth| self.number(nth))
     }
 
     /// The inputs of a pair, as the network takes them.
     fn scaled(&self, both: &Both) -> [f32; INPUTS] {
-        let inputs = both.inputs();
+        let inputs = added(both.inputs());
         core::array::from_fn(|nth| {
             let [mean, per_deviation] = self.scale(nth);
             (inputs[nth] - mean) * per_deviation
@@ -124,7 +83,7 @@ impl<'a> Interaction<'a> {
     /// The factor on the network's outputs, with its slopes by the inputs.
     fn factor(&self, both: &Both) -> [f32; 1 + INPUTS] {
         let [size, part, .., ax, ay, bx, by] = both.inputs();
-        let far_mm = self.number(COORDINATES + 2 * INPUTS);
+        let far_mm = self.number(2 * INPUTS);
         let [x, y] = [ax - bx, ay - by];
         let square = x * x + y * y;
         let all = square + far_mm * far_mm;
@@ -141,114 +100,40 @@ impl<'a> Interaction<'a> {
     }
 
     /// The motion of the images that the mean of single contacts leaves, focal lengths.
-    #[inline(never)]
     pub fn moved(&self, both: &Both) -> Column {
-        let [first, second, last] = &self.layers;
-        let inputs = self.scaled(both);
-        let mut hidden = [[0; 2]; APART];
-        for (number, (bias, step, weights)) in hidden.iter_mut().zip(first.rows()) {
-            let [value, _] = bent(bias + step * sum(weights, &inputs));
-            *number = rounded(LARGEST * value);
-        }
-        let hidden = hidden.get(..WIDTH).unwrap_or_default();
-        let mut outputs = [0.0; COORDINATES];
-        for (nth, four) in second.fours().enumerate() {
-            let sums = products(hidden, four.numbers);
-            for (k, (bias, step)) in four.scales.into_iter().enumerate() {
-                let [value, _] = bent(bias + step * UNIT * short(sums[k]));
-                for (output, (_, _, weights)) in outputs.iter_mut().zip(last.rows()) {
-                    let weight = weights.get(4 * nth + k).copied().unwrap_or_default();
-                    *output += number(weight) * value;
-                }
-            }
-        }
+        let motion = self.network.motion(&self.scaled(both));
         let [factor, ..] = self.factor(both);
-        let outputs = outputs.iter().zip(last.rows());
-        Column::of(outputs.map(|(sum, (bias, step, _))| factor * (step * sum + bias)))
+        Column::of(motion.into_iter().map(|part| factor * part))
     }
 
-    /// Adds that motion to a prediction, and its slopes by the inputs to `slopes`.
+    /// Adds that motion to a prediction, and its slopes by [`Both::inputs`] to `slopes`.
     #[inline(never)]
     pub fn add_to(&self, both: &Both, moved: &mut Column, slopes: &mut [Column; INPUTS]) {
-        let [_, second, last] = &self.layers;
-        let (hidden, units) = self.hidden(both);
-        // A value of the second layer is used at once: there is no room for two layers' values.
-        let mut outputs = [[0.0; 1 + INPUTS]; COORDINATES];
-        for (nth, (bias, step, weights)) in second.rows().enumerate() {
-            let mut sums = [0.0; LANES];
-            let fours = hidden.as_chunks::<4>().0.iter();
-            for (sums, four) in sums.as_chunks_mut().0.iter_mut().zip(fours) {
-                *sums = products(weights, four.as_flattened()).map(short);
-            }
-            let mut value: Value = [0.0; 1 + INPUTS];
-            for ((value, sum), unit) in value.iter_mut().zip(sums).zip(units) {
-                *value = step * unit * sum;
-            }
-            let [bent, slope] = bent(bias + value[0]);
-            value = value.map(|part| slope * part);
-            value[0] = bent;
-            for (output, (_, _, weights)) in outputs.iter_mut().zip(last.rows()) {
-                let weight = number(weights.get(nth).copied().unwrap_or_default());
-                for (sum, value) in output.iter_mut().zip(&value) {
-                    *sum += weight * value;
-                }
-            }
-        }
-        for (output, (bias, step, _)) in outputs.iter_mut().zip(last.rows()) {
-            *output = output.map(|sum| step * sum);
-            output[0] += bias;
-        }
+        let mut lanes = [[0.0; COORDINATES]; 1 + INPUTS];
+        (self.network).put_with_slopes(&self.scaled(both), &mut lanes);
+        let [motion, by_scaled @ ..] = &lanes;
         let [factor, by_inputs @ ..] = self.factor(both);
-        let values = moved.iter_mut().zip(&outputs);
-        for (nth, (moved, [output, of_output @ ..])) in values.enumerate() {
-            *moved += factor * output;
-            let parts = by_inputs.iter().zip(of_output);
-            for (slope, (by_input, of_output)) in slopes.iter_mut().zip(parts) {
+        for (nth, (moved, part)) in moved.iter_mut().zip(motion).enumerate() {
+            *moved += factor * part;
+            let slope = |input: usize| {
+                let [_, per_deviation] = self.scale(input);
+                by_scaled[input]
+                    .get(nth)
+                    .map_or(0.0, |slope| per_deviation * slope)
+            };
+            let of_motion = added(core::array::from_fn(slope));
+            let parts = by_inputs.iter().zip(of_motion);
+            for (slope, (by_input, of_motion)) in slopes.iter_mut().zip(parts) {
                 if let Some(slope) = slope.get_mut(nth) {
-                    *slope += factor * of_output + by_input * output;
+                    *slope += factor * of_motion + by_input * part;
                 }
             }
         }
-    }
-
-    /// The first layer with its slopes, and the units of its sums.
-    #[inline(never)]
-    fn hidden(&self, both: &Both) -> (Hidden, Value) {
-        let [first, ..] = &self.layers;
-        let inputs = self.scaled(both);
-        // The largest slopes of any pair: the neurons' function is nowhere steeper than 1.
-        let mut steepest = [f32::MIN_POSITIVE; INPUTS];
-        for (_, step, weights) in first.rows() {
-            for (most, weight) in steepest.iter_mut().zip(weights) {
-                *most = most.max((step * number(*weight)).abs());
-            }
-        }
-        let mut hidden = [[[0; 2]; APART]; LANES];
-        let [values, slopes @ ..] = &mut hidden;
-        let per_steepest = steepest.map(|most| LARGEST / most);
-        for (nth, (bias, step, weights)) in first.rows().enumerate() {
-            let [value, slope] = bent(bias + step * sum(weights, &inputs));
-            if let Some(place) = values.get_mut(nth) {
-                *place = rounded(LARGEST * value);
-            }
-            let weights = weights.iter().zip(&per_steepest);
-            for (slopes, (weight, per_steepest)) in slopes.iter_mut().zip(weights) {
-                if let Some(place) = slopes.get_mut(nth) {
-                    *place = rounded(step * number(*weight) * slope * per_steepest);
-                }
-            }
-        }
-        let mut units = [UNIT; 1 + INPUTS];
-        for (nth, (unit, most)) in units.iter_mut().skip(1).zip(steepest).enumerate() {
-            let [_, per_deviation] = self.scale(nth);
-            *unit *= most * per_deviation;
-        }
-        (hidden, units)
     }
 
     /// Adds what the network leaves to a covariance.
     pub fn add_uncertainty(&self, both: &Both, covariance: &mut Covariance) {
-        let [factor, ..] = self.factor(both);
+        let of_size = both.size * both.size * both.size * both.size;
         let row = |nth: usize| self.left.get(triangle(nth)..triangle(nth + 1));
         for one in 0..COORDINATES {
             for other in 0..=one {
@@ -259,80 +144,27 @@ impl<'a> Interaction<'a> {
                     let [a, b] = [a, b].map(|part| f32::from_le_bytes(*part));
                     a * b
                 });
-                covariance.add(one, other, factor * factor * products.sum::<f32>());
+                covariance.add(one, other, of_size * products.sum::<f32>());
             }
         }
     }
 }
 
-/// Four outputs of a layer that follow each other.
-struct Four<'a> {
-    /// Bias and step of each.
-    scales: [(f32, f32); 4],
-    /// The weights of the first, and [`APART`] numbers later those of the next.
-    numbers: &'a [Number],
-}
-
-impl<'a> Layer<'a> {
-    /// The outputs in fours. The layer's inputs are [`WIDTH`].
-    fn fours(&self) -> impl Iterator<Item = Four<'a>> {
-        self.bytes.chunks_exact(4 * row(WIDTH)).filter_map(|four| {
-            let scale = |nth: usize| {
-                let (words, _) = four.get(nth * row(WIDTH)..)?.as_chunks::<4>();
-                let ([bias, step], _) = words.split_first_chunk()?;
-                Some((f32::from_le_bytes(*bias), f32::from_le_bytes(*step)))
-            };
-            Some(Four {
-                scales: [scale(0)?, scale(1)?, scale(2)?, scale(3)?],
-                numbers: four.get(8..)?.as_chunks().0,
-            })
-        })
-    }
-
-    /// Bias, step and weights of each output.
-    fn rows(&self) -> impl Iterator<Item = Row<'a>> {
-        let rows = self.bytes.chunks_exact(row(self.inputs).max(1));
-        rows.filter_map(|row| {
-            let ([bias, step], _) = row.as_chunks::<4>().0.split_first_chunk()?;
-            let weights = row.get(8..)?.as_chunks().0;
-            Some((
-                f32::from_le_bytes(*bias),
-                f32::from_le_bytes(*step),
-                weights,
-            ))
-        })
-    }
-}
-
-/// Σ w·x.
-fn sum(weights: &[Number], values: &[f32]) -> f32 {
-    let products = weights.iter().zip(values);
-    products.fold(0.0, |sum, (weight, value)| sum + number(*weight) * value)
-}
-
-fn number(bytes: Number) -> f32 {
-    f32::from(i16::from_le_bytes(bytes))
-}
-
-/// The nearest number; within ±[`LARGEST`] the value of a [`Number`].
-fn rounded(value: f32) -> Number {
-    ((value + 0.5f32.copysign(value)) as i16).to_le_bytes()
-}
-
-/// A sum of products without its last bits.
-fn short(sum: i64) -> f32 {
-    (sum >> LEFT_OUT) as i32 as f32
-}
-
-/// Bytes of an output of a layer.
-const fn row(inputs: usize) -> usize {
-    8 + 2 * inputs
-}
-
-/// The hidden neurons' function x / (1 + |x|), with its slope. It needs no exponential.
-fn bent(x: f32) -> [f32; 2] {
-    let part = 1.0 / (1.0 + x.abs());
-    [x * part, part * part]
+/// Sums and differences of tilts and of places, in place of those of both. It takes slopes by the
+/// former to slopes by the latter, too.
+fn added([size, part, a, b, c, d, x, y, z, w]: [f32; INPUTS]) -> [f32; INPUTS] {
+    [
+        size,
+        part,
+        a + c,
+        b + d,
+        a - c,
+        b - d,
+        x + z,
+        y + w,
+        x - z,
+        y - w,
+    ]
 }
 
 #[cfg(test)]
@@ -382,7 +214,7 @@ mod tests {
             assert!((a - b).abs() < 1e-6, "{a} {b}");
         }
         for (way, slope) in slopes.iter().enumerate().skip(2) {
-            let step = 5e-3;
+            let step = 2e-2;
             let [back, forth] = [-step, step].map(|step| {
                 let mut poses = both.poses;
                 let (number, axis) = ((way - 2) / 2, way % 2);

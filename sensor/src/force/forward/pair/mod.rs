@@ -6,7 +6,8 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `interaction` | the network |
+//! | `interaction` | what a network adds to the mean of single contacts |
+//! | `network` | the network |
 //! | `film` | the positions of all images, with slopes |
 //! | `descent` | steps downhill from a start |
 //! | `search` | where steps begin; both in parts, for a device with little time |
@@ -14,6 +15,7 @@
 mod descent;
 mod film;
 mod interaction;
+mod network;
 mod search;
 
 pub use descent::Problem;

@@ -1,0 +1,108 @@
+//! Measures what the sensor's model leaves of pairs that it has not seen, for the network's file:
+//! `cargo run --release -p hivtac-calibration --example pairs_left -- unseen.csv
+//! sensor/data/pairs-8v.bin`. The pairs are those of `pairs -- unseen.csv 600 unseen`. What is left
+//! has the errors of the network, of the tables and of a coarser mesh.
+
+use std::fs;
+
+use anyhow::{Context, Result, ensure};
+use hivtac_sensor::force::forward::pair::{Both, Interaction, PairPrediction};
+use hivtac_sensor::force::forward::{Forward, Markers, Pose};
+use hivtac_sensor::force::model::Model;
+
+/// Coordinates of the dots' images.
+const COORDINATES: usize = 16;
+/// Numbers at the end of the file: a lower factor of the covariance, row by row.
+const FACTOR: usize = COORDINATES * (COORDINATES + 1) / 2;
+/// Focal length of the camera at 320x240, px.
+const FOCAL_PX: f64 = 175.0;
+const MODEL: &[u8] = include_bytes!("../models/8v/default.hvtm");
+
+type Matrix = [[f64; COORDINATES]; COORDINATES];
+
+fn main() -> Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let pairs = arguments.next().context("name a file of pairs")?;
+    let path = arguments.next().context("name the network's file")?;
+    let mut bytes = fs::read(&path)?;
+    let model = Model::parse(MODEL)
+        .ok()
+        .context("the model is not readable")?;
+    let forward = model.forward.context("the model has no tables")?;
+    let interaction = Interaction::new(&bytes).context("the network is not readable")?;
+    let (mut sum, mut squares, mut count) = (Matrix::default(), 0.0, 0.0);
+    for line in fs::read_to_string(pairs)?.lines() {
+        let numbers: Result<Vec<f64>, _> = line.split(',').map(str::parse).collect();
+        let (left, size) = left(&numbers?, &forward, &interaction)?;
+        count += 1.0;
+        for (row, one) in sum.iter_mut().zip(left) {
+            squares += one * one;
+            for (sum, other) in row.iter_mut().zip(left) {
+                *sum += one * other / size.powi(4);
+            }
+        }
+    }
+    ensure!(count > 0.0, "there are no pairs");
+    let rms_px = FOCAL_PX * (squares / count / COORDINATES as f64).sqrt();
+    println!("{count} pairs: {rms_px:.4} px");
+    let factor = lower_factor(&sum.map(|row| row.map(|part| part / count)));
+    let end = bytes.len() - 4 * FACTOR;
+    bytes.truncate(end);
+    bytes.extend(factor.iter().flat_map(|part| part.to_le_bytes()));
+    Ok(fs::write(path, bytes)?)
+}
+
+/// What the model leaves of a pair's motion, focal lengths, and the size of both.
+fn left(
+    numbers: &[f64],
+    forward: &Forward<'_>,
+    interaction: &Interaction<'_>,
+) -> Result<([f64; COORDINATES], f64)> {
+    let part = |from: usize, count: usize| {
+        let parts = numbers.get(from..from + count);
+        parts.context("a line is too short")
+    };
+    let poses = [0, 1].map(|k| -> Result<Pose> {
+        let force_n: [f64; 3] = part(3 * k, 3)?.try_into()?;
+        let place_mm: [f64; 2] = part(6 + 2 * k, 2)?.try_into()?;
+        Ok(Pose::of_force(
+            force_n.map(|own| own as f32),
+            place_mm.map(|own| own as f32),
+            &forward.stiffness,
+            &forward.limits,
+        ))
+    });
+    let [first, second] = poses;
+    let both = Both::new([first?, second?], forward);
+    let mut told = PairPrediction::default();
+    told.put(&both, forward, interaction, &Markers::defaults(8));
+    let mut left: [f64; COORDINATES] = part(10, COORDINATES)?.try_into()?;
+    for (left, told) in left.iter_mut().zip(told.moved.iter()) {
+        *left -= f64::from(*told);
+    }
+    Ok((left, f64::from(both.size)))
+}
+
+/// Cholesky's lower factor, row by row.
+fn lower_factor(matrix: &Matrix) -> Vec<f32> {
+    let mut factor = Matrix::default();
+    for i in 0..COORDINATES {
+        for j in 0..=i {
+            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
+            let rest = matrix[i][j] - known;
+            factor[i][j] = if i == j {
+                rest.sqrt()
+            } else {
+                rest / factor[j][j]
+            };
+        }
+    }
+    let rows = factor.iter().enumerate();
+    rows.flat_map(|(i, row)| {
+        row[..=i]
+            .iter()
+            .map(|part| *part as f32)
+            .collect::<Vec<_>>()
+    })
+    .collect()
+}
