@@ -7,14 +7,16 @@
 
 use super::hand::{MOST_N, Touch};
 use hivtac_sensor::force::forward::pair::{Both, Interaction};
-use hivtac_sensor::force::forward::{Forward, Pose};
+use hivtac_sensor::force::forward::{Column, Forward, Pose};
 use hivtac_sensor::force::model::Model;
-use hivtac_twin::{Layout, Load, Scene};
+use hivtac_twin::{Disc, Layout, Load, Scene};
 
 /// How far from its middle a dot moves as one, mm.
 const DOT_MM: f64 = 1.0;
 /// Step for the slopes of a dot's image, mm.
 const STEP_MM: f64 = 0.01;
+/// Corrections of a dot's shift, each from the slopes where the last one led.
+const CORRECTIONS: usize = 2;
 
 /// What two contacts on a film with these dots do together.
 #[derive(Clone, Debug)]
@@ -56,14 +58,14 @@ impl PairFilm {
             scene.pressed(&load(whole)?).ok()
         });
         let (first, second) = (first?, second?);
-        let mean = move |rest: [f64; 2]| -> [f64; 3] {
-            let [a, b] = [&first, &second].map(|film| film.displacement(rest));
+        let alone = move |rest: [f64; 2]| [&first, &second].map(|film| film.displacement(rest));
+        let mean = move |[a, b]: [[f64; 3]; 2]| -> [f64; 3] {
             [0, 1, 2].map(|i| part * a[i] + (1.0 - part) * b[i])
         };
-        let shifts = self.shifts(scene, touches, &mean)?;
+        let shifts = self.shifts(scene, touches, (&alone, &mean))?;
         let dots_mm = self.dots_mm.clone();
         Some(move |rest: [f64; 2]| {
-            let [x, y, z] = mean(rest);
+            let [x, y, z] = mean(alone(rest));
             let near = |dot: &[f64; 2]| libm::hypot(rest[0] - dot[0], rest[1] - dot[1]) < DOT_MM;
             let [right, down] = dots_mm
                 .iter()
@@ -73,13 +75,53 @@ impl PairFilm {
         })
     }
 
-    /// The shift of each dot along the film, mm, that moves its image as the network says.
+    /// The shift of each dot along the film, mm, that moves its image from the mean of the single
+    /// contacts' images as the network says. The image of the mean film is elsewhere: a picture
+    /// of a mean is no mean of pictures.
     fn shifts(
         &self,
         scene: &Scene,
         touches: [Touch; 2],
-        mean: &impl Fn([f64; 2]) -> [f64; 3],
+        (alone, mean): (
+            &impl Fn([f64; 2]) -> [[f64; 3]; 2],
+            &impl Fn([[f64; 3]; 2]) -> [f64; 3],
+        ),
     ) -> Option<Vec<[f64; 2]>> {
+        let moved = self.moved(touches)?;
+        let camera = scene.camera();
+        let shifts = self.dots_mm.iter().enumerate().map(|(id, dot)| {
+            let disc = Disc::marker(*dot);
+            let [a, b] = [0, 1].map(|which| disc.centroid_px(|rest| alone(rest)[which], camera));
+            let wanted = [0, 1].map(|axis| {
+                let [mean_px, ..] = mean([[a[axis]; 3], [b[axis]; 3]]);
+                mean_px + f64::from(moved.at(2 * id + axis)) * camera.focal_px()
+            });
+            let at = |[right, down]: [f64; 2]| {
+                let shifted = |rest| {
+                    let [x, y, z] = mean(alone(rest));
+                    [x + right, y + down, z]
+                };
+                disc.centroid_px(shifted, camera)
+            };
+            (0..CORRECTIONS).fold([0.0; 2], |[right, down], _| {
+                let here = at([right, down]);
+                let slope =
+                    |there: [f64; 2]| [0, 1].map(|axis| (there[axis] - here[axis]) / STEP_MM);
+                let [a, c] = slope(at([right + STEP_MM, down]));
+                let [b, d] = slope(at([right, down + STEP_MM]));
+                let px = [0, 1].map(|axis| wanted[axis] - here[axis]);
+                let whole = a * d - b * c;
+                [
+                    right + (d * px[0] - b * px[1]) / whole,
+                    down + (a * px[1] - c * px[0]) / whole,
+                ]
+            })
+        });
+        Some(shifts.collect())
+    }
+
+    /// The motion of the images that the network adds, focal lengths.
+    fn moved(&self, touches: [Touch; 2]) -> Option<Column> {
         let [first, second] = touches.map(|touch| {
             let force_n = load(touch)?.vector_n().map(|part| part as f32);
             let place_mm = touch.place_mm.map(|part| part as f32);
@@ -88,26 +130,8 @@ impl PairFilm {
             } = &self.forward;
             Some(Pose::of_force(force_n, place_mm, stiffness, limits))
         });
-        let moved = self
-            .interaction
-            .moved(&Both::new([first?, second?], &self.forward));
-        let camera = scene.camera();
-        let shifts = self.dots_mm.iter().enumerate().map(|(id, dot)| {
-            let [x, y, z] = mean(*dot);
-            let at =
-                |right: f64, down: f64| camera.project([dot[0] + x + right, dot[1] + y + down, z]);
-            let (here, [a, c], [b, d]) = (at(0.0, 0.0), at(STEP_MM, 0.0), at(0.0, STEP_MM));
-            let slope = |there: f64, from: f64| (there - from) / STEP_MM;
-            let [a, b] = [slope(a, here[0]), slope(b, here[0])];
-            let [c, d] = [slope(c, here[1]), slope(d, here[1])];
-            let px = [2 * id, 2 * id + 1].map(|k| f64::from(moved.at(k)) * camera.focal_px());
-            let whole = a * d - b * c;
-            [
-                (d * px[0] - b * px[1]) / whole,
-                (a * px[1] - c * px[0]) / whole,
-            ]
-        });
-        Some(shifts.collect())
+        let both = Both::new([first?, second?], &self.forward);
+        Some(self.interaction.moved(&both))
     }
 }
 
