@@ -17,7 +17,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold};
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_tests::artifact;
-use hivtac_twin::{Format, Layout, Scene, Shutter};
+use hivtac_twin::{Disc, Format, Layout, Scene, Shutter};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::health::Health;
 use hivtac_wire::message::{
@@ -333,6 +333,9 @@ const NEEDLES: [Touch; 2] = [
         angles_deg: [0.0, 4.0],
     },
 ];
+/// Corrections of a dot's place by its image, and about what they take for a pixel.
+const CORRECTIONS: usize = 12;
+const MM_PER_PX: f64 = 0.05;
 /// Samples until both are found and followed.
 const SAMPLES_OF_TWO: usize = 220;
 /// The first of them, of which the program looks closely at each.
@@ -344,13 +347,26 @@ const FRAMES_REFUSED: u32 = 64;
 const TORN: [usize; 3] = [1, 4, 6];
 const TORN_MM: f64 = 0.2;
 
-/// How the dots of eight move under two needles, mm, as the sensing's model has it.
+/// How the dots of eight move under two needles, mm, so that their images are where the sensing's
+/// model has them: in a scene they stay flat.
 fn moved_by_two() -> Vec<[f64; 3]> {
     let scene = Kind::Ov7725.scene("rest", eight_dots(), SEED).unwrap();
     let model = Kind::Ov7725.model(eight_dots());
     let film = PairFilm::of(model, eight_dots()).unwrap();
     let moved = film.displacement(&scene, NEEDLES).unwrap();
-    eight_dots().centres_mm().into_iter().map(moved).collect()
+    let flat = |dot| {
+        let (disc, camera) = (Disc::marker(dot), scene.camera());
+        let wanted = disc.centroid_px(&moved, camera);
+        let mut flat = moved(dot);
+        for _ in 0..CORRECTIONS {
+            let here = disc.centroid_px(|_| flat, camera);
+            for axis in [0, 1] {
+                flat[axis] += MM_PER_PX * (wanted[axis] - here[axis]);
+            }
+        }
+        flat
+    };
+    eight_dots().centres_mm().into_iter().map(flat).collect()
 }
 
 /// The samples of a device with eight dots that moved by this, mm. A twin makes the same of the
