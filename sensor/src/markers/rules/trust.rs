@@ -105,8 +105,7 @@ impl Trust {
     /// taken on this unit; `reading` is the kind of contact.
     pub fn new(settings: &Settings, rest: &[Marker; 4], own_rest: bool, reading: Reading) -> Trust {
         let geometry = &settings.geometry;
-        let centroids = rest.map(|marker| (marker.x, marker.y));
-        let at_rest = Pattern::of_centroids(centroids);
+        let at_rest = Pattern::of_centroids(rest.map(|marker| (marker.x, marker.y)));
         let (grid, grid_of_means) = grid(settings.threshold.format());
         let displacement = match settings.centroid {
             CentroidEstimator::RednessWeighted => grid_of_means * reading.displacement,
@@ -115,10 +114,10 @@ impl Trust {
         let hollow = HOLLOW[usize::from(settings.dilations.min(MAX_DILATIONS))];
         let rest_width = geometry.across(geometry.rest_distance());
         Trust {
-            edges: core::array::from_fn(|identity| {
-                let distance = distance(centroids[identity], at_rest.center);
+            edges: rest.map(|marker| {
+                let distance = distance((marker.x, marker.y), at_rest.center);
                 let distance = Px((distance * Px::ONE.0 as f32) as i32);
-                edge_at_rest(geometry, distance, rest[identity].area)
+                edge_at_rest(geometry, distance, marker.area)
             }),
             by_rest_width: 1.0 / rest_width.to_f32().max(LEAST_LENGTH),
             by_half_side: 1.0 / at_rest.half_side.max(LEAST_LENGTH),
