@@ -238,7 +238,8 @@ fn channel((bias, step, weights): Row<'_>, inputs: &[f32; INPUTS]) -> [Images; 2
         sums[parity % IMAGES] += step * number(*weight) * input;
     }
     let bent = mixed(sums).map(bent);
-    [0, 1].map(|which| mixed(bent.map(|both| both[which] / IMAGES as f32)))
+    let [values, slopes] = [bent.map(|[value, _]| value), bent.map(|[_, slope]| slope)];
+    [values, slopes].map(|images| mixed(images.map(|image| image / IMAGES as f32)))
 }
 
 /// From parities to images, and from images to sums of each parity.
