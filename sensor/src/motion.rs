@@ -8,14 +8,22 @@
 //! Using two frames instead of one changes a position's noise. At rest the weights are 1 − c and c,
 //! with c = (y − middle) / L. For markers 54 rows off the middle of 278 lines, the upper ones have
 //! 1.21 times the noise, the lower ones 0.83 times.
+//!
+//! Markers whose velocity changes were not moved as far as that: a hit, a slip that begins, or a
+//! grip that opens. The change of their motion from frame to frame limits the error, which the
+//! forces then state ([`Motion::unsteadiness`]).
 
 use crate::markers::lost::Lost;
+use crate::markers::sqrt;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::units::Px;
 
 /// The most frames that may be missed between two of which the motion is told. The mean motion over
 /// more says little about that during a frame.
 const MOST_MISSED: u16 = 7;
+/// A change of a marker's motion, in px from frame to frame, that may be the modelled noise: one
+/// and a half times its root mean square.
+const STEADY_PX: f32 = 0.06;
 
 /// The previous frame's markers, from which those of the current frame have moved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,6 +31,8 @@ pub struct Motion {
     /// Lines from frame to frame, blank ones included; `None` with a global shutter.
     lines: Option<u16>,
     before: Option<Seen>,
+    /// The frame right before that one; `None` if frames were missed since.
+    earlier: Option<Seen>,
     /// The markers of the current frame, which may be looked at again.
     now: Option<Seen>,
     /// Frames missed between the previous frame and the current one.
@@ -51,6 +61,7 @@ impl Motion {
         Motion {
             lines: Some(lines),
             before: None,
+            earlier: None,
             now: None,
             missed: 0,
             missing: 0,
@@ -64,7 +75,7 @@ impl Motion {
 
     /// Call before a frame that the previous one says nothing about.
     pub fn forget(&mut self) {
-        (self.before, self.now) = (None, None);
+        (self.before, self.earlier, self.now) = (None, None, None);
     }
 
     /// Call before a frame, for frames that were missed before it.
@@ -75,18 +86,29 @@ impl Motion {
 
     /// Call at the beginning of each frame.
     pub fn begin_frame(&mut self) {
+        let missed_before = self.missed;
         self.missed = core::mem::take(&mut self.missing);
         let is_near = self.missed <= MOST_MISSED;
+        let none_is_missed = missed_before == 0 && self.missed == 0;
+        self.earlier = self.before.take().filter(|_| none_is_missed);
         self.before = self.now.take().filter(|_| is_near);
     }
 
     /// Call at the end of each frame, with its markers and those that are lost, whose places are
-    /// not used; `None` if it showed no markers.
+    /// not used. A frame that showed no markers, `None`, is as one that was missed.
     pub fn ended(&mut self, seen: Option<(&MarkerList, Lost)>) {
-        self.now = seen.map(|(markers, lost)| Seen {
-            markers: *markers,
-            lost,
-        });
+        match seen {
+            Some((markers, lost)) => {
+                self.now = Some(Seen {
+                    markers: *markers,
+                    lost,
+                });
+            }
+            None => {
+                self.now = self.before.take();
+                self.missing = self.missed.saturating_add(1);
+            }
+        }
     }
 
     /// Returns the markers as they were while the middle row of a frame of `rows` rows was exposed.
@@ -105,6 +127,44 @@ impl Motion {
         }
         Some(moved)
     }
+
+    /// Returns the standard uncertainty, on each axis, with which markers are where
+    /// [`Motion::at_the_middle`] says: 0 while their motion is steady, or with a global shutter.
+    /// Without an earlier frame that shows a marker, the marker rested before. `noise` is the
+    /// factor on the modelled noise.
+    pub fn unsteadiness(&self, seen: &MarkerList, lost: Lost, rows: u16, noise: f32) -> Px {
+        let Some((lines, before)) = self.lines.zip(self.before.as_ref()) else {
+            return Px(0);
+        };
+        let earlier = self.earlier.as_ref();
+        let steady = STEADY_PX * noise;
+        let (mut sum, mut count) = (0.0, 0.0);
+        for (identity, (now, then)) in seen.iter().zip(before.markers.iter()).enumerate() {
+            if lost.contains(identity) || before.lost.contains(identity) {
+                continue;
+            }
+            let first = earlier
+                .filter(|earlier| !earlier.lost.contains(identity))
+                .and_then(|earlier| earlier.markers.get(identity))
+                .unwrap_or(then);
+            let [x, y] = [[now.x, then.x, first.x], [now.y, then.y, first.y]].map(change);
+            let lines = (f32::from(self.missed) + 1.0) * f32::from(lines);
+            let late = below_middle(now, rows).to_f32() / lines;
+            sum += (x * x + y * y - steady * steady).max(0.0) * late * late;
+            count += 1.0;
+        }
+        Px::of_f32(sqrt(sum / f32::max(count, 1.0)))
+    }
+}
+
+/// How much farther a coordinate moved, px, than from the first frame to the second.
+fn change([now, then, first]: [Px; 3]) -> f32 {
+    Px(now.0 - 2 * then.0 + first.0).to_f32()
+}
+
+/// How far below the middle row a marker is.
+fn below_middle(marker: &Marker, rows: u16) -> Px {
+    Px(marker.y.0 - ((i32::from(rows) - 1) << 15))
 }
 
 /// `lines` are those from `before` to `marker`'s frame. Coordinates are below 2¹⁰ px, 2²⁶ in
@@ -112,8 +172,7 @@ impl Motion {
 /// has more lines than rows.
 #[inline(never)]
 fn move_to_the_middle(marker: &mut Marker, before: &Marker, rows: u16, lines: i64) {
-    let middle = (i64::from(rows) - 1) << 15;
-    let below = i64::from(marker.y.0) - middle;
+    let below = i64::from(below_middle(marker, rows).0);
     let lines = (lines << 16) + i64::from(marker.y.0) - i64::from(before.y.0);
     let back = |now: Px, before: Px| {
         let moved = i64::from(now.0) - i64::from(before.0);
@@ -175,6 +234,77 @@ mod tests {
     }
 
     #[test]
+    fn a_frame_without_markers_is_as_one_that_was_missed() {
+        let frame = |x: f64| MarkerList::from(PLACES.map(|[x0, y]| marker(x0 + x, y)));
+        let moved = |between: &dyn Fn(&mut Motion)| {
+            let mut motion = Motion::rolling(LINES);
+            motion.ended(Some((&frame(0.0), Lost::NONE)));
+            between(&mut motion);
+            motion.begin_frame();
+            motion.at_the_middle(&frame(4.0), Lost::NONE, ROWS)
+        };
+        let unseen = |motion: &mut Motion| {
+            motion.begin_frame();
+            motion.ended(None);
+        };
+        let missed = moved(&|motion| motion.miss(2));
+        assert!(missed.is_some());
+        assert_eq!(moved(&|motion| (0..2).for_each(|_| unseen(motion))), missed);
+        let long = moved(&|motion| (0..=MOST_MISSED).for_each(|_| unseen(motion)));
+        assert_eq!(long, None);
+    }
+
+    /// At rest, then moved by these distances, px, from frame to frame.
+    fn unsteady(moved: &[f64]) -> f64 {
+        let mut motion = Motion::rolling(LINES);
+        let mut x = 0.0;
+        let mut unsteady = Px(0);
+        for by in [0.0, 0.0].iter().chain(moved) {
+            x += by;
+            let now = MarkerList::from(PLACES.map(|[x0, y]| marker(x0 + x, y)));
+            motion.begin_frame();
+            unsteady = motion.unsteadiness(&now, Lost::NONE, ROWS, 1.0);
+            motion.ended(Some((&now, Lost::NONE)));
+        }
+        unsteady.to_f64()
+    }
+
+    #[test]
+    fn markers_are_uncertain_while_their_motion_changes() {
+        let late = 54.5 / f64::from(LINES);
+        for (moved, expected) in [
+            (&[][..], 0.0),
+            (&[3.0], 3.0),
+            (&[3.0, 3.0], 0.0),
+            (&[3.0, 3.0, -1.0], 4.0),
+            (&[0.05], 0.0),
+            (&[1.0, 1.05], 0.0),
+        ] {
+            let off = unsteady(moved) - late * expected;
+            assert!(off.abs() < 2e-3, "{moved:?}: {off}");
+        }
+    }
+
+    #[test]
+    fn after_missed_frames_markers_rested_before() {
+        let mut motion = Motion::rolling(LINES);
+        let at = |x| MarkerList::from(PLACES.map(|[x0, y]| marker(x0 + x, y)));
+        for x in [0.0, 4.0] {
+            motion.begin_frame();
+            motion.ended(Some((&at(x), Lost::NONE)));
+        }
+        motion.miss(1);
+        motion.begin_frame();
+        let unsteady = motion
+            .unsteadiness(&at(12.0), Lost::NONE, ROWS, 1.0)
+            .to_f64();
+        let late = 54.5 / f64::from(2 * LINES);
+        assert!((unsteady - late * 8.0).abs() < 2e-3, "{unsteady}");
+        let global = Motion::GLOBAL.unsteadiness(&at(12.0), Lost::NONE, ROWS, 1.0);
+        assert_eq!(global, Px(0));
+    }
+
+    #[test]
     fn a_frame_that_is_long_ago_says_nothing() {
         let now = MarkerList::from(PLACES.map(|[x, y]| marker(x, y)));
         for missed in [MOST_MISSED + 1, u16::MAX] {
@@ -205,10 +335,6 @@ mod tests {
                 .is_some_and(|moved| moved != now)
         );
         motion.forget();
-        assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
-        motion.ended(Some((&before, Lost::NONE)));
-        motion.ended(None);
-        motion.begin_frame();
         assert_eq!(motion.at_the_middle(&now, Lost::NONE, ROWS), None);
         let mut global = Motion::GLOBAL;
         global.ended(Some((&before, Lost::NONE)));

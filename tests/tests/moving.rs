@@ -7,11 +7,12 @@
 use std::fs;
 use std::path::Path;
 
+use hivtac_sensor::force::Force;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::threshold::ByteOrder;
-use hivtac_twin::{Motion, Preset, Scene, Shutter, Vibration};
+use hivtac_twin::{Catch, Load, Motion, Preset, Scene, Shutter, Vibration};
 
 /// Number of lines of an OV7725's frame; 240 of them are rows.
 const LINES: u16 = 278;
@@ -151,4 +152,70 @@ fn a_force_that_changes_is_measured_as_one_that_stays() {
             assert!(worth, "{name} N/s at {rate_hz} Hz: {seen:?} {moved:?}");
         }
     }
+}
+
+/// Hits of an object that is then held, 6 to 12 Hz: |F| changes by up to a fifth from frame to
+/// frame, and so does the place.
+fn hits() -> Vec<Scene> {
+    let still = Scene::preset("static", Preset::Ov7725, 320, 240, 5).unwrap();
+    let hit = |frequency_hz| {
+        let catch = Catch {
+            peak_n: 0.12,
+            hold_n: 0.05,
+            frequency_hz,
+            start_s: 0.1,
+            ..Catch::default()
+        };
+        still.clone().with_motion(Motion::Catch(catch)).unwrap()
+    };
+    [6.0, 9.0, 12.0].map(hit).into()
+}
+
+/// Whether direction, |F| and place are within three of their stated standard uncertainties; the
+/// place is off along two axes.
+fn is_covered(force: &Force, truth: &Load) -> bool {
+    let found_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    let place = force.place.unwrap();
+    let [x, y] = truth.offset_mm();
+    let off = [
+        angle_deg(found_n, truth.vector_n()) * 1e3 / f64::from(force.direction_sigma.0),
+        (f64::from(force.magnitude.0) - truth.magnitude_n() * 1e6).abs()
+            / f64::from(force.magnitude_sigma.0),
+        (f64::from(place.x.0) - x * 1e3).hypot(f64::from(place.y.0) - y * 1e3)
+            / f64::from(place.sigma.0)
+            / std::f64::consts::SQRT_2,
+    ];
+    off.iter().all(|off| *off <= 3.0)
+}
+
+#[test]
+fn forces_of_hits_are_kept_and_within_three_sigma() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    let model = fs::read(root.join("calibration/models/default.hvtm")).unwrap();
+    let shutter = Shutter {
+        exposure_s: EXPOSURE_S,
+        readout_s: 240.0 / f64::from(LINES) / RATES[0],
+    };
+    let [mut frames, mut refused, mut beyond] = [0; 3];
+    for scene in hits() {
+        let mut sensor = sensor(&model, motion::Motion::rolling(LINES));
+        for number in 0..FRAMES {
+            let frame = scene.frame_by(&shutter, number, number as f64 / RATES[0]);
+            let force = sensor.measure_frame(&frame.pixels).force;
+            let truth = frame.truth.force;
+            if truth.magnitude_n() < 2e-3 {
+                continue;
+            }
+            frames += 1;
+            refused += u32::from(force.is_none());
+            beyond += u32::from(force.is_some_and(|force| !is_covered(&force, &truth)));
+        }
+    }
+    println!("{refused} of {frames} refused, {beyond} beyond three sigma");
+    // Some first and last frames of a contact, in which the pattern is not square.
+    assert!(
+        frames > 100 && 15 * refused <= frames,
+        "{refused} of {frames}"
+    );
+    assert!(100 * beyond <= frames, "{beyond} of {frames}");
 }

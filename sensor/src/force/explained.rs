@@ -195,7 +195,8 @@ impl Resting {
     ) -> Observed<'a> {
         let (mut moved, mut noise) = (Column::defaults(2 * self.px.len()), List::default());
         let scale = self.mounting.scale();
-        let blur = scale * frame.blur.to_f32();
+        let [blur, motion] = [frame.blur, frame.motion].map(|px| scale * px.to_f32());
+        let blurred = blur * blur + motion * motion;
         let at_rest = self.px.iter().zip(self.areas.iter());
         let pairs = markers.iter().zip(at_rest).zip(moved.as_chunks_mut().0);
         for (k, ((marker, ([x, y], area)), moved)) in pairs.enumerate() {
@@ -214,7 +215,7 @@ impl Resting {
                 // Limited from below: a law that falls to 0 within the areas would make a marker
                 // certain.
                 let seen = frame.times * scale * at_rest * growth.max(0.1);
-                seen * seen + blur * blur
+                seen * seen + blurred
             });
             noise.push(forward.rest_image.noise(k, variances));
         }

@@ -30,6 +30,9 @@ pub struct FrameNoise {
     pub times: f32,
     /// An additional standard uncertainty of each coordinate, 0 or more.
     pub blur: Px,
+    /// Another one, of markers whose motion changes
+    /// ([`Motion::unsteadiness`](crate::motion::Motion::unsteadiness)).
+    pub motion: Px,
 }
 
 impl FrameNoise {
@@ -37,6 +40,7 @@ impl FrameNoise {
     pub const AS_MODELLED: FrameNoise = FrameNoise {
         times: 1.0,
         blur: Px(0),
+        motion: Px(0),
     };
 }
 
@@ -52,6 +56,8 @@ pub struct NoiseLevel {
     /// The same over more frames, within the scatter of `variance`: it shows noise that is a little
     /// larger than modelled.
     lasting: f32,
+    /// Uncertainty of the current frame's markers by their motion.
+    motion: Px,
 }
 
 impl NoiseLevel {
@@ -61,6 +67,7 @@ impl NoiseLevel {
         now: None,
         variance: 1.0,
         lasting: 1.0,
+        motion: Px(0),
     };
 
     /// Call before a frame that does not immediately follow the previous one.
@@ -71,6 +78,12 @@ impl NoiseLevel {
     /// Call at the beginning of each frame.
     pub fn begin_frame(&mut self) {
         self.before = self.now.take();
+        self.motion = Px(0);
+    }
+
+    /// Sets the uncertainty of the current frame's markers by their motion.
+    pub fn set_motion(&mut self, motion: Px) {
+        self.motion = motion;
     }
 
     /// Returns the noise to expect of a frame, at least the model's, with this additional blur.
@@ -80,6 +93,7 @@ impl NoiseLevel {
         FrameNoise {
             times: sqrt(variance),
             blur,
+            motion: self.motion,
         }
     }
 

@@ -406,8 +406,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         };
         let rows = self.settings.geometry.height;
         let moved = seen.and_then(|seen| {
-            let seen_list = MarkerList::from(seen.markers);
-            let moved = self.motion.at_the_middle(&seen_list, Lost::NONE, rows)?;
+            let markers = MarkerList::from(seen.markers);
+            let moved = at_the_middle(&self.motion, &mut self.noise, &markers, Lost::NONE, rows)?;
             Some(seen.moved_to(moved.array()))
         });
         let still = moved.as_ref().or(seen);
@@ -570,6 +570,20 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
         Some(force)
     }
+}
+
+/// Returns the markers as [`Motion::at_the_middle`] does, and tells `noise` how uncertain their
+/// motion makes them.
+fn at_the_middle(
+    motion: &Motion,
+    noise: &mut NoiseLevel,
+    seen: &MarkerList,
+    lost: Lost,
+    rows: u16,
+) -> Option<MarkerList> {
+    let times = noise.of_frame(Px(0)).times;
+    noise.set_motion(motion.unsteadiness(seen, lost, rows, times));
+    motion.at_the_middle(seen, lost, rows)
 }
 
 impl<const BLOBS: usize, T: Table> Default for Sensor<'_, BLOBS, T> {

@@ -6,7 +6,7 @@
 //! from the others ([`Status::MARKER_LOST`]), with its own uncertainty.
 
 use super::again::BLUR;
-use super::{Look, Measurement, Prepared, Sensor};
+use super::{Look, Measurement, Prepared, Sensor, at_the_middle};
 use crate::force::features::Features;
 use crate::force::forward::{Column, Estimate, Forward, Pose, Start};
 use crate::force::rest::Rest;
@@ -162,9 +162,13 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let prepared = self.prepared.as_ref();
         let mut status = prepared.map_or(Status::OK, |prepared| prepared.standing);
         let rows = self.settings.geometry.height;
-        let moved = self
-            .motion
-            .at_the_middle(&placed.markers, placed.lost, rows);
+        let moved = at_the_middle(
+            &self.motion,
+            &mut self.noise,
+            &placed.markers,
+            placed.lost,
+            rows,
+        );
         let still = Placed {
             markers: moved.unwrap_or(placed.markers),
             ..placed

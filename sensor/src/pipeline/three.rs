@@ -10,7 +10,7 @@
 //! forwards. A frame that three markers do not explain stays refused for its first reason, as does
 //! a contact near the lost marker: the others hardly see it.
 
-use super::{Measurement, Sensor};
+use super::{Measurement, Sensor, at_the_middle};
 use crate::markers::lost::Lost;
 use crate::markers::tables::Table;
 use hivtac_terms::force::ContactList;
@@ -50,9 +50,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             .finder
             .find_three(self.scanner.blobs(), &rest, trust)?;
         let (seen, lost) = (&three.markers, three.lost);
-        let rows = self.settings.geometry.height;
         let (seen, lost_one) = (MarkerList::from(*seen), Lost::only(lost));
-        let moved = self.motion.at_the_middle(&seen, lost_one, rows);
+        let rows = self.settings.geometry.height;
+        let moved = at_the_middle(&self.motion, &mut self.noise, &seen, lost_one, rows);
         let mut markers = moved.unwrap_or(seen);
         let noise = self.noise.of_frame(Px(0));
         let (estimate, at) = resting.estimate_of_three(forward, &markers, lost, noise);

@@ -11,14 +11,16 @@
 //! distance · (1 + 10 mN / |F|) + σ · (1/8 + |ΔF| / 2|F|)
 //!
 //! with the smaller |F| of the two frames, ΔF the vector between their forces, and σ the place's
-//! stated uncertainty. It must also have moved by three times the noise of the frames between: the
+//! stated uncertainty. The places of a frame whose markers change their motion are less certain
+//! than those of the steady frames beside it: twice that difference of σ is added for either frame.
+//! It must also have moved by three times the noise of the frames between: the
 //! mean length of the place's second differences, which are 0 in a steady motion. A slip begins
 //! with the second such frame in a row: when a force begins to change, a rolling shutter gives one
 //! frame whose markers do not move as before. While it slips, three fifths of the distance are
 //! enough.
 
 use super::SlipLimits;
-use crate::force::{Force, Place};
+use crate::force::Force;
 use hivtac_terms::division::Divisor;
 use hivtac_terms::root::root;
 use hivtac_terms::units::MicroNewtons;
@@ -30,6 +32,10 @@ const FRAMES: usize = 32;
 const DOUBLES_AT: u64 = 10_000;
 /// A place must have moved by this many mean second differences.
 const NOISES: u64 = 3;
+/// Larger uncertainties of a place count as this large, µm.
+const LARGEST_SIGMA: u32 = 1 << 30;
+/// A place of an uncertain frame must have moved by this many times what its σ is larger.
+const UNSTEADY: u64 = 2;
 /// Fraction of the distance that is enough while it slips.
 const GOES_ON: [u64; 2] = [3, 5];
 
@@ -43,6 +49,8 @@ struct Seen {
     /// µN.
     force: [i32; 3],
     magnitude: u32,
+    /// The place's stated uncertainty, µm.
+    sigma: u32,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -64,6 +72,7 @@ impl Slip {
             place: [0; 2],
             force: [0; 3],
             magnitude: 0,
+            sigma: 0,
         }; FRAMES],
         count: 0,
         next: 0,
@@ -92,9 +101,10 @@ impl Slip {
             place: [place.x.0, place.y.0],
             force: force.cartesian.map(|part| part.0),
             magnitude: force.magnitude.0.unsigned_abs().max(1),
+            sigma: place.sigma.0.min(LARGEST_SIGMA),
         };
         self.forget_older(time_us as u32, limits.within.0.saturating_mul(1_000));
-        let moved = is_pulled(force, limits) && self.has_moved(limits, &seen, &place);
+        let moved = is_pulled(force, limits) && self.has_moved(limits, &seen);
         self.slips = moved && self.moved;
         self.moved = moved;
         self.keep(seen);
@@ -122,16 +132,19 @@ impl Slip {
         self.count = (self.count + 1).min(FRAMES);
     }
 
-    fn has_moved(&self, limits: &SlipLimits, now: &Seen, place: &Place) -> bool {
+    fn has_moved(&self, limits: &SlipLimits, now: &Seen) -> bool {
         let distance = match self.slips {
             true => u64::from(limits.distance.0) * GOES_ON[0] / GOES_ON[1],
             false => limits.distance.0.into(),
         };
+        let steady = self
+            .newest()
+            .fold(now.sigma, |least, seen| least.min(seen.sigma));
         let mut noise = None;
         self.newest().any(|before| {
             let moved = far(now.place, before.place);
             moved >= distance
-                && moved >= least_moved(distance, now, before, place)
+                && moved >= least_moved(distance, now, before, steady)
                 && moved >= *noise.get_or_insert_with(|| NOISES * self.noise(now))
         })
     }
@@ -171,17 +184,20 @@ fn length(x: i64, y: i64) -> u32 {
     root((x * x + y * y) as u64)
 }
 
-/// How far a place must have moved from one frame to another, µm.
-fn least_moved(distance: u64, now: &Seen, before: &Seen, place: &Place) -> u64 {
+/// How far a place must have moved from one frame to another, µm; `steady` is the least σ of the
+/// frames between.
+fn least_moved(distance: u64, now: &Seen, before: &Seen, steady: u32) -> u64 {
     let pairs = now.force.iter().zip(&before.force);
     let squares = pairs.map(|(now, before)| u64::from(now.abs_diff(*before).min(1 << 30)).pow(2));
     let change = u64::from(root(squares.sum()));
     let smaller = Divisor::new(now.magnitude.min(before.magnitude));
-    let sigma = u64::from(place.sigma.0.min(1 << 30));
+    let [now, before, steady] = [now.sigma, before.sigma, steady].map(u64::from);
+    let unsteady = (now + before).saturating_sub(2 * steady);
     distance
         + smaller.quotient(distance * DOUBLES_AT)
-        + sigma / 8
-        + smaller.quotient(sigma * change) / 2
+        + now / 8
+        + smaller.quotient(now * change) / 2
+        + UNSTEADY * unsteady
 }
 
 /// Whether the force along the film is a large enough part of the force into it.
@@ -195,6 +211,7 @@ fn is_pulled(force: &Force, limits: &SlipLimits) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::force::Place;
     use crate::temporal::tests::force_of;
     use hivtac_terms::units::{Micrometres, Permille, SignedMicrometres};
     use proptest::prelude::*;
@@ -296,6 +313,26 @@ mod tests {
         };
         assert!(!told(250));
         assert!(told(3), "a model that knows the place");
+    }
+
+    /// A hit: for two frames the place is 300 µm off, as their stated uncertainty allows.
+    #[test]
+    fn places_of_uncertain_frames_do_not_slip() {
+        let told = |sigma: u32| {
+            let mut slip = Slip::NONE;
+            (0..40).any(|k: i32| {
+                let is_hit = k == 20 || k == 21;
+                let force = at(if is_hit { 300 } else { 0 }, PULLED);
+                let place = force.place.map(|place| Place {
+                    sigma: Micrometres(if is_hit { sigma } else { 5 }),
+                    ..place
+                });
+                let force = Force { place, ..force };
+                slip.follow(&LIMITS, 6_405 * k as u64, Some(&force), Some(true))
+            })
+        };
+        assert!(told(5));
+        assert!(!told(150));
     }
 
     #[test]

@@ -10,6 +10,9 @@ const GAP: usize = 2;
 const LATE_S: f64 = 0.05;
 /// Least length of a slip, mm; a shorter one counts neither as missed nor as invented.
 const LEAST_SLIP_MM: f64 = 0.1;
+/// A slip that begins at most this long before its contact ends is the grip's opening: it counts
+/// neither as missed nor as invented, s.
+const OPENS_S: f64 = 0.025;
 
 /// A frame: the true state in the middle of its exposure, and the reported one.
 #[derive(Clone, Copy, Debug, Default)]
@@ -68,7 +71,13 @@ impl Score {
             let after = after.min(frames.len() - 1);
             (frames[after].slipped_mm - frames[before].slipped_mm).abs() >= LEAST_SLIP_MM
         };
-        let wanted: Vec<Event> = all.iter().filter(far).cloned().collect();
+        let opens = |event: &&Event| {
+            let first = &frames[*event.start()..];
+            let ends = first.iter().find(|frame| !frame.touches);
+            ends.is_some_and(|end| end.time_s - first[0].time_s <= OPENS_S)
+        };
+        let counts = |event: &&Event| far(event) && !opens(event);
+        let wanted: Vec<Event> = all.iter().filter(counts).cloned().collect();
         Score::of(frames, &wanted, &all, |frame| frame.told_slip)
     }
 
@@ -143,7 +152,8 @@ fn belonging<'f>(frames: &'f [Frame], event: &Event) -> impl Iterator<Item = &'f
 mod tests {
     use super::*;
 
-    /// Frames of 10 ms: `t` true, `x` reported, `b` both, `n` true without a force.
+    /// Frames of 10 ms: `t` true, `x` reported, `b` both, `n` true without a force, `_` without a
+    /// contact.
     fn score(text: &str) -> Score {
         let mut slipped_mm = 0.0;
         let frames = text.chars().enumerate().map(|(at, what)| {
@@ -153,6 +163,7 @@ mod tests {
                 slips: "tbn".contains(what),
                 told_slip: "xb".contains(what),
                 has_force: what != 'n',
+                touches: what != '_',
                 slipped_mm,
                 ..Frame::default()
             }
@@ -172,6 +183,9 @@ mod tests {
             ("ttt........xxx", [1, 0, 1, 1, 0]),
             ("..bb.bb...bb..", [2, 2, 2, 0, 0]),
             ("......b.......", [0, 0, 1, 0, 0]),
+            // A grip that opens, and a slip that ends with its contact.
+            ("....tt____....", [0, 0, 0, 0, 0]),
+            ("...ttt____....", [1, 0, 0, 0, 0]),
         ] {
             let score = score(text);
             let found = [
