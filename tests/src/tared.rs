@@ -208,13 +208,25 @@ impl TaredSensor {
         let model = Model::parse(Box::leak(file.into_boxed_slice()))?;
         let geometry = &model.conditions.geometry;
         let (width, height) = (geometry.width.into(), geometry.height.into());
-        let preset = model.conditions.preset;
+        let scene = Scene::preset("rest", model.conditions.preset, width, height, 7)?;
+        Self::on(model, &scene)
+    }
+
+    /// Returns a sensor with a committed model of this scene's layout, tared on that scene.
+    ///
+    /// # Errors
+    /// As [`Self::of_model`].
+    pub fn of_model_on(file: Vec<u8>, scene: &Scene) -> Result<TaredSensor> {
+        Self::on(Model::parse(Box::leak(file.into_boxed_slice()))?, scene)
+    }
+
+    fn on(model: Model<'static>, scene: &Scene) -> Result<TaredSensor> {
         let mut sensor = Box::new(Sensor::new());
         let settings = model.conditions.settings(ByteOrder::Native);
         let configured = sensor.configure(settings, Some(model));
         configured.map_err(|error| anyhow!("{error}"))?;
         let mut tared = TaredSensor { sensor };
-        let rest = tared.rest(&Scene::preset("rest", preset, width, height, 7)?)?;
+        let rest = tared.rest(scene)?;
         tared.sensor.set_tare(Some(rest), Drift::NONE);
         Ok(tared)
     }
@@ -261,6 +273,12 @@ impl TaredSensor {
         self.sensor.set_down(down);
     }
 
+    /// Keeps the rest position alone: nothing is known of frames.
+    pub fn begin_anew(&mut self) {
+        let rest = self.sensor.tare().copied();
+        self.sensor.set_tare(rest, Drift::NONE);
+    }
+
     /// Keeps the rest position, but marks it as confirmed by no frame.
     pub fn tared_at_another_time(&mut self) {
         let rest = self.sensor.tare().copied();
@@ -271,12 +289,23 @@ impl TaredSensor {
     /// refused.
     pub fn sense(&mut self, frame: &Frame) -> Measurement {
         self.sensor.forget_frame();
+        self.sense_next(frame)
+    }
+
+    /// As [`Self::sense`], for a frame that follows the previous one.
+    pub fn sense_next(&mut self, frame: &Frame) -> Measurement {
         self.sensor.measure_frame_closely(&frame.words())
     }
 
     /// As [`Self::sense`], from bands of `rows` rows. Two bands are in memory at a time, as on the
     /// microcontroller.
     pub fn sense_in_bands(&mut self, frame: &Frame, rows: usize) -> Measurement {
+        self.sensor.forget_frame();
+        self.sense_next_in_bands(frame, rows)
+    }
+
+    /// As [`Self::sense_in_bands`], for a frame that follows the previous one.
+    pub fn sense_next_in_bands(&mut self, frame: &Frame, rows: usize) -> Measurement {
         let (words, sensor) = (frame.words(), &mut self.sensor);
         let length = words.len() / usize::from(sensor.settings().geometry.height) * rows;
         let push = |sensor: &mut Sensor<'_>| {
@@ -286,7 +315,6 @@ impl TaredSensor {
                 above = band;
             }
         };
-        sensor.forget_frame();
         sensor.begin_frame();
         push(sensor);
         let measurement = sensor.finish_frame();

@@ -6,7 +6,7 @@ use hivtac_tests::judged::{Contacts, Judged};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::TaredSensor;
-use hivtac_twin::{MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Specks};
+use hivtac_twin::{Layout, MARKERS, Options, Paint, Patch, Preset, Salt, Scene, Shutter, Specks};
 
 const PRESSES: Contacts = Contacts {
     force_n: [0.01, 0.15],
@@ -58,6 +58,46 @@ fn patched(far_mm: f64, radius_mm: f64, paint: Paint) -> Options {
             paint,
         }],
         ..Options::default()
+    }
+}
+
+/// A force is measured ahead of a frame's last rows, and anew if something red follows. Both are
+/// one frame, of which later frames know.
+#[test]
+fn a_frame_that_is_measured_ahead_in_vain_counts_once() {
+    let below = Patch {
+        centre_mm: [0.0, 6.0],
+        radius_mm: 0.3,
+        paint: Paint::Red,
+    };
+    let shutter = Shutter {
+        exposure_s: 0.004,
+        readout_s: 0.0,
+    };
+    for (model, layout) in [
+        (models::anywhere(1), Layout::default()),
+        (models::eight_dots(), "8v".parse().unwrap()),
+    ] {
+        let scene = Scene::preset("demo", Preset::Ov7725, 320, 240, 7).unwrap();
+        let options = Options {
+            layout,
+            noise: 6.0,
+            ..Options::default()
+        };
+        let whole = scene.with_options(options.clone()).unwrap();
+        let sensor = || TaredSensor::of_model_on(model.clone(), &whole).unwrap();
+        let [mut sensor, mut in_bands] = [sensor(), sensor()];
+        let patched = Options {
+            patches: vec![below],
+            ..options
+        };
+        let scene = whole.with_options(patched).unwrap();
+        for number in 0..3 * FRAMES {
+            let frame = scene.frame_by(&shutter, number, 0.6 + number as f64 / 156.0);
+            let seen = sensor.sense_next(&frame);
+            let other = in_bands.sense_next_in_bands(&frame, 8);
+            assert_eq!(seen, other, "{number} of {layout:?}");
+        }
     }
 }
 

@@ -97,11 +97,21 @@ impl NoiseLevel {
         }
     }
 
+    /// Call before the blobs of a frame are measured. What was [seen](Self::saw) of the same frame
+    /// before more blobs came is forgotten.
+    pub fn begin_measurement(&mut self) {
+        self.now = None;
+    }
+
     /// Takes the residual of a frame, in units of the expected `noise`.
     pub fn saw(&mut self, noise: FrameNoise, left: &Column) {
         let left = left.map(|part| part * noise.times);
         // A residual beyond the largest noise is not noise.
         self.now = (square(&left) <= LARGEST * residual::unexplained(left.len())).then_some(left);
+    }
+
+    /// Call at the end of each frame: what was seen of it counts.
+    pub fn end_frame(&mut self) {
         let Some((before, left)) = self.before.as_ref().zip(self.now.as_ref()) else {
             return;
         };
@@ -151,6 +161,7 @@ mod tests {
         let noise = level.of_frame(Px(0));
         let parts = left.map(|part| part / noise.times);
         level.saw(noise, &parts);
+        level.end_frame();
         level.of_frame(Px(0)).times
     }
 

@@ -109,6 +109,8 @@ struct Prepared {
     rest: Option<Rest>,
     /// What the previous frame of a film of another layout showed.
     before: placed::Before,
+    /// What this one shows, as far as its blobs are known.
+    now: Option<placed::Before>,
 }
 
 impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
@@ -369,6 +371,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     /// Ends the frame and returns its measurement.
     pub fn finish_frame(&mut self) -> Measurement {
         let mut measurement = self.measure_scanned();
+        self.end_measurement();
         let seen = measurement.markers.as_ref();
         self.motion.ended(seen.map(|seen| (seen, measurement.lost)));
         self.complete(&mut measurement);
@@ -380,6 +383,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     fn measure_scanned(&mut self) -> Measurement {
         if let Err(reason) = self.end_scan() {
+            self.begin_measurement();
             return self.measurement(Err(reason));
         }
         if let Some(measurement) = self.ahead.measurement(self.scanner.blobs().len()) {
@@ -390,12 +394,35 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
 
     /// Returns the measurement of the blobs of the last finished frame.
     fn measure_blobs(&mut self) -> Measurement {
+        self.begin_measurement();
         if self.has_other_layout() {
             return self.measure_placed();
         }
         let found = self.find_markers();
         let found = found.map_err(|reason| reason | self.another_layout(reason));
         self.measurement(found)
+    }
+
+    /// Forgets what a measurement ahead of the last blobs has left for later frames. They know of
+    /// no second look, which may come too late.
+    fn begin_measurement(&mut self) {
+        if matches!(self.look, Look::Again) {
+            return;
+        }
+        self.noise.begin_measurement();
+        if let Some(prepared) = self.prepared.as_mut() {
+            prepared.now = None;
+        }
+    }
+
+    /// Keeps what the frame's measurement has left for later frames.
+    fn end_measurement(&mut self) {
+        self.noise.end_frame();
+        if let Some(prepared) = self.prepared.as_mut()
+            && let Some(now) = prepared.now.take()
+        {
+            prepared.before = now;
+        }
     }
 
     /// Returns the measurement of these markers, or of a frame without.
@@ -475,6 +502,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             standing: self.standing_status(),
             rest,
             before: placed::Before::default(),
+            now: None,
         });
         self.apply_drift();
         self.apply_contact_shape();

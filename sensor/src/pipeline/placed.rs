@@ -230,7 +230,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             let count = before
                 .refused
                 .map_or(0, |refused| refused.count.wrapping_add(1));
-            prepared.before = Before {
+            prepared.now = Some(Before {
                 load: is_explained.then_some(estimate.pose),
                 left_out,
                 refused: (!is_explained).then_some(Refused {
@@ -238,7 +238,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
                     count,
                 }),
                 is_disturbed: before.is_disturbed,
-            };
+            });
         }
         (!status.intersects(Status::NO_FORCE)).then_some(force)
     }
