@@ -4,7 +4,7 @@
 use crate::clock::Clock;
 use crate::grip::Reading;
 use crate::grip::pair::Pair;
-use crate::recording::{HELLO, WIRE, to_hex};
+use crate::recording::{HELLO, TYPES, WIRE, to_hex, types};
 use crate::ros::channel::{
     Channel, Frames, GRIP_TOPIC, GripChannel, grip_messages, messages, topic_of,
 };
@@ -67,7 +67,10 @@ impl Topics {
             let schema = writer.add_schema(definition.name, "ros2msg", text)?;
             let topic = topic_of(&unit) + &topic;
             let metadata = match topic.ends_with(WIRE) {
-                true => BTreeMap::from([(HELLO.to_owned(), hello_text.clone())]),
+                true => BTreeMap::from([
+                    (HELLO.to_owned(), hello_text.clone()),
+                    (TYPES.to_owned(), types::ours()),
+                ]),
                 false => BTreeMap::new(),
             };
             *number = writer.add_channel(schema, &topic, "cdr", &metadata)?;

@@ -75,6 +75,13 @@ impl Devices {
         ports.chain(self.device.iter().map(named)).collect()
     }
 
+    /// These arguments, as another program of the project takes them.
+    pub fn words(&self) -> Vec<&str> {
+        let ports = self.port.iter().map(|port| ["--port", port]);
+        let named = self.device.iter().map(|device| ["--device", device]);
+        ports.chain(named).flatten().collect()
+    }
+
     /// Connects to each of these addresses; returns the connections and the devices' hellos.
     pub fn connect(&self, addresses: &[Address]) -> Result<(Vec<Link>, Vec<DeviceHello>), Failure> {
         let connect = |address| Link::connect(address, self.timeout);

@@ -5,6 +5,7 @@
 `cargo xtask test --all rerun` builds the tool, and installs Rerun and the package first.
 """
 
+import os
 import signal
 import subprocess
 import sys
@@ -15,17 +16,20 @@ from pathlib import Path
 
 import hivtac
 import numpy as np
+import rerun as rr
 from hivtac.rerun import MM_PER_N
 from rerun.chunk import RrdReader
 from rig import true_force
 from twin import PRESSED, Twin
 
+TOOL = os.environ["HIVTAC_TOOL"]
 
-def log(*words, seconds=None):
+
+def log(*words, seconds=None, program=(sys.executable, "-m", "hivtac.rerun")):
     """Runs the command into a file, for this long or to its end; returns the file's content."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "log.rrd"
-        command = [sys.executable, "-m", "hivtac.rerun", *words, "--save", file]
+        command = [*program, *words, "--save", file]
         # Without its own handling of Ctrl-C a background process would ignore it.
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         if seconds is not None:
@@ -61,7 +65,10 @@ class Logged(unittest.TestCase):
     def test_forces_of_a_sensor_are_true_and_pictures_have_mask_and_markers(self):
         with Twin(PRESSED) as twin:
             twin.run("settings", "set", "contact", "needle")
-            content = log("--port", twin.port, seconds=8)
+            # The tool looks for Python beside itself, then along the path.
+            path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+            served = ("env", f"PATH={path}", TOOL, "serve", "--rerun", "--port", twin.port)
+            content = log("--", seconds=8, program=served)
             true = twin.truth()
         forces = content.by_frame("/hivtac/force", "scalars")
         known = [frame for frame, force in forces.items() if np.isfinite(force).all()]
@@ -106,6 +113,19 @@ class Logged(unittest.TestCase):
         status = content.by_frame("/hivtac/status", "text")
         for frame, sample in samples.items():
             self.assertEqual(status[frame][0].split(), list(sample.status))
+
+    def test_a_program_logs_samples_and_pictures_by_one_function(self):
+        with tempfile.TemporaryDirectory() as folder, Twin() as twin:
+            file = Path(folder) / "own.rrd"
+            with rr.RecordingStream("own") as stream, hivtac.open(twin.port) as sensor:
+                stream.save(file)
+                sample, picture = next(sensor), sensor.look()
+                hivtac.log_rerun(sample, "thumb")
+                hivtac.log_rerun(picture, "thumb")
+                stream.flush()
+            content = Content(file)
+        self.assertEqual(set(content.by_frame("/thumb/force", "scalars")), {sample.frame})
+        self.assertEqual(set(content.by_frame("/thumb/picture", "buffer")), {picture.frame})
 
     def test_failures_are_told(self):
         with self.assertRaisesRegex(AssertionError, "hivtac: .*no-such"):

@@ -154,6 +154,12 @@ impl<const N: usize> Decoder<N> {
     }
 }
 
+/// Decodes a frame of any protocol version in place, without its closing zero, and returns its body;
+/// `None` if it is damaged.
+pub fn body(frame: &mut [u8]) -> Option<&[u8]> {
+    checked_body(frame).ok()
+}
+
 /// Decodes a frame in place, without its closing zero.
 fn decode<M: Message>(frame: &mut [u8]) -> Result<Received<M>, Reject> {
     let body = checked_body(frame)?;

@@ -136,7 +136,8 @@ pub enum ModelSource {
 }
 
 /// One frame's result.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Schema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Schema)]
+#[serde(default)]
 pub struct Sample {
     /// Number of the sample; a gap is a sample lost on the way to the host.
     pub sequence: u32,
@@ -172,6 +173,7 @@ impl Sample {
 
 /// Counters since boot. They saturate instead of wrapping, which takes 49 days at 1 kHz (32 bits).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
+#[serde(default)]
 pub struct Stats {
     /// Number of VSYNC edges.
     pub frames_exposed: u32,

@@ -2,7 +2,9 @@
 //! changes.
 
 use crate::message::{DeviceMessage, HostHello, HostMessage, PROTOCOL_VERSION};
+use postcard_schema::Schema;
 use postcard_schema::key::hash::fnv1a64::hash_ty_path;
+use postcard_schema::schema::NamedType;
 use serde::Deserialize;
 
 /// Changes with every message: FNV-1a over names and types of all fields and variants of both
@@ -10,6 +12,10 @@ use serde::Deserialize;
 /// meaning of status bits: their changes must raise [`PROTOCOL_VERSION`].
 pub const SCHEMA_HASH: u64 =
     u64::from_le_bytes(hash_ty_path::<(DeviceMessage, HostMessage)>("hivtac"));
+
+/// Names and types of all that a device sends, as recordings carry them: a later release reads by
+/// them what this one recorded.
+pub const DEVICE_TYPES: &NamedType = DeviceMessage::SCHEMA;
 
 /// The frozen start of both hellos: variant 0, then these two fields, in every protocol version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]

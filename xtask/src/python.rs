@@ -129,7 +129,7 @@ impl Python {
 const STRICT: [&str; 2] = ["-W", "error"];
 
 /// The quiet command `pip install`.
-pub fn pip(python: &Path) -> Command {
+fn pip(python: &Path) -> Command {
     let mut command = Command::new(python);
     command.args("-m pip install --quiet --disable-pip-version-check".split(' '));
     command

@@ -9,21 +9,36 @@ use hivtac_wire::image::Image;
 use serde_json::Value;
 
 use crate::python::Environment;
-use crate::{artifacts, process, python, toolchain, web};
+use crate::{artifacts, process, toolchain, web};
 
 /// Options of `cargo xtask release`.
 #[derive(Args)]
 pub struct Release {
+    /// Raise the version to this one first, as `0.3.0`, wherever it is written.
+    version: Option<String>,
     /// Linux computers for which to build, by Rust's names. By default x86-64 and ARM, with glibc
     /// 2.17 and with musl.
     #[arg(long, value_name = "TARGET")]
     target: Vec<String>,
-    /// Tag this commit at the end, as `v0.2.0`, with the notes. Pushed, the tag publishes.
+    /// Tag this commit at the end, as `v0.2.0`, with the notes, after a commit of a raised version.
+    /// Pushed, the tag publishes.
     #[arg(long)]
     tag: bool,
 }
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
+/// Where the version is written: a file, and what is before and behind it.
+const WRITTEN: [(&str, &str, &str); 5] = [
+    ("Cargo.toml", "\nversion = \"", "\"\n"),
+    ("tests/qemu/Cargo.toml", "\nversion = \"", "\"\n"),
+    ("host-tool/lerobot/pyproject.toml", "\nversion = \"", "\"\n"),
+    ("host-tool/lerobot/pyproject.toml", "\"hivtac==", "\""),
+    (
+        "ros2/hivtac_ros2_control/package.xml",
+        "<version>",
+        "</version>",
+    ),
+];
 const LINUX: [&str; 4] = [
     "x86_64-unknown-linux-gnu",
     "x86_64-unknown-linux-musl",
@@ -46,8 +61,11 @@ impl Release {
     /// Writes the files to `target/xtask/release/VERSION/`, then installs those that this computer
     /// runs.
     pub fn run(&self) -> Result<()> {
+        if let Some(version) = self.version.as_deref().filter(|it| *it != VERSION) {
+            return self.raise(version);
+        }
         if self.tag {
-            may_be_tagged()?;
+            may_be_tagged(VERSION)?;
         }
         let folder = toolchain::work_folder("release")?.join(VERSION);
         if folder.exists() {
@@ -89,15 +107,46 @@ impl Release {
             // Lines with `#` are notes, too.
             true => {
                 let mut mark = git("tag --annotate --cleanup=verbatim --file");
-                process::run(mark.arg(notes_file).arg(tag()))
+                process::run(mark.arg(notes_file).arg(format!("v{VERSION}")))
             }
             false => Ok(()),
         }
     }
+
+    /// Writes another version wherever this one is, then makes the release with a program of it.
+    fn raise(&self, version: &str) -> Result<()> {
+        notes(&process::read(&toolchain::at("CHANGELOG.md"))?, version)?;
+        if self.tag {
+            may_be_tagged(version)?;
+        }
+        for place in WRITTEN {
+            let (file, text) = raised(place, version)?;
+            process::write(&file, &text)?;
+        }
+        process::run(&mut toolchain::cargo("update --workspace --offline", ""))?;
+        process::run(&mut toolchain::cargo(
+            "update --workspace --offline",
+            "tests/qemu",
+        ))?;
+        if self.tag {
+            process::run(git("commit --all --message").arg(format!("Release {version}")))?;
+        }
+        let mut release = toolchain::cargo("xtask release", "");
+        for target in &self.target {
+            release.args(["--target", target]);
+        }
+        process::run(release.args(self.tag.then_some("--tag")))
+    }
 }
 
-fn tag() -> String {
-    format!("v{VERSION}")
+/// A file of [`WRITTEN`], with another version there.
+fn raised((name, before, after): (&str, &str, &str), version: &str) -> Result<(PathBuf, String)> {
+    let file = toolchain::at(name);
+    let text = process::read(&file)?;
+    let written = |version: &str| format!("{before}{version}{after}");
+    let is_once = text.matches(&written(VERSION)).count() == 1;
+    ensure!(is_once, "{name} needs {:?}, once", written(VERSION));
+    Ok((file, text.replace(&written(VERSION), &written(version))))
 }
 
 fn git(words: &str) -> Command {
@@ -107,11 +156,11 @@ fn git(words: &str) -> Command {
 }
 
 /// Checks that a tag of this version would mark what is built.
-fn may_be_tagged() -> Result<()> {
+fn may_be_tagged(version: &str) -> Result<()> {
     let changed = process::output(&mut git("status --porcelain"))?;
     ensure!(changed.is_empty(), "not committed yet:\n{changed}");
-    let taken = process::output(git("tag --list").arg(tag()))?;
-    ensure!(taken.is_empty(), "the tag {} is there already", tag());
+    let taken = process::output(git("tag --list").arg(format!("v{version}")))?;
+    ensure!(taken.is_empty(), "the tag v{version} is there already");
     Ok(())
 }
 
@@ -122,7 +171,7 @@ fn notes(text: &str, version: &str) -> Result<String> {
     let of = newest.split([',', ' ', '\n']).next().unwrap_or_default();
     ensure!(
         of == version,
-        "the newest section of CHANGELOG.md is of {of}, Cargo.toml says {version}"
+        "the newest section of CHANGELOG.md is of {of}, the release is {version}"
     );
     Ok(format!("# {newest}"))
 }
@@ -264,15 +313,16 @@ fn bill_of_materials(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What is asked of an installed package: forces of a simulated sensor, by the program that came
-/// with it, and firmware for both boards.
+/// What is asked of an installed program: forces of a simulated sensor, and firmware for both
+/// boards.
 const ASK: &str = r#"
 import glob, json, subprocess, sys
 import hivtac
 
 program, firmware, version = sys.argv[1:]
 assert len(glob.glob(f"{firmware}/hivtac-firmware-{version}-*.bin")) == 2, firmware
-twin = subprocess.Popen([program, "twin", "--json", "--scene", "static"], stdout=subprocess.PIPE)
+command = [program, "twin", "--json", "--scene", "static"]
+twin = subprocess.Popen(command, stdout=subprocess.PIPE)
 try:
     with hivtac.open(json.loads(twin.stdout.readline())["port"]) as sensor:
         forces = sum(next(sensor).force is not None for _ in range(200))
@@ -282,47 +332,63 @@ assert forces > 150, forces
 print(f"{program}: {forces} of 200 samples have a force")
 "#;
 
-/// Installs the wheel that runs here into an environment of its own, unpacks the archives, and asks
-/// their programs.
+/// Installs the wheel of a version that runs here from a folder into an environment of its own,
+/// unpacks the archives, and asks their programs.
+const INSTALL: &str = r#"
+set -e
+files=$1 work=$2 version=$3 ask=$4
+python3 -m venv --clear --system-site-packages "$work/installed"
+"$work/installed/bin/pip" install --quiet --find-links "$files" "hivtac==$version"
+"$work/installed/bin/python" -c "$ask" \
+    "$work/installed/bin/hivtac" "$work/installed/share/hivtac/firmware" "$version"
+for archive in "$files/hivtac-$version-$(uname -m)"-*-linux-*.tar.gz; do
+    rm -rf "$work/unpacked"
+    mkdir "$work/unpacked"
+    tar -xzf "$archive" -C "$work/unpacked" --strip-components=1
+    "$work/installed/bin/python" -c "$ask" \
+        "$work/unpacked/hivtac" "$work/unpacked/firmware" "$version"
+done
+"#;
+
+/// Installs what runs here, on this computer and in a new Debian.
 fn install(folder: &Path) -> Result<()> {
     let work = toolchain::work_folder("release")?;
-    let environment = work.join("installed");
-    process::run(process::command("python3 -m venv --clear").arg(&environment))?;
-    let programs = environment.join("bin");
-    let python = programs.join("python");
-    let mut pip = python::pip(&python);
-    pip.arg("--find-links").arg(folder);
-    process::run(pip.arg(format!("hivtac=={VERSION}")))?;
-    let ask = |program: &Path, firmware: &Path| {
-        let mut ask = Command::new(&python);
-        ask.args(["-I", "-c", ASK]).arg(program).arg(firmware);
-        process::run(ask.arg(VERSION))
-    };
-    let firmware = environment.join("share/hivtac/firmware");
-    ask(&programs.join("hivtac"), &firmware)?;
-    for target in LINUX {
-        let name = format!("hivtac-{VERSION}-{target}");
-        let archive = folder.join(format!("{name}.tar.gz"));
-        if !archive.is_file() || !target.starts_with(std::env::consts::ARCH) {
-            continue;
-        }
-        process::run(
-            Command::new("tar")
-                .arg("-xzf")
-                .arg(archive)
-                .arg("-C")
-                .arg(&work),
-        )?;
-        let unpacked = work.join(name);
-        ask(&unpacked.join("hivtac"), &unpacked.join("firmware"))?;
-        std::fs::remove_dir_all(unpacked)?;
+    let shell = ["sh", "-c", INSTALL, "install"];
+    let mut here = process::command("env");
+    here.args(shell).arg(folder).arg(&work).args([VERSION, ASK]);
+    process::run(&mut here)?;
+    let is_root = process::output(&mut process::command("id -u"))?.trim() == "0";
+    if !is_root || process::find_program("debootstrap").is_none() {
+        process::say("not installed in a new Debian: that needs root and the program debootstrap");
+        return Ok(());
     }
-    Ok(())
+    let debian = work.join("debian");
+    if debian.exists() {
+        std::fs::remove_dir_all(&debian)?;
+    }
+    let packages = "--include=python3-venv,python3-numpy";
+    let mut make = process::command("debootstrap --variant=minbase");
+    process::run(make.args([packages, "stable"]).arg(&debian))?;
+    for file in folder.read_dir()? {
+        copy_into(&debian.join("files"), &[file?.path()])?;
+    }
+    let mut there = process::command("env PIP_NO_INDEX=1 chroot");
+    there.arg(&debian).args(shell);
+    process::run(there.args(["/files", "/tmp", VERSION, ASK]))?;
+    Ok(std::fs::remove_dir_all(debian)?)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_package_has_the_workspaces_version() {
+        for place in WRITTEN {
+            let text = raised(place, "9.8.7").unwrap().1;
+            assert!(text.contains(&format!("{}9.8.7{}", place.1, place.2)));
+        }
+    }
 
     #[test]
     fn notes_are_the_newest_section() {

@@ -65,6 +65,7 @@ __all__ = [
     "Tare",
     "VersionError",
     "grip",
+    "log_rerun",
     "open",
     "recording",
 ]
@@ -283,6 +284,20 @@ def recording(path: str | os.PathLike[str], *, device: str | None = None) -> Rec
     Raises `Error` when the file is not a recording, or does not have the sensor.
     """
     return Recording(Reader(os.fspath(path), device))
+
+
+def log_rerun(it: Sample | Picture, name: str = "hivtac") -> None:
+    """Logs a sample or a picture below the entity `name` in the program's recording in Rerun;
+    `hivtac.rerun` says what is there, and has the film's outline (`log_film`).
+
+    Raises `ImportError` without Rerun: `pip install hivtac[rerun]`.
+    """
+    from hivtac import rerun
+
+    if isinstance(it, Picture):
+        rerun.log_picture(it, name)
+    else:
+        rerun.log_sample(it, name)
 
 
 def grip(

@@ -1,13 +1,14 @@
 """Shows a sensor or a recording in Rerun, live or into a file. Needs `pip install hivtac[rerun]`.
 
     python -m hivtac.rerun                            # the only sensor, in Rerun's viewer
+    hivtac serve --rerun                              # the same
     python -m hivtac.rerun press.mcap --save press.rrd
 
 In a program of yours, which has its own recording in Rerun:
 
     hivtac.rerun.log_film("thumb")
     for sample in sensor:
-        hivtac.rerun.log_sample(sample, "thumb")
+        hivtac.log_rerun(sample, "thumb")
 
 Lengths are in mm, forces in N. The arrow of a force has 100 mm for 1 N, and ends where it presses.
 """

@@ -1,6 +1,7 @@
 //! Reads the recordings of `hivtac record`: every message of a device, as it was received.
 
 mod records;
+pub mod types;
 
 use std::collections::{HashMap, VecDeque};
 use std::fmt::Display;
@@ -16,6 +17,7 @@ use hivtac_wire::frame::DEVICE_FRAME_LIMIT;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
 pub use records::Damage;
 use records::{Records, Source};
+use types::Types;
 
 /// End of the topic with a device's messages.
 pub const WIRE: &str = "/wire";
@@ -25,9 +27,27 @@ pub const BEFORE_BYTES: usize = 16;
 /// Name of a [`WIRE`] channel's metadata with the device's hello, in hexadecimal digits: other
 /// tools that trim or merge files keep it.
 pub const HELLO: &str = "hello";
+/// Name of that channel's metadata with the [`types`] of the messages.
+pub const TYPES: &str = "types";
 
 /// A message with its receive time, ns since 1970.
 pub type Kept = (u64, DeviceMessage);
+
+/// A channel with a device's messages.
+struct Topic {
+    name: String,
+    /// Where another release recorded it: the types of the messages.
+    types: Option<Types>,
+}
+
+impl Topic {
+    fn message(&self, frame: &[u8]) -> Option<DeviceMessage> {
+        match &self.types {
+            None => decoded(frame),
+            Some(types) => types.message(frame),
+        }
+    }
+}
 
 /// A recording that is read from its beginning, for one device.
 pub struct Recording {
@@ -36,8 +56,8 @@ pub struct Recording {
     records: Records,
     /// Records that were read ahead.
     ahead: VecDeque<Record<'static>>,
-    /// The topics of the channels with devices' messages.
-    topics: HashMap<u16, String>,
+    /// The channels with devices' messages.
+    topics: HashMap<u16, Topic>,
     /// The devices, by their topics.
     devices: Vec<(String, DeviceHello)>,
     /// The chosen device's topic.
@@ -119,11 +139,21 @@ impl Recording {
         if !channel.topic.ends_with(WIRE) {
             return;
         }
+        let mut topic = Topic {
+            name: channel.topic,
+            types: None,
+        };
         let hello = channel.metadata.get(HELLO).and_then(|text| from_hex(text));
-        if let Some(DeviceMessage::Hello(hello)) = hello.and_then(|frame| decoded(&frame)) {
-            self.add_device(channel.topic.clone(), hello);
+        if let Some(frame) = hello {
+            if decoded(&frame).is_none() {
+                let types = channel.metadata.get(TYPES);
+                topic.types = types.and_then(|text| Types::parse(text));
+            }
+            if let Some(DeviceMessage::Hello(hello)) = topic.message(&frame) {
+                self.add_device(topic.name.clone(), hello);
+            }
         }
-        self.topics.insert(channel.id, channel.topic);
+        self.topics.insert(channel.id, topic);
     }
 
     fn add_device(&mut self, topic: String, hello: DeviceHello) {
@@ -172,9 +202,11 @@ impl Recording {
                 Some(Record::Channel(channel)) => self.add(channel),
                 Some(Record::Message { header, data }) => {
                     let topic = self.topics.get(&header.channel_id);
-                    let message = data.get(BEFORE_BYTES..).and_then(decoded);
-                    if let Some((topic, message)) = topic.zip(message) {
-                        return Ok(Some((topic.clone(), (header.log_time, message))));
+                    let message = topic
+                        .zip(data.get(BEFORE_BYTES..))
+                        .and_then(|(topic, frame)| Some((topic, topic.message(frame)?)));
+                    if let Some((topic, message)) = message {
+                        return Ok(Some((topic.name.clone(), (header.log_time, message))));
                     }
                 }
                 Some(_) => (),

@@ -6,10 +6,17 @@ use mcap::{MAGIC, WriteOptions, Writer};
 
 use super::*;
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::force::{ContactList, Force, Place};
+use hivtac_terms::marker::{Marker, MarkerList};
+use hivtac_terms::status::Status;
 use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::{Mono, Threshold};
+use hivtac_terms::units::{
+    MicroNewtons, MilliDegrees, Px, SignedMicrometres, UnsignedMicroNewtons,
+};
+use hivtac_wire::decoder;
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
-use hivtac_wire::message::{LogLevel, LogLine, PROTOCOL_VERSION};
+use hivtac_wire::message::{LogLevel, LogLine, PROTOCOL_VERSION, Sample, Stats};
 use hivtac_wire::version::SCHEMA_HASH;
 
 const ALL: [u64; 24] = {
@@ -232,5 +239,166 @@ proptest::proptest! {
         if let Ok(mut recording) = open(file, None) {
             proptest::prop_assert!(times(&mut recording).len() <= 2 * ALL.len());
         }
+    }
+}
+
+/// A frame of any body.
+fn framed(body: &[u8]) -> Vec<u8> {
+    let content = [body, &crc32fast::hash(body).to_le_bytes()].concat();
+    let parts = content.split(|byte| *byte == 0);
+    // Short bodies only: no part of 254 bytes without a zero.
+    let coded = parts.flat_map(|part| [&[part.len() as u8 + 1], part].concat());
+    coded.chain([0]).collect()
+}
+
+fn body(message: &DeviceMessage) -> Vec<u8> {
+    decoder::body(&mut frame(message).strip_suffix(&[0]).unwrap().to_vec())
+        .unwrap()
+        .to_vec()
+}
+
+fn sample(sequence: u32) -> Sample {
+    Sample {
+        sequence,
+        frame: sequence / 2,
+        time_us: 1 << 40,
+        status: Status::CONTACT | Status::NOT_CALIBRATED,
+        force: Some(Force {
+            alpha: MilliDegrees(-12_345),
+            magnitude: MicroNewtons(98_765),
+            magnitude_sigma: UnsignedMicroNewtons(456),
+            place: Some(Place {
+                x: SignedMicrometres(-321),
+                ..Place::default()
+            }),
+            ..Force::default()
+        }),
+        ..Sample::default()
+    }
+}
+
+#[test]
+fn this_releases_messages_are_read_by_their_types_as_without() {
+    let types = Types::parse(&types::ours()).unwrap();
+    let marker = Marker {
+        x: Px(70_000),
+        y: Px(-1),
+        area: 80,
+    };
+    let samples = [
+        Sample::default(),
+        sample(7),
+        Sample {
+            contacts: ContactList::from([Force::default(); 2]),
+            markers: MarkerList::from([marker; 4]),
+            ..sample(u32::MAX)
+        },
+    ];
+    let stats = Stats {
+        latency_us: 4321,
+        uptime_us: u64::MAX,
+        ..Stats::default()
+    };
+    let others = [
+        DeviceMessage::Stats(stats),
+        DeviceMessage::Hello(hello(9)),
+        line(5),
+    ];
+    for message in samples.map(DeviceMessage::Sample).into_iter().chain(others) {
+        assert_eq!(types.message(&frame(&message)), Some(message));
+    }
+}
+
+/// Another release: its sample begins with a number that this one does not know, and has no
+/// contacts; its stats have another name.
+fn other_types() -> serde_json::Value {
+    let mut types: serde_json::Value = serde_json::from_str(&types::ours()).unwrap();
+    let variants = types["ty"]["Enum"].as_array_mut().unwrap();
+    let fields = variants[1]["ty"]["NewtypeVariant"]["ty"]["Struct"].as_array_mut();
+    let fields = fields.unwrap();
+    fields.retain(|field| field["name"] != "contacts");
+    let unknown = serde_json::json!({ "name": "warmth", "ty": { "name": "u8", "ty": "U8" } });
+    fields.insert(0, unknown);
+    variants[2]["name"] = "Counters".into();
+    types
+}
+
+/// The body of a message of that release.
+fn other_body(message: &DeviceMessage) -> Vec<u8> {
+    let mut body = body(message);
+    match message {
+        DeviceMessage::Hello(hello) => {
+            let ours = postcard_varint(hello.schema);
+            let at = body.windows(ours.len()).position(|it| it == ours).unwrap();
+            body.splice(at..at + ours.len(), postcard_varint(0x1234_5678_9abc_def0));
+        }
+        DeviceMessage::Sample(_) => {
+            // Its end are two empty lists: contacts and markers.
+            assert!(body.ends_with(&[0, 0]), "{body:?}");
+            body.pop();
+            body.insert(1, 37);
+        }
+        _ => (),
+    }
+    body
+}
+
+fn postcard_varint(mut number: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    while number > 0x7f {
+        bytes.push(number as u8 | 0x80);
+        number >>= 7;
+    }
+    bytes.push(number as u8);
+    bytes
+}
+
+/// A recording of that release: a hello, samples 0 to 9, and counters.
+fn of_another_release(types: Option<String>) -> Vec<u8> {
+    let hello_frame = framed(&other_body(&DeviceMessage::Hello(hello(1))));
+    let mut metadata = BTreeMap::from([(HELLO.to_owned(), to_hex(&hello_frame))]);
+    metadata.extend(types.map(|types| (TYPES.to_owned(), types)));
+    let mut writer = Writer::new(Cursor::new(Vec::new())).unwrap();
+    let topic = format!("/unit_1{WIRE}");
+    let channel_id = writer.add_channel(0, &topic, "cdr", &metadata).unwrap();
+    let samples = (0..10).map(|number| DeviceMessage::Sample(sample(number)));
+    let messages = samples.chain([DeviceMessage::Stats(Stats::default())]);
+    let bodies = messages.map(|message| framed(&other_body(&message)));
+    for (log_time, bytes) in (0..).zip([hello_frame].into_iter().chain(bodies)) {
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time,
+            publish_time: log_time,
+        };
+        let data = [&[0; BEFORE_BYTES][..], &bytes].concat();
+        writer.write_to_known_channel(&header, &data).unwrap();
+    }
+    writer.finish().unwrap();
+    writer.into_inner().into_inner()
+}
+
+#[test]
+fn another_releases_samples_are_read_by_the_types_in_its_recording() {
+    let file = of_another_release(Some(other_types().to_string()));
+    let (mut recording, found) =
+        Recording::of("it.mcap".to_owned(), Box::new(Cursor::new(file)), None).unwrap();
+    assert_eq!(found, hello(1), "as this release says it to others");
+    for number in 0..10 {
+        let (came_ns, message) = recording.next_message().unwrap().unwrap();
+        assert_eq!(message, DeviceMessage::Sample(sample(number)));
+        assert_eq!(came_ns, u64::from(number) + 1);
+    }
+    assert_eq!(recording.next_message().unwrap(), None, "unknown: left out");
+}
+
+#[test]
+fn another_releases_recording_without_usable_types_says_so() {
+    let deep = "[".repeat(100_000);
+    let endless = r#"{"name":"","ty":{"Seq":{"name":"","ty":"Unit"}}}"#;
+    for types in [None, Some("{}"), Some(&deep), Some(endless)] {
+        let file = of_another_release(types.map(str::to_owned));
+        let error = open(file, None).err().unwrap().to_string();
+        assert!(error.contains("another release"), "{error}");
     }
 }

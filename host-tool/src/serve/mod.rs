@@ -1,4 +1,4 @@
-//! `hivtac serve`: serves the forces to other programs, as a node of ROS 2 or for Foxglove.
+//! `hivtac serve`: serves the forces to other programs, as a node of ROS 2, for Foxglove or Rerun.
 
 mod diagnosis;
 #[cfg(feature = "foxglove")]
@@ -7,6 +7,7 @@ mod names;
 #[cfg(feature = "ros2")]
 mod node;
 mod outlet;
+mod rerun;
 mod sensor;
 
 use crate::device::Devices;
@@ -43,13 +44,14 @@ const DOMAIN: &str = "ROS_DOMAIN_ID";
 /// The largest domain; a larger one would need a UDP port above the last.
 const LAST_DOMAIN: u16 = 232;
 
-/// Serve forces to other programs, as a node of ROS 2 or for Foxglove, until Ctrl-C
+/// Serve forces to other programs, as a node of ROS 2, for Foxglove or Rerun, until Ctrl-C
 ///
 /// For a hivtac that was built with it: `cargo install --path host-tool --features
 /// ros2,foxglove`. Prints `ready` and where; goes on after a lost connection, which diagnostics
 /// tell. Topics of the node, each below its name: `wrench`, `place`, `contacts`, `markers`,
 /// `contact`, `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are
-/// below /NODE/SENSOR, those of a grip below /NODE/grip.
+/// below /NODE/SENSOR, those of a grip below /NODE/grip. Rerun needs no such build, but Python with
+/// `hivtac[rerun]`.
 ///
 /// Example: hivtac serve --ros2 --foxglove
 #[derive(Args)]
@@ -83,6 +85,10 @@ pub struct ServeArguments {
     /// Where it is as one JSON object
     #[arg(long)]
     json: bool,
+    /// Options of Rerun's own: `-- --save press.rrd` writes a file, `-- --connect` uses a viewer
+    /// that is open
+    #[arg(last = true, value_name = "OPTIONS", requires = "rerun")]
+    rerun_options: Vec<String>,
 }
 
 /// Which programs are served.
@@ -95,6 +101,9 @@ struct Outlets {
     /// For Foxglove, over its WebSocket
     #[arg(long)]
     foxglove: bool,
+    /// In Rerun's viewer
+    #[arg(long, conflicts_with_all = ["ros2", "foxglove", "grip", "json"])]
+    rerun: bool,
 }
 
 /// Serves until the program is interrupted. Prints `ready` and the addresses.
@@ -103,6 +112,9 @@ struct Outlets {
 /// When this build lacks an outlet, a device is missing at the start, or an outlet cannot be
 /// opened. A device that is lost later is waited for.
 pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
+    if arguments.outlets.rerun {
+        return rerun::run(arguments);
+    }
     let (devices, grip) = (&arguments.devices, &arguments.grip);
     let addresses = grip.before(devices.timeout, || devices.addresses())?;
     built_with(&arguments.outlets)?;

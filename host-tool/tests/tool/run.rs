@@ -26,6 +26,12 @@ pub fn run(arguments: &[&str]) -> Finished {
     start(arguments).finish()
 }
 
+/// Runs `hivtac ARGUMENTS` to its end, with other programs from these folders alone.
+pub fn run_with_path(path: &str, arguments: &[&str]) -> Finished {
+    let mut tool = Command::new(env!("CARGO_BIN_EXE_hivtac"));
+    Finished::new(tool.args(arguments).env("PATH", path).output().unwrap())
+}
+
 /// Runs `hivtac` to its end with `words` of the shell, on a disk that is full once a file has this
 /// many blocks of 512 bytes.
 pub fn run_on_full_disk(blocks: u32, words: &str) -> Finished {

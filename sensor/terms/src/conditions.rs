@@ -10,9 +10,11 @@
 )]
 pub enum CentroidEstimator {
     /// The mean of its pixels in the mask (the paper's).
+    #[cfg_attr(feature = "wire", serde(alias = "BinaryMask"))]
     BinaryMask,
     /// The mean of the same pixels, each weighted by how much of it a marker covers: by the redness
     /// of RGB565, the Cr of YUV422, the luma of mono.
+    #[cfg_attr(feature = "wire", serde(alias = "RednessWeighted"))]
     RednessWeighted,
 }
 

@@ -13,7 +13,8 @@ use crate::units::{
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",
-    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema),
+    serde(default)
 )]
 pub struct Force {
     /// α.

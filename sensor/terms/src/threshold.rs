@@ -13,10 +13,13 @@ use core::fmt;
 )]
 pub enum PixelFormat {
     /// 16 bits: red in bits 15–11, green in 10–5, blue in 4–0.
+    #[cfg_attr(feature = "wire", serde(alias = "Rgb565"))]
     Rgb565,
     /// Pairs of pixels in the byte order Y0 Cb Y1 Cr.
+    #[cfg_attr(feature = "wire", serde(alias = "Yuv422"))]
     Yuv422,
     /// One byte for each pixel: its luma.
+    #[cfg_attr(feature = "wire", serde(alias = "Mono"))]
     Mono,
 }
 

@@ -4,5 +4,4 @@ mod dependencies;
 mod links;
 mod shared_state;
 mod unsafe_code;
-mod versions;
 mod width;

@@ -150,6 +150,36 @@ fn a_signal_keeps_the_flash() {
     }
 }
 
+/// Before the rig is ready, while the firmware runs, and while the file is written, since the second
+/// signal comes then.
+#[test]
+#[ignore = "10 s"]
+fn a_signal_at_any_time_leaves_a_whole_flash() {
+    let directory = tempfile::tempdir().unwrap();
+    let flash = directory.path().join("flash");
+    let mut before = Contents::default();
+    *before.array.last_mut().unwrap() = 7;
+    before.save(&flash).unwrap();
+    for round in 0..60 {
+        let signal = ["-INT", "-TERM", "-KILL"][round % 3];
+        let mut rig = rig();
+        rig.stdout(Stdio::null()).arg(firmware());
+        rig.args(["--tcp", "0", "--no-wait", "--flash"]).arg(&flash);
+        let child = rig.spawn().unwrap();
+        for wait_ms in [round as u64 * 7, round as u64 % 11] {
+            std::thread::sleep(Duration::from_millis(wait_ms));
+            // It may have ended, which the second signal then says.
+            let process = child.id().to_string();
+            let mut kill = Command::new("kill");
+            let _ = kill.args([signal, &process]).output();
+        }
+        let (code, error) = end(child);
+        assert!(matches!(code, None | Some(0)), "{round} {signal}: {error}");
+        let left = Contents::load(&flash).unwrap();
+        assert_eq!(left.array.last(), Some(&7), "{round} {signal}");
+    }
+}
+
 #[test]
 fn a_script_gives_bytes_truth_and_counters() {
     let directory = tempfile::tempdir().unwrap();
