@@ -13,7 +13,7 @@ use crate::markers::lost::Lost;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::units::Px;
 
-/// The most frames that may be missed between two of which the motion is told. The mean motion over
+/// The most frames that may be missed between two that give a motion. The mean motion over
 /// more says little about that during a frame.
 const MOST_MISSED: u16 = 7;
 
