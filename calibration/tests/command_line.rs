@@ -31,7 +31,7 @@ fn stderr_of_failure(output: &Output) -> String {
     String::from_utf8(output.stderr.clone()).unwrap()
 }
 
-/// A user's mistake is told in one line, whatever the environment asks of panics.
+/// A user's mistake is reported in one line, whatever the environment asks of panics.
 #[test]
 fn a_mistake_is_told_without_a_backtrace() {
     let directory = tempfile::tempdir().unwrap();

@@ -118,7 +118,7 @@ fn rule(status: Status, is_square: bool) -> Option<String> {
 }
 
 impl<'a> Finding<'a> {
-    /// Of the picture `image`, by a model of a film with so many dots.
+    /// Of the picture `image`, by a model of a film with `dots` dots.
     pub fn new(
         image: &'a str,
         settings: &Settings,

@@ -420,7 +420,7 @@ mod tests {
         assert!(line.ends_with(end), "{line}");
     }
 
-    /// The force is the sum, the contacts are told beside it.
+    /// The force is the sum; the line has the contacts, too.
     #[test]
     fn two_contacts_are_told_each() {
         let mut two = with_place();

@@ -225,7 +225,7 @@ impl Drop for Reader {
         self.shared.is_over.store(true, Ordering::Relaxed);
         self.shared.is_given_up.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread was told already.
+            // A panic of the thread was reported already.
             let _ = thread.join();
         }
     }

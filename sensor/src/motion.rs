@@ -18,7 +18,7 @@ use crate::markers::sqrt;
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::units::Px;
 
-/// The most frames that may be missed between two of which the motion is told. The mean motion over
+/// The most frames that may be missed between two that give a motion. The mean motion over
 /// more says little about that during a frame.
 const MOST_MISSED: u16 = 7;
 /// A change of a marker's motion, in px from frame to frame, that may be the modelled noise: one

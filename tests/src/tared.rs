@@ -243,7 +243,7 @@ impl TaredSensor {
         rest.map_err(|refusal| anyhow!("no rest position: {refusal:?}"))
     }
 
-    /// Tares on frames, of which a given number must be good, and keeps the rest position.
+    /// Tares on frames (a given number must be good) and keeps the rest position.
     ///
     /// # Errors
     /// If the frames end before there is an outcome.

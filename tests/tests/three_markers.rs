@@ -94,7 +94,7 @@ impl Forces {
     }
 }
 
-/// Adds the forces of presses in a scene of which marker `lost` is not seen; `None` if all are.
+/// Adds the forces of presses in a scene without its marker `lost`; `None` if all are.
 /// Frames in which another marker is not wholly in the picture do not count.
 fn press(scene: &Scene, lost: Option<usize>, presses: u64, forces: &mut Forces) {
     let (mut sensor, mut random) = (sensor(), Random::new(29));

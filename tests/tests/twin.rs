@@ -35,7 +35,7 @@ const MT9V034_ARRAY: [u32; 2] = [376, 240];
 const SAMPLES: usize = 24;
 const PATIENCE: Duration = Duration::from_secs(TIMEOUT_S as u64);
 
-/// What a new device is told. A threshold makes what earlier frames left be forgotten. The first
+/// What a new device is sent. A threshold makes what earlier frames left be forgotten. The first
 /// one is not the model's: samples say so, until the first frame under the second.
 fn told(kind: Kind) -> [Request; 4] {
     let [other, own]: [Threshold; 2] = match kind {
@@ -88,7 +88,7 @@ fn next_sample(link: &mut Link, is_mismatch: bool) -> Sample {
 }
 
 /// Returns what the firmware in a rig says of itself, and the samples of successive frames, from
-/// the first one after what it was told.
+/// the first one after what it was sent.
 fn from_the_rig(rig: &Rig, kind: Kind, count: usize) -> (DeviceHello, SettingsReport, Vec<Sample>) {
     let address = Address::Tty(rig.port().to_owned());
     let (mut link, hello) = Link::connect(&address, PATIENCE).unwrap();
@@ -338,7 +338,7 @@ const CORRECTIONS: usize = 12;
 const MM_PER_PX: f64 = 0.05;
 /// Samples until both are found and followed.
 const SAMPLES_OF_TWO: usize = 220;
-/// The first of them, of which the program looks closely at each.
+/// The first of them; the program looks closely at each.
 const FIRST: usize = 6;
 /// Samples of a film that nothing explains, most frames for them, and how far some dots are moved
 /// for that, mm.

@@ -51,7 +51,7 @@ pub(crate) fn binned(width: u32, picture: &[[Channel<i16>; 3]]) -> Vec<[Channel<
     pixels.map(mean).collect()
 }
 
-/// Returns all colours of the pixels of a picture, in rows of `width`, each of which sees one.
+/// Returns all colours of the pixels of a picture, in rows of `width`; each sees one colour.
 pub(crate) fn interpolated(width: u32, picture: &[[Channel; 3]]) -> Vec<[Channel; 3]> {
     let width = width as usize;
     let height = picture.len() / width;

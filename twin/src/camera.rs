@@ -146,7 +146,7 @@ impl Camera {
         self
     }
 
-    /// Returns the same camera with pixels so many times smaller.
+    /// Returns the same camera with pixels smaller by this factor.
     pub(crate) fn finer(self, times: u32) -> Camera {
         let factor = f64::from(times);
         Camera {

@@ -112,7 +112,7 @@ impl Light {
         self.room.through_to_touching(FILM_COLOUR, SKIN_COLOUR)
     }
 
-    /// Returns the colour of a pixel of which a part (0 to 1) has another colour.
+    /// Returns the colour of a pixel, a part (0 to 1) of it in another colour.
     pub(crate) fn painted(
         &self,
         pixel: usize,

@@ -37,7 +37,7 @@ pub enum Heard {
     Message(DeviceMessage),
     /// A job is done, or why not.
     Ended(Option<Ticket>, Result<String, Failure>),
-    /// A snapshot, or why there is none.
+    /// A snapshot, or why it is missing.
     Snapshot(Option<Ticket>, Result<Box<Taken>, Failure>),
     /// The conversation is over.
     Lost(Failure),

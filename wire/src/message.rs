@@ -26,7 +26,7 @@ pub const PROTOCOL_VERSION: u16 = 2;
 pub enum DeviceMessage {
     /// Answer to a [`HostMessage::Hello`] and to [`Request::GetInfo`].
     Hello(DeviceHello),
-    /// One frame's force, or why there is none.
+    /// One frame's force, or why it is missing.
     Sample(Sample),
     /// Counters since boot; sent once a second while streaming, and on request.
     Stats(Stats),

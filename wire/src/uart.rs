@@ -1,4 +1,4 @@
-//! Defines the UART on which a device sends its samples, beside USB.
+//! Defines the UART on which a device sends its samples in addition to USB.
 
 /// Bits a second; each byte has one start bit, eight data bits and one stop bit. Common adapters
 /// go that fast.

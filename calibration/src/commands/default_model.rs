@@ -24,7 +24,7 @@ pub struct DefaultModelArgs {
     /// Lens and camera: ov7725 (320 × 240), or mt9v034 (160 × 152, mono, black markers).
     #[arg(long, default_value = "ov7725")]
     preset: Preset,
-    /// Pixel format: rgb565, yuv422 or mono; the preset's own unless told.
+    /// Pixel format: rgb565, yuv422 or mono; the preset's own if not given.
     #[arg(long, value_parser = pixel_format)]
     format: Option<PixelFormat>,
     /// Where default.weights and default.hvtm go.

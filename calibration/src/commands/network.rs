@@ -151,7 +151,7 @@ pub struct UnitArgs {
     /// Standard uncertainty of where the stage's zero is on the film, mm.
     #[arg(long, default_value_t = 0.1)]
     stage_mm: f64,
-    /// Standard uncertainty of each place on its own, beside the stage's zero, mm: 0 with a stage,
+    /// Standard uncertainty of each place, besides that of the stage's zero, mm: 0 with a stage,
     /// some tenths where a place was found by eye.
     #[arg(long, value_name = "MM", default_value_t = 0.0, value_parser = length)]
     place_mm: f64,

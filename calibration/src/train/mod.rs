@@ -27,7 +27,7 @@ pub struct Samples {
     pub features: Vec<[f64; INPUTS]>,
     /// Answers except places, in the units of the network's meaning, row by row.
     pub answers: Vec<[f64; OUTPUTS]>,
-    /// The whole force (N), of which the answers may be a part, row by row. Used only by
+    /// The whole force (N) of each row; the answers may be a part of it. Used only by
     /// [`Options::direction_weight`].
     pub forces_n: Vec<[f64; OUTPUTS]>,
     /// The tip's place (mm), row by row, for a network that gives places; otherwise empty.

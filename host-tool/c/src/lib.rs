@@ -203,7 +203,7 @@ pub unsafe extern "C" fn hivtac_close(sensor: *mut Connection) {
     }
     // SAFETY: the caller's promise.
     let connection = unsafe { Box::from_raw(sensor) };
-    // A panic while it ends is told, as every other.
+    // A panic while it ends is reported, as every other.
     let _ = guarded(|| {
         drop(connection);
         Ok(())

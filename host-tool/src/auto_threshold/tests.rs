@@ -160,7 +160,7 @@ fn a_limit_keeps_its_margins() {
     assert!(error.contains("24 are needed between them"), "{error}");
 }
 
-/// Eight dots are found, and a missing one is told.
+/// Eight dots are found, and a missing one is reported.
 #[test]
 fn it_separates_eight_dots() {
     let eight = |missing: bool| {

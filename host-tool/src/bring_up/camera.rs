@@ -59,7 +59,7 @@ fn silent(refused: Option<String>, complaint: Option<String>) -> Step {
 }
 
 /// Judges an inspection. Registers that have differed from what was written since the camera's
-/// set-up are told, but not wrong.
+/// set-up are reported, but not wrong.
 pub fn judge(it: &Inspection, since_set_up: bool) -> Step {
     let different: Vec<_> = it.different.iter().map(different).collect();
     let (own, mut wrong) = match since_set_up {

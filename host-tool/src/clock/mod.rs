@@ -16,7 +16,7 @@ const LATE_NS: i64 = 1_000_000;
 const LATE_FOR_US: u64 = 3_000_000;
 /// A sample that is sooner by this, ns, shows that all before were late, or a clock was set.
 const SOONER_NS: i64 = -1_000_000;
-/// Latencies that must agree that it is another one: they are told once a second, each of one
+/// Latencies that must agree that it is another one: the device sends one each second, of one
 /// frame, and a frame may take longer than others.
 const LATENCIES: usize = 4;
 /// Differences of latencies up to this, µs, are chance; a longer exposure makes larger ones.
@@ -78,7 +78,7 @@ impl Arrival {
 /// clocks' rates. The device's own latency, from exposure to sample, is taken off.
 #[derive(Clone, Debug, Default)]
 pub struct Clock {
-    /// The last latencies that the device told, µs, and the one that is taken off.
+    /// The last latencies that the device reported, µs, and the one that is subtracted.
     latencies_us: VecDeque<u32>,
     latency_us: u32,
     line: Line,
@@ -94,7 +94,7 @@ impl Clock {
         if latency_us == 0 {
             return;
         }
-        // From the first one told on, a lesser one was right before, too.
+        // From the first report on, a lesser one was right before, too.
         let is_new = self.latencies_us.len() < LATENCIES;
         self.latencies_us.truncate(LATENCIES - 1);
         self.latencies_us.push_front(latency_us);

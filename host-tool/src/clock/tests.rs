@@ -45,7 +45,7 @@ fn a_device_that_starts_anew_and_a_clock_that_is_set_are_followed() {
     assert_eq!(clock.stamp_ns(16_000, START), START);
 }
 
-/// A sample comes 4.8 ms and 0 to 8 ms after its exposure. Once the device told its latency,
+/// A sample comes 4.8 ms and 0 to 8 ms after its exposure. Once the device reported its latency,
 /// stamps are true to 0.5 ms.
 #[test]
 fn the_devices_latency_is_taken_off() {

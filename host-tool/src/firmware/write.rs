@@ -5,7 +5,7 @@ use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::stop;
 use hivtac_wire::image::{FIRST_LOOK, FIRST_STAGE, Image, Part};
 
-/// What is told while an image is written.
+/// Reports progress while an image is written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Progress {
     /// The device has no first stage, which is written now, before all else.

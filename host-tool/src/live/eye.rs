@@ -182,7 +182,7 @@ impl Eye {
             (Presses::Scene, _) => Ok(scene.frame_by(&shutter, number, time_s)),
             (Presses::Course(course), _) => own(&|after_s| course.load(time_s + after_s)),
         };
-        // A load that the film's tables do not have is none.
+        // A load beyond the film's tables counts as no load.
         let frame = frame.or_else(|_| own(&|_| Load::REST));
         let frame = frame.unwrap_or_else(|_| scene.frame_by(&shutter, number, time_s));
         taken(frame)

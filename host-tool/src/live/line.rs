@@ -43,7 +43,7 @@ impl Tcp {
                 std::thread::sleep(LOOK_EVERY);
                 continue;
             };
-            // A host that has left again is none.
+            // A host that has left again does not count.
             let _ = converse_over(&stream, shared);
         }
     }

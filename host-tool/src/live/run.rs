@@ -102,9 +102,9 @@ pub struct Frames {
 /// What is to do at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Due {
-    /// The next frame is whole in so many µs.
+    /// The next frame is whole after this time, µs.
     In(u64),
-    /// A frame is whole, after so many that came too late to be taken.
+    /// A frame is whole; this many before it came too late to be taken.
     Now(u32),
 }
 
@@ -205,7 +205,7 @@ impl Clock {
     }
 }
 
-/// A number for the microcontroller of a twin: told from real ones by its first letters.
+/// A number for the microcontroller of a twin: its first letters distinguish it from real ones.
 pub fn device_id(kind: Kind, unit: u64) -> [u8; 12] {
     let mut id = *b"twin\0\0\0\0\0\0\0\0";
     let number = unit.to_be_bytes();

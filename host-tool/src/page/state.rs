@@ -27,7 +27,7 @@ pub struct State {
     /// The device's newest counters.
     pub stats: Option<Stats>,
     lines: VecDeque<String>,
-    /// The shape of what presses; `None` until the device told its settings.
+    /// The shape of what presses; `None` until the device sent its settings.
     pub contact_shape: Option<ContactShape>,
     /// What this sensor and another feel together, for a person; `None` without a grip.
     pub grip: Option<String>,

@@ -30,7 +30,7 @@ pub struct Told {
     pub threshold: Limits,
     /// The threshold that the model was made for.
     pub model_threshold: Option<Limits>,
-    /// The shape of what presses, as `hivtac settings` writes it; `None` until the device told it.
+    /// The shape of what presses, as `hivtac settings` writes it; `None` until the device sent it.
     pub contact: Option<String>,
     /// Samples a second.
     pub rate_hz: Option<f64>,

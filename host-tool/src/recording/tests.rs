@@ -179,7 +179,7 @@ fn what_other_tools_packed_trimmed_or_merged_is_read() {
     assert_eq!(times(&mut open(merged, Some(&second)).unwrap()), ALL);
 }
 
-/// One flipped bit loses at most the chunk it is in, and a loss is always told.
+/// One flipped bit loses at most the chunk it is in, and a loss is always reported.
 #[test]
 fn a_flipped_bit_loses_one_chunk_at_most() {
     let whole = recorded(&[1], &ALL, true);

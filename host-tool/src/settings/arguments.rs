@@ -115,7 +115,7 @@ pub enum SetCommand {
     },
     /// What is sent in place of each frame's own force
     ///
-    /// Contact and slip are told of each frame's own force all the same.
+    /// Contact and slip are of each frame's own force all the same.
     #[command(subcommand)]
     Filter(FilterCommand),
     /// Whether the rest position follows what drifts while nothing touches the film

@@ -86,7 +86,7 @@ impl<'p> Band<'p> {
         above: &[],
     };
 
-    /// Returns `rows` rows from the frame's row `y` on, all of which are in the band.
+    /// Returns `rows` rows from the frame's row `y` on; the band must have all of them.
     pub fn part(&self, y: u16, rows: usize) -> &'p [u16] {
         let start = usize::from(y - self.first) * self.row_length;
         let end = start + rows * self.row_length;

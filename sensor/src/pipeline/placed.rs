@@ -342,7 +342,7 @@ impl Seen<'_> {
     }
 }
 
-/// The marker, not lost, of which a load leaves most over; or the one with so many before it.
+/// The marker, not lost, that a load explains worst, after `before` others that it explains worse.
 fn least_explained(left: &Column, lost: Lost, before: usize) -> usize {
     let mut others = lost;
     let mut suspect = 0;

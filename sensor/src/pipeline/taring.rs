@@ -10,7 +10,7 @@ use hivtac_terms::units::MicroNewtons;
 
 /// A press of at least this that explains a change of the rest position is a touch: 0.3 mN.
 const TOUCHED: MicroNewtons = MicroNewtons(300);
-/// The same for a unit of which nothing else is known: its gluing may look like a smaller press.
+/// The same for a unit without any other knowledge: its gluing may look like a smaller press.
 /// Seen in 1,500 untouched units: at most 2.8 mN.
 const TOUCHED_OF_UNIT: MicroNewtons = MicroNewtons(4_000);
 /// The same if gravity pulled differently then. The effect of that is known to a few tenths: 1 mN.

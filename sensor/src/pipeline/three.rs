@@ -127,7 +127,7 @@ mod tests {
         }
     }
 
-    /// Nor three discs, of which two are nearest to the same rest place.
+    /// Nor three discs, if two are nearest to the same rest place.
     #[test]
     fn two_markers_are_too_few() {
         let (pattern, mut picture) = picture(&[0, 1]);

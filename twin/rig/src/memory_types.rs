@@ -110,7 +110,7 @@ impl MemoryTypes {
         }
     }
 
-    /// Returns a memory that the program may both write and execute; `None` if there is none.
+    /// Returns a memory that the program may both write and execute; `None` without one.
     pub fn writable_code(&self) -> Option<u64> {
         let state = self.lock();
         let is_writable_code = |address: &u64| {

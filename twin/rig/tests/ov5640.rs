@@ -98,7 +98,7 @@ fn half_as_many_instructions_per_second_are_enough() {
 }
 
 /// The light is that of the OV7725's tests. Its smaller pixels need the longest exposure and three
-/// times the gain; everything is as written, and told.
+/// times the gain; everything is as written, and reported.
 #[test]
 #[ignore = "10 s: as for the other cameras"]
 fn settings_and_inspection_are_its_own() {
@@ -123,7 +123,7 @@ fn settings_and_inspection_are_its_own() {
     assert_eq!(run.health().problems, 0, "{}", run.log());
 }
 
-/// A register that lost its value is told by both bytes of its address.
+/// A register that lost its value is named by both bytes of its address.
 #[test]
 #[ignore = "10 s: as for the other cameras"]
 fn a_register_that_changed_is_told_by_its_whole_address() {
@@ -235,7 +235,7 @@ fn an_exposure_that_is_found_in_small_steps_is_waited_for() {
     forces(&run);
 }
 
-/// Less light than its longest exposure and highest gain make up for is told.
+/// Too little light for its longest exposure and highest gain is reported.
 #[test]
 #[ignore = "as on the other camera"]
 fn a_search_that_finds_no_good_exposure_says_so() {

@@ -152,7 +152,7 @@ fn a_program_that_breaks_its_own_protection_gets_no_further() {
     const MPU_CTRL: u32 = 0xE000_ED94;
     const PRIVILEGED_DEFAULT: u32 = 1 << 2;
     const READ_ONLY: u32 = 0b110 << 24;
-    // External memory, of which there is none.
+    // External memory, which no board has.
     const NO_EXTERNAL: u32 = 0b1000_0111 << 8 | 31 << 1 | 1;
     let mut writes = vec![
         (MPU_CTRL + 4, 1),

@@ -28,7 +28,7 @@ const STEP_US: u64 = 21;
 const STEPS: u64 = 18;
 const CUTS: u64 = CUT.len() as u64 * STEPS;
 
-/// Begins a control transfer every so many milliseconds, each cut off a step later in it by what
+/// Begins a control transfer at a fixed interval, ms, each cut off a step later by what
 /// `cut` adds at a time in µs; then says hello.
 fn cut(period_ms: u64, cut: impl Fn(Setup, u64) -> Setup) -> Run {
     let end_ms = 200 + CUTS * period_ms;
@@ -68,7 +68,7 @@ fn another_setup_ends_a_control_transfer() {
     assert_eq!(greetings(&run), 2);
 }
 
-/// A suspend that the core tells late, together with the end of a reset, is none.
+/// A suspend that the core reports late, together with the end of a reset, does not count.
 #[test]
 fn a_stale_suspend_does_not_make_it_deaf() {
     let run = without_camera(220).fault("usb-stale-suspend").run();

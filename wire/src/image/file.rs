@@ -27,7 +27,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Reads a file: an ELF, of which the image is made, or an image.
+    /// Reads a file: an ELF, to make the image from, or an image.
     ///
     /// # Errors
     /// If it is not whole, or not for this chip and layout.

@@ -219,7 +219,7 @@ impl Follower {
         }
     }
 
-    /// Counts the current frame, of which no further data will come.
+    /// Counts the current frame; no further data of it will come.
     fn close(&mut self) {
         match self.under {
             Under::Nothing => {}

@@ -164,7 +164,7 @@ impl Fitting {
 /// A kept setting that a start could not use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unusable {
-    /// The rest position is none for these settings.
+    /// The rest position does not fit these settings.
     Tare,
     /// The limits of contact, slip or filter are out of range.
     Temporal,

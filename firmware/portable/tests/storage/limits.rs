@@ -18,7 +18,7 @@ fn the_longest_record_is_kept_and_a_longer_one_refused() {
     assert_eq!((length, payload), (Some(PAYLOAD_LIMIT), longest));
 }
 
-/// A record that only a seal behind its sector could follow is none.
+/// A record whose seal would lie behind its sector does not count.
 #[test]
 fn a_record_without_room_for_its_seal_is_not_read() {
     let mut cells = Cells::blank(1);

@@ -239,7 +239,7 @@ impl Device {
     }
 
     /// The self-test: of a device's checks, those that a twin can fail. It has neither stack nor
-    /// temperature nor supply; the latter two are told as 25 °C and watched.
+    /// temperature nor supply; it reports the latter two as 25 °C and watched.
     fn health(&mut self) -> Health {
         let answers_right = Model::parse(self.built_in).is_ok_and(|model| {
             let expected = known_answer::of(&model, &mut Network::new());

@@ -14,7 +14,7 @@ pub const KNOTS: core::ops::RangeInclusive<u8> = 2..=16;
 pub const LARGEST_STEP: f32 = 1e-3;
 /// Most entries of a lower triangle.
 const TRIANGLE: usize = triangle(MOST_EQUATIONS);
-/// Standard uncertainty as a fraction of the motion, for a unit of which only a rest picture is
+/// Standard uncertainty as a fraction of the motion, for a unit whose only known picture is at rest
 /// known, if the file has no grid for it. `OF_ITSELF` is that of each coordinate of a marker,
 /// `OF_ALL` that of all coordinates together.
 const OF_ITSELF: f32 = 0.03;

@@ -92,7 +92,7 @@ impl RestImage {
         ]
     }
 
-    /// Returns the mounting of a unit of which only a tare is known. Shift, turn and size of the
+    /// Returns the mounting of a unit when only its tare is known. Shift, turn and size of the
     /// whole pattern are attributed to the camera, because a rest picture cannot separate them from
     /// gluing. The remainder is gluing.
     pub fn mounting(&self, rest: &Rest) -> Mounting {

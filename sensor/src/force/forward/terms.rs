@@ -1,4 +1,4 @@
-//! Evaluates the polynomials in size and tilt of which the film's answer at one place is a sum.
+//! Evaluates the polynomials in size and tilt whose sum is the film's answer at one place.
 
 use crate::force::kernels::Factors;
 

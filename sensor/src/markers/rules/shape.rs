@@ -102,7 +102,7 @@ impl Shape {
         })
     }
 
-    /// The marker of which this is the image.
+    /// The marker with this image.
     pub fn marker(&self) -> Marker {
         Marker {
             x: self.x,

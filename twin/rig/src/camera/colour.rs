@@ -315,7 +315,7 @@ mod tests {
         Colour::of(registers, LIGHT, exposed).apply(picture).pixels[0]
     }
 
-    /// The response of which the gains above make white.
+    /// The response that the gains above make white.
     const LIGHT: [f64; 3] = [64.0 / 84.0, 1.0, 64.0 / 109.0];
     const GREY: u16 = 16 << 11 | 32 << 5 | 16;
     const RED: u16 = 24 << 11 | 10 << 5 | 5;

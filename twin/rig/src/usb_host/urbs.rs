@@ -81,7 +81,7 @@ pub struct Done {
 /// What a client's transfer asks of the port itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
-    /// The transaction, if any, is over; so many bytes came from and went to the device.
+    /// The transaction, if any, is over; these are the bytes that came from and went to the device.
     Over([usize; 2]),
     /// The client has reset the port.
     PortReset,
@@ -131,7 +131,7 @@ pub struct Urbs {
     /// Bulk and interrupt endpoints: those towards the host from 16 on.
     queues: [Queue; 32],
     turn: usize,
-    /// The ends of transfers that the client has not been told.
+    /// The ends of transfers that the client does not know yet.
     pub done: VecDeque<Done>,
     /// Packets that were dropped for their toggle.
     pub repeated: u64,
@@ -388,7 +388,7 @@ impl Queue {
     }
 }
 
-/// Returns the status of a transfer of so many bytes.
+/// Returns the status of a transfer of this many bytes.
 fn short(urb: &Urb, moved: usize) -> i32 {
     match urb.refuses_short && moved < urb.length {
         true => status::TOO_SHORT,
@@ -423,7 +423,7 @@ mod tests {
         Outline::of(&[9, 4, 0, 0, 1, 2, 2, 1, 0, 7, 5, 0x81, 3, 8, 0, 10])
     }
 
-    /// Makes so many transactions with a core that is off; returns the ends: number and status.
+    /// Makes this many transactions with a core that is off; returns the ends: number and status.
     fn ends(urbs: &mut Urbs, steps: u64) -> Vec<(u32, i32)> {
         for now in 0..steps {
             urbs.step(now, 7, &outline(), &mut Core::default());

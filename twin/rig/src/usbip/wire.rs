@@ -164,7 +164,7 @@ fn word(bytes: &VecDeque<u8>, at: usize) -> Option<u32> {
     Some(u32::from_be_bytes([byte(0)?, byte(1)?, byte(2)?, byte(3)?]))
 }
 
-/// Takes so many bytes, if they are there.
+/// Takes this many bytes, if they are there.
 fn take(bytes: &mut VecDeque<u8>, length: usize) -> Option<Vec<u8>> {
     (bytes.len() >= length).then(|| bytes.drain(..length).collect())
 }

@@ -28,7 +28,7 @@ pub struct Mirrored {
 const MIRRORED: usize = 4;
 
 impl LoadFunctions {
-    /// Returns the terms of which the functions are sums.
+    /// Returns the terms that the functions are sums of.
     pub fn terms() -> Terms {
         Terms::up_to(8, 4, 1)
     }

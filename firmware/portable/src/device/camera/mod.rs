@@ -86,7 +86,7 @@ impl Rolling {
     }
 }
 
-/// A quotient without a panic; 0 if it is none.
+/// A quotient without a panic; 0 when dividing by zero.
 const fn quotient(number: i64, divisor: i64) -> i64 {
     match number.checked_div(divisor) {
         Some(quotient) => quotient,

@@ -30,7 +30,7 @@ pub const WHITE: White = White { red: 91, blue: 102 };
 
 /// Columns and rows of the array, of 1.4 µm, that a frame shows.
 pub const WINDOW: [u16; 2] = [2_352, 1_764];
-/// Of so many columns and rows one is read, binned from two.
+/// One column and row in this many is read, binned from two.
 pub const SUBSAMPLING: u16 = 4;
 /// Lines from frame to frame: those of the window, two for the interpolation, 24 blank ones. Linux
 /// and OpenMV have no fewer blank ones.
