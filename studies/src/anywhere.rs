@@ -15,7 +15,7 @@ use hivtac_twin::Options;
 use serde::Serialize;
 
 use crate::page;
-use crate::press::{Errors, FORCES_MN, Information, REACH_MM, Row, TestedUnit, press};
+use crate::press::{Errors, FORCES_MN, Information, REACH_MM, TestedUnit, press};
 
 /// The weights file of the default model, which gives places.
 pub const WEIGHTS: &str = "calibration/models/default.weights";
@@ -74,9 +74,12 @@ impl Anywhere {
 /// Errors of presses on a unit, and their ratio to the Cramér–Rao bound.
 #[derive(Serialize)]
 struct Held {
-    /// Root mean squares of the errors.
-    #[serde(flatten)]
-    row: Row,
+    /// |F|, mN.
+    force_mn: u32,
+    /// Number of forces, and root mean squares of their errors: direction, degrees; |F|, mN; each
+    /// coordinate of the place, µm.
+    frames: u32,
+    rms: [f64; 3],
     /// Ratios for direction, |F| and place.
     times_the_bound: [f64; 3],
     #[serde(skip)]
@@ -114,15 +117,17 @@ impl Held {
                 *reasons.entry(refusals(answer.status)).or_insert(0) += 1;
             }
         }
-        let row = errors.row(force_mn);
+        let rms = errors.rms();
         let bounds = bounds.map(|sum| (sum / f64::from(errors.count)).sqrt());
         Ok(Held {
+            force_mn,
+            frames: errors.count,
+            rms,
             times_the_bound: [
-                row.direction_deg.to_radians() / bounds[0],
-                row.magnitude_mn / (1e3 * bounds[1]),
-                row.place_um / (1e3 * bounds[2]),
+                rms[0].to_radians() / bounds[0],
+                rms[1] / (1e3 * bounds[1]),
+                rms[2] / (1e3 * bounds[2]),
             ],
-            row,
             errors,
             reasons,
             hidden: presses - answers.len() as u32,
@@ -133,13 +138,8 @@ impl Held {
     /// within their stated bounds. Then the number of presses without a force, with the reasons,
     /// and of those left out.
     fn cells(&self) -> String {
-        let Row {
-            force_mn,
-            direction_deg,
-            magnitude_mn,
-            place_um,
-            ..
-        } = self.row;
+        let force_mn = self.force_mn;
+        let [direction_deg, magnitude_mn, place_um] = self.rms;
         let [direction, force, place] = self.errors.covered();
         let [a, b, c] = self.times_the_bound;
         let reasons = self.reasons.iter();

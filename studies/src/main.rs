@@ -1,17 +1,14 @@
-//! `hivtac-studies`: runs the project's studies. They compare its results with what is possible and
-//! with the paper's pipeline, and test units drawn at random.
+//! `hivtac-studies`: runs the studies whose figures change with the models: units drawn at random,
+//! what presses them, and how near their errors come to the least that is possible.
 
 mod anywhere;
 mod contacts;
 mod page;
-mod paper;
 mod press;
 mod scene;
-mod slip;
 mod touches;
 mod tradeoff;
 mod units;
-mod unseen;
 
 use anyhow::Result;
 use clap::{Parser, Subcommand};
@@ -28,13 +25,10 @@ struct Cli {
 enum Command {
     Anywhere(anywhere::Anywhere),
     Contacts(contacts::Contacts),
-    Paper(paper::Paper),
     #[command(subcommand)]
     Scene(scene::SceneCommand),
-    Slip(slip::Slip),
     Touches(Box<touches::Touches>),
     Tradeoff(tradeoff::TradeoffArgs),
-    Unseen(unseen::Unseen),
     Units(units::Units),
 }
 
@@ -44,12 +38,9 @@ fn main() -> Result<()> {
     match Cli::parse().command {
         Command::Anywhere(study) => study.run(),
         Command::Contacts(study) => study.run(),
-        Command::Paper(study) => study.run(),
         Command::Scene(command) => command.run(),
-        Command::Slip(study) => study.run(),
         Command::Touches(study) => study.run(),
         Command::Tradeoff(study) => study.run(),
-        Command::Unseen(study) => study.run(),
         Command::Units(study) => study.run(),
     }
 }

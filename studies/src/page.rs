@@ -15,18 +15,9 @@ pub fn write(name: &str, text: &str, results: &str) -> Result<()> {
     let (before, after) = text
         .split_once(PLACE)
         .context("the page has no place for its results")?;
-    let text = format!("{before}{}{after}", results.trim_end());
-    write_file(&Path::new("docs/results").join(name), &text)
-}
-
-/// Writes a file of the project and prints its name.
-pub fn write_file(path: &Path, text: &str) -> Result<()> {
-    fs::write(path, text).with_context(|| {
-        format!(
-            "cannot write {}: run it in the project's folder",
-            path.display()
-        )
-    })?;
+    let path = Path::new("docs/results").join(name);
+    fs::write(&path, format!("{before}{}{after}", results.trim_end()))
+        .with_context(|| format!("cannot write {}: run it in the project", path.display()))?;
     println!("wrote {}", path.display());
     Ok(())
 }

@@ -6,6 +6,10 @@ use crate::frame::*;
 use crate::message::{DeviceMessage, HostMessage, Outcome, Reply};
 use crate::version::{HelloPrefix, SCHEMA_HASH};
 use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::TestRunner;
+use std::collections::HashSet;
+use std::mem::discriminant;
 use std::vec::Vec;
 
 type HostDecoder = Decoder<DEVICE_FRAME_LIMIT>;
@@ -202,4 +206,20 @@ fn the_same_version_with_another_schema_is_foreign() {
     let bytes = frame(&HostMessage::Hello(prefix.into()));
     let received: Vec<Received<HostMessage>> = decode_all(&mut DeviceDecoder::new(), &bytes);
     assert_eq!(received, [Received::ForeignHello(prefix)]);
+}
+
+/// What the properties above are tested with.
+#[test]
+fn any_message_is_of_every_kind() {
+    let mut runner = TestRunner::deterministic();
+    let (mut device, mut host) = (HashSet::new(), HashSet::new());
+    for _ in 0..500 {
+        let message = any_device_message().new_tree(&mut runner);
+        device.insert(discriminant(&message.unwrap().current()));
+        let message = any_host_message().new_tree(&mut runner);
+        if let HostMessage::Command(command) = message.unwrap().current() {
+            host.insert(discriminant(&command.request));
+        }
+    }
+    assert_eq!((device.len(), host.len()), (11, 24));
 }

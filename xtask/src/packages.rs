@@ -1,7 +1,6 @@
 //! Installs missing Debian packages if allowed, or else names them.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
@@ -39,32 +38,6 @@ pub fn install(packages: &str, why: &str) -> Result<()> {
 pub fn are_known(package: &str) -> bool {
     let knows = || process::succeeds(command("apt-cache show").arg(package));
     knows() || process::succeeds(&mut command("apt-get update")) && knows()
-}
-
-/// Unpacks a Debian package into a folder of its name below `folder`, without installing it; one
-/// that is there already is kept.
-pub fn unpacked(package: &str, folder: &Path) -> Result<PathBuf> {
-    let unpacked = folder.join(package);
-    if unpacked.is_dir() {
-        return Ok(unpacked);
-    }
-    let fresh = folder.join("fresh");
-    if fresh.exists() {
-        fs::remove_dir_all(&fresh).with_context(|| format!("removing {}", fresh.display()))?;
-    }
-    fs::create_dir_all(&fresh).with_context(|| format!("creating {}", fresh.display()))?;
-    let mut download = command("apt-get download");
-    process::run(download.arg(package).current_dir(&fresh))?;
-    let mut files = fs::read_dir(&fresh)?;
-    let file = files.next().context("apt-get downloaded nothing")??.path();
-    process::run(
-        command("dpkg-deb --extract")
-            .arg(&file)
-            .arg(fresh.join("files")),
-    )?;
-    fs::rename(fresh.join("files"), &unpacked)
-        .with_context(|| format!("renaming to {}", unpacked.display()))?;
-    Ok(unpacked)
 }
 
 /// Installs QEMU's PC, if missing.

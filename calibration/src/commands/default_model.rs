@@ -8,15 +8,13 @@ use hivtac_calibration::data::conditions::pixel_format;
 use hivtac_calibration::data::dataset::{Loads, Recipe};
 use hivtac_calibration::network::Meaning;
 use hivtac_calibration::train::Options;
+use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::geometry::Preset;
 use hivtac_terms::threshold::PixelFormat;
 
 use super::data::rendered;
 use super::model::{CheckArgs, exported};
 use super::network::trained;
-
-/// Number of Gauss–Newton steps.
-const STEPS: u8 = 1;
 
 /// Options of `default-model`.
 #[derive(Args)]
@@ -27,6 +25,14 @@ pub struct DefaultModelArgs {
     /// Pixel format: rgb565, yuv422 or mono; the preset's own if not given.
     #[arg(long, value_parser = pixel_format)]
     format: Option<PixelFormat>,
+    /// Plain means of each marker's pixels, not weighted by redness: faster and less accurate.
+    #[arg(long)]
+    binary: bool,
+    /// Gauss–Newton steps from the network's answer, 0 to 3; with 0 the network alone.
+    #[arg(long, default_value_t = 1)]
+    steps: u8,
+    #[command(flatten)]
+    options: Options,
     /// Where default.weights and default.hvtm go.
     #[arg(long, default_value = "calibration/models")]
     out_dir: PathBuf,
@@ -37,6 +43,10 @@ impl DefaultModelArgs {
         let usual = Recipe::of(self.preset);
         let recipe = Recipe {
             format: self.format.unwrap_or(usual.format),
+            centroid: match self.binary {
+                true => CentroidEstimator::BinaryMask,
+                false => usual.centroid,
+            },
             ..usual
         };
         let noise = Recipe {
@@ -46,12 +56,13 @@ impl DefaultModelArgs {
         };
         let options = Options {
             meaning: Meaning::ForceAndPlace,
-            ..Options::default()
+            ..self.options.clone()
         };
-        let weights = trained(&rendered(&recipe)?, &options)?;
-        let weights = weights
-            .with_film(STEPS, &rendered(&noise)?)?
-            .with_others()?;
+        let mut weights = trained(&rendered(&recipe)?, &options)?;
+        if self.steps > 0 {
+            weights = weights.with_film(self.steps, &rendered(&noise)?)?;
+            weights = weights.with_others()?;
+        }
         weights.save(&self.out_dir.join("default.weights"))?;
         let model = self.out_dir.join("default.hvtm");
         exported(&weights, &model)?;

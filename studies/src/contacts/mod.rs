@@ -1,7 +1,6 @@
 //! Presses by objects that are no needles, by the full solver, and what the sensing makes of them.
 
 mod objects;
-mod presses;
 mod reading;
 mod row;
 
@@ -21,8 +20,7 @@ use rayon::prelude::*;
 use crate::anywhere::WEIGHTS;
 use crate::page;
 
-pub use objects::{KINDS, Kind};
-pub use presses::{Plan, Press, presses};
+use objects::{KINDS, Kind, Press, presses};
 use reading::Reader;
 use row::Row;
 
@@ -67,12 +65,7 @@ impl Contacts {
             fineness: self.fineness,
             ..Design::default()
         })?;
-        let plan = Plan {
-            of_each: self.presses,
-            seed: self.seed,
-            near_dots: self.near_dots,
-        };
-        let presses = presses(&film, plan)?;
+        let presses = presses(&film, self.presses, self.seed, self.near_dots);
         let layout = weights.conditions.layout()?;
         let rows = self.rows(&model, &film, layout, &presses)?;
         if self.json {

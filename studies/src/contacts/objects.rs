@@ -1,13 +1,14 @@
-//! Draws objects that press the film, and how they do it.
+//! Draws objects that press the film, and solves what they do to it, with the truth.
 
-use anyhow::Result;
-use hivtac_shell::{Body, Ends, Patch, Shape};
+use anyhow::{Context, Result};
+use hivtac_shell::{Body, Ends, Equilibrium, Film, Patch, Shape};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::units::Micrometres;
 use hivtac_twin::film::reduced::NOMINAL_RADIUS_MM;
 use hivtac_twin::{Load, MARKER_REST_MM};
 use rand::Rng;
 use rand_chacha::ChaCha8Rng;
+use rayon::prelude::*;
 
 use crate::press::{ANGLE_DEG, REACH_MM, seeded};
 
@@ -56,25 +57,58 @@ pub const KINDS: [Kind; 11] = [
 ];
 
 /// What presses.
-#[derive(Clone, Debug)]
-pub enum Object {
+enum Object {
     /// A pressure that is known before.
     Patch(Patch),
     /// A body whose pressure follows from its contact.
     Body(Body),
 }
 
-/// An object and the force that presses it on the film.
+/// A press of an object.
 #[derive(Clone, Debug)]
-pub struct Drawn {
-    /// The object in words, with its sizes.
-    pub name: String,
-    /// The object.
-    pub object: Object,
+pub struct Press {
+    /// The object's kind.
+    pub kind: Kind,
     /// Its shape, if the sensor can be told.
     pub shape: Option<ContactShape>,
-    /// The force on the film, N, film frame.
+    /// The film under it.
+    pub state: Equilibrium,
+    /// The true force on the film, N, film frame.
     pub force_n: [f64; 3],
+    /// The true centre of pressure, mm: the mean of the points of the mounted film that touch,
+    /// weighted by the normal pressure.
+    pub centre_mm: [f64; 2],
+}
+
+/// Solves presses of all kinds on a film, so many of each, on all threads. They come by kind, in
+/// the order of [`KINDS`], each kind in the order of its draws, anywhere or beside dots only. A
+/// press is left out if the contact reaches too far for the solver; it is told on stderr.
+pub fn presses(film: &Film, of_each: u32, seed: u64, near_dots: bool) -> Vec<Press> {
+    let draws = KINDS
+        .into_iter()
+        .flat_map(|kind| (0..of_each).map(move |number| (kind, number)));
+    let solved = draws.collect::<Vec<_>>().into_par_iter();
+    let solved = solved.map(|(kind, number)| {
+        let press = kind.press(film, seed, number, near_dots);
+        press.inspect_err(|why| eprintln!("left out: {why:#}")).ok()
+    });
+    solved.collect::<Vec<_>>().into_iter().flatten().collect()
+}
+
+impl Object {
+    /// The film under it with a force, N, and the centre of the pressure, mm.
+    fn press(self, film: &Film, force_n: [f64; 3]) -> Result<(Equilibrium, [f64; 2])> {
+        Ok(match self {
+            Object::Patch(patch) => {
+                let state = film.press_patch(&patch, force_n, &film.rest());
+                (state?, patch.centre_mm())
+            }
+            Object::Body(body) => {
+                let touch = film.press_body(&body, force_n, &film.rest())?;
+                (touch.state, touch.patch.centre_mm())
+            }
+        })
+    }
 }
 
 impl Kind {
@@ -91,12 +125,12 @@ impl Kind {
         }
     }
 
-    /// Draws press `number` of this kind: the same for the same seed, however many are drawn. Its
-    /// place is anywhere within [`REACH_MM`], or [beside a dot](beside_a_dot).
+    /// Draws press `number` of this kind and solves it: the same for the same seed, however many
+    /// are drawn. Its place is anywhere within [`REACH_MM`], or [beside a dot](beside_a_dot).
     ///
     /// # Errors
-    /// Never, as long as the ranges are those of a load and of objects.
-    pub fn draw(self, seed: u64, number: u32, near_dots: bool) -> Result<Drawn> {
+    /// If the film finds no rest under it.
+    pub fn press(self, film: &Film, seed: u64, number: u32, near_dots: bool) -> Result<Press> {
         let mut random = seeded(seed);
         let index = KINDS
             .iter()
@@ -114,11 +148,14 @@ impl Kind {
         let load = Load::from_angles(force_n, alpha_deg, beta_deg)?;
         let (name, object, shape) = self.object(place_mm, &mut random)?;
         let [x, y] = place_mm;
-        Ok(Drawn {
-            name: format!("{name} over ({x:.2}, {y:.2}) mm, {:.0} mN", 1e3 * force_n),
-            object,
+        let (state, centre_mm) = (object.press(film, load.vector_n()))
+            .with_context(|| format!("{name} at ({x:.2}, {y:.2}) mm, {:.0} mN", 1e3 * force_n))?;
+        Ok(Press {
+            kind: self,
             shape,
+            state,
             force_n: load.vector_n(),
+            centre_mm,
         })
     }
 
@@ -191,34 +228,4 @@ fn beside_a_dot(place_mm: [f64; 2]) -> [f64; 2] {
         let beside = BESIDE_MM * (2.0 * part.abs() / REACH_MM - 1.0);
         (MARKER_REST_MM + beside).min(REACH_MM).copysign(part)
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn draws_are_the_same_for_the_same_seed_and_differ_otherwise() {
-        for kind in KINDS {
-            let draw = |seed, number| kind.draw(seed, number, false).unwrap();
-            assert_eq!(draw(1, 3).name, draw(1, 3).name);
-            assert_ne!(draw(1, 3).force_n, draw(1, 4).force_n);
-            assert_ne!(draw(1, 3).force_n, draw(2, 3).force_n);
-            let [x, y, z] = draw(1, 3).force_n;
-            let size = (x * x + y * y + z * z).sqrt();
-            assert!((FORCES_N[0]..=FORCES_N[1]).contains(&size) && z < 0.0);
-        }
-    }
-
-    #[test]
-    fn presses_beside_dots_stay_within_reach() {
-        for [x, y] in [[0.0, 4.0], [-0.1, -3.9], [2.0, -2.0], [4.0, 0.5]] {
-            let found = beside_a_dot([x, y]);
-            for (part, before) in found.into_iter().zip([x, y]) {
-                assert!(part.abs() <= REACH_MM && part * before >= 0.0);
-                assert!((part.abs() - MARKER_REST_MM).abs() <= BESIDE_MM);
-            }
-        }
-        assert_eq!(beside_a_dot([2.0, -2.0]), [MARKER_REST_MM, -MARKER_REST_MM]);
-    }
 }

@@ -9,7 +9,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_twin::film::Layout;
 use hivtac_twin::{Frame, Load, Options};
 
-use super::presses::Press;
+use super::objects::Press;
 use crate::press::{Tared, TestedUnit};
 
 /// Numbers of noise that a press has for itself.
@@ -107,8 +107,7 @@ mod tests {
         let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"));
         let model = model.unwrap();
         let film = Film::new(&Design::default()).unwrap();
-        let drawn = Kind::Needle.draw(12, 71, true).unwrap();
-        let press = Press::solve(&film, Kind::Needle, drawn).unwrap();
+        let press = Kind::Needle.press(&film, 12, 71, true).unwrap();
         let reader = Reader::new(&model, &film, Layout::default(), (5, 1)).unwrap();
         let [answers] = reader.read((0, &press), [press.shape]).unwrap();
         for answer in answers {

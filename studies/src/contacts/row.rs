@@ -2,17 +2,16 @@
 
 use std::collections::BTreeMap;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use hivtac_calibration::data::dataset::reasons;
 use hivtac_calibration::data::loads::norm;
-use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
-use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::Force;
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_terms::status::Status;
 use serde::Serialize;
 
-use super::presses::Press;
+use super::objects::Press;
+use crate::press::{Judged, judged};
 
 /// What the sensor made of the frames of a kind of presses.
 #[derive(Debug, Default, Serialize)]
@@ -70,25 +69,15 @@ impl Row {
     fn add_force(&mut self, force: &Force, status: Status, press: &Press) -> Result<()> {
         self.of_three += u32::from(status.contains(Status::MARKER_LOST));
         self.loosely += u32::from(status.contains(Status::LOOSELY_EXPLAINED));
-        let place = force.place.context("the model tells no places")?;
-        let [x, y] = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
-        let size_n = norm(press.force_n);
-        let found = force.cartesian.map(|part| f64::from(part.0));
-        let stronger = f64::from(force.magnitude.0) * 1e-6 / size_n - 1.0;
-        let errors = [
-            angle_deg(found, press.force_n).unwrap_or(180.0),
-            stronger.abs(),
-            (x - press.centre_mm[0]).hypot(y - press.centre_mm[1]),
-        ];
-        let bounds = [
-            DIRECTION_BOUND * f64::from(force.direction_sigma.0) * 1e-3,
-            MAGNITUDE_BOUND * f64::from(force.magnitude_sigma.0) * 1e-6 / size_n,
-            PLACE_BOUND * f64::from(place.sigma.0) * 1e-3,
-        ];
-        self.stronger += stronger;
+        let size_mn = 1e3 * norm(press.force_n);
+        let Judged { errors, bounds } = judged(force, press.force_n, press.centre_mm)?;
+        self.stronger += errors[1] / size_mn;
+        // |F| in parts of the true size, places in mm.
+        let units = [1.0, size_mn, 1e3];
         for k in 0..3 {
-            self.errors[k].push(errors[k]);
-            self.within[k] += u32::from(errors[k] <= bounds[k]);
+            let error = errors[k].abs();
+            self.errors[k].push(error / units[k]);
+            self.within[k] += u32::from(error <= bounds[k]);
         }
         Ok(())
     }

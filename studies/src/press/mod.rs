@@ -1,20 +1,19 @@
 //! Known presses on simulated sensors, and the sensor's answers.
 
 mod bound;
-mod random_unit;
 mod real;
 mod rows;
 mod unit;
 
 pub use bound::Information;
-use random_unit::RandomUnit;
-pub use random_unit::{normal, seeded};
 pub use real::RealFilm;
-pub use rows::{Errors, Row};
+pub use rows::{Errors, Judged, judged};
 pub use unit::{Answer, Tared, TestedUnit};
 
 use hivtac_shell::halton;
 use hivtac_twin::{FilmError, Load};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
 /// Forces, mN.
 pub const FORCES_MN: [u32; 3] = [50, 100, 200];
@@ -36,4 +35,14 @@ pub fn press(number: u32, [from_n, to_n]: [f64; 2], reach_mm: f64) -> Result<Loa
 /// coordinate.
 fn part(number: u32, base: usize) -> f64 {
     halton(number as usize + 20, base)
+}
+
+/// A random number generator, the same for the same seed.
+pub fn seeded(seed: u64) -> ChaCha8Rng {
+    ChaCha8Rng::seed_from_u64(seed)
+}
+
+/// The sum of twelve uniform numbers: nearly normal, with variance 1.
+pub fn normal(random: &mut ChaCha8Rng) -> f64 {
+    (0..12).map(|_| random.random_range(-0.5..0.5)).sum()
 }

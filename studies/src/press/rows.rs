@@ -1,11 +1,11 @@
-//! Sums errors of many answers, by force.
+//! Errors of forces, and their sums over many answers.
 
 use anyhow::{Context, Result};
+use hivtac_calibration::data::loads::norm;
 use hivtac_calibration::evaluation::bounds::{DIRECTION_BOUND, MAGNITUDE_BOUND, PLACE_BOUND};
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::Force;
 use hivtac_twin::Load;
-use serde::Serialize;
 
 /// Sums of squares of errors, and the number of errors within their stated bounds.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,19 +23,31 @@ pub struct Errors {
     within: [u32; 3],
 }
 
-/// Root mean square errors at a force.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    /// |F|, mN.
-    pub force_mn: u32,
-    /// Error of the direction, degrees.
-    pub direction_deg: f64,
-    /// Error of |F|, mN.
-    pub magnitude_mn: f64,
-    /// Error of each coordinate of the place, µm.
-    pub place_um: f64,
-    /// Number of forces.
-    pub frames: u32,
+/// What a force states of its direction (degrees), |F| (mN) and place (µm).
+pub struct Judged {
+    /// Errors; that of |F| is positive if it is too large.
+    pub errors: [f64; 3],
+    /// The stated 95 % bounds.
+    pub bounds: [f64; 3],
+}
+
+/// Compares a force with the true one, N, and its place, mm; a force without a place is an error.
+pub fn judged(force: &Force, truth_n: [f64; 3], truth_mm: [f64; 2]) -> Result<Judged> {
+    let place = force.place.context("the model tells no places")?;
+    let found_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
+    let [x, y] = [place.x, place.y].map(|part| f64::from(part.0));
+    Ok(Judged {
+        errors: [
+            angle_deg(found_n, truth_n).unwrap_or(180.0),
+            f64::from(force.magnitude.0) * 1e-3 - 1e3 * norm(truth_n),
+            (x - 1e3 * truth_mm[0]).hypot(y - 1e3 * truth_mm[1]),
+        ],
+        bounds: [
+            DIRECTION_BOUND * f64::from(force.direction_sigma.0) * 1e-3,
+            MAGNITUDE_BOUND * f64::from(force.magnitude_sigma.0) * 1e-3,
+            PLACE_BOUND * f64::from(place.sigma.0),
+        ],
+    })
 }
 
 impl Errors {
@@ -45,35 +57,8 @@ impl Errors {
             self.refused += 1;
             return Ok(());
         };
-        let found_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
-        let place = force.place.context("the model tells no places")?;
-        let found_mm = [place.x, place.y].map(|part| f64::from(part.0) * 1e-3);
-        let bounds = [
-            DIRECTION_BOUND * f64::from(force.direction_sigma.0) * 1e-3,
-            MAGNITUDE_BOUND * f64::from(force.magnitude_sigma.0) * 1e-3,
-            PLACE_BOUND * f64::from(place.sigma.0),
-        ];
-        let magnitude_n = f64::from(force.magnitude.0) * 1e-6;
-        let truth = (truth.vector_n(), truth.offset_mm());
-        self.take((found_n, magnitude_n, found_mm), truth, bounds);
-        Ok(())
-    }
-
-    /// Adds a force (N), its magnitude (N) and its place (mm), with the true force and place. Also
-    /// takes the stated 95 % bounds: of the direction (degrees), of |F| (mN), and of the place
-    /// (µm).
-    pub fn take(
-        &mut self,
-        (found_n, magnitude_n, found_mm): ([f64; 3], f64, [f64; 2]),
-        (truth_n, truth_mm): ([f64; 3], [f64; 2]),
-        bounds: [f64; 3],
-    ) {
-        let true_size_n = truth_n.iter().map(|part| part * part).sum::<f64>().sqrt();
-        let errors = [
-            angle_deg(found_n, truth_n).unwrap_or(180.0),
-            1e3 * (magnitude_n - true_size_n).abs(),
-            1e3 * (found_mm[0] - truth_mm[0]).hypot(found_mm[1] - truth_mm[1]),
-        ];
+        let Judged { errors, bounds } = judged(force, truth.vector_n(), truth.offset_mm())?;
+        let errors = errors.map(f64::abs);
         self.count += 1;
         // Ratio of three standard uncertainties to a 95 % bound.
         let far = 3.0 / MAGNITUDE_BOUND;
@@ -83,6 +68,7 @@ impl Errors {
             self.squares[k] += errors[k] * errors[k] / if k == 2 { 2.0 } else { 1.0 };
             self.within[k] += u32::from(errors[k] <= bounds[k]);
         }
+        Ok(())
     }
 
     /// Adds the errors of another sum.
@@ -105,17 +91,5 @@ impl Errors {
     pub fn covered(&self) -> [f64; 3] {
         self.within
             .map(|within| 100.0 * f64::from(within) / f64::from(self.count))
-    }
-
-    /// The row for a force.
-    pub fn row(&self, force_mn: u32) -> Row {
-        let [direction_deg, magnitude_mn, place_um] = self.rms();
-        Row {
-            force_mn,
-            direction_deg,
-            magnitude_mn,
-            place_um,
-            frames: self.count,
-        }
     }
 }

@@ -12,12 +12,16 @@ use hivtac_sensor::tare::TareBuilder;
 use hivtac_terms::status::Status;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, Pose, Unit};
 use hivtac_twin::film::{Dots, Layout, Pressed};
+use hivtac_twin::units::{TIP_RADIUS_MM, random_unit};
 use hivtac_twin::{Frame, Load, Options, Scene, Truth};
+use rand::Rng;
 
-use super::{RandomUnit, RealFilm};
+use super::{RealFilm, normal, seeded};
 
 /// Frames of a tare.
 const TARE_FRAMES: u16 = 64;
+/// The focal length of all lenses, µm.
+const FOCAL_UM: f64 = 2100.0;
 
 /// A simulated sensor, as a person built it.
 pub struct TestedUnit {
@@ -68,10 +72,10 @@ impl TestedUnit {
     /// The unit with this number and these dots among randomly drawn units.
     pub fn random(conditions: &Conditions, layout: Layout, number: u64) -> Result<Self> {
         let focal_px = conditions.geometry.focal.to_f64();
-        let RandomUnit {
-            options,
-            tip_radius_mm,
-        } = RandomUnit::new(number, layout, focal_px);
+        let mut random = seeded(number);
+        let options = random_unit(|| normal(&mut random), layout, FOCAL_UM, focal_px);
+        let [from, to] = TIP_RADIUS_MM;
+        let tip_radius_mm = random.random_range(from..to);
         Self::new(conditions, options, tip_radius_mm, number)
     }
 

@@ -1,16 +1,12 @@
 //! `hivtac-studies tradeoff`: picks the best configuration under a user's limits
 //! (`docs/tradeoff.md`).
 
-mod model;
 mod pick;
 
 use std::fmt;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use hivtac_calibration::progress::bar;
-use hivtac_terms::conditions::CentroidEstimator;
 use serde::Deserialize;
 
 use pick::{Limits, best};
@@ -20,28 +16,23 @@ const TABLE: &str = include_str!("../../tradeoff/configurations.csv");
 /// The core's cycles in a microsecond.
 const CYCLES_PER_US: f64 = 480.0;
 
-/// Pick the configuration that is best under limits of time and error.
+/// Pick the configuration that is best under limits of time and error; without any, the default
+/// model's.
 #[derive(Args)]
 pub struct TradeoffArgs {
     #[command(flatten)]
     limits: Limits,
-    /// Train the pick on as many frames as the default model, and write its model and settings into
-    /// this folder. Without any limit the pick is the default.
-    #[arg(long)]
-    out: Option<PathBuf>,
 }
 
-/// One configuration, as a row of the table.
+/// One configuration, as a row of the table. All that the firmware supports unchanged have frames
+/// of 320×240.
 #[derive(Clone, Debug, Deserialize)]
 struct Configuration {
-    /// Columns and rows of a frame.
-    width: u16,
-    height: u16,
     /// Estimator of the markers' positions: `binary` or `weighted`.
     centroid: String,
     /// Widths of the network's hidden layers, such as `64-64`.
     network: String,
-    /// Format of its numbers: `f32`, `int16` or `int8 per channel`.
+    /// Format of its numbers: `int16` or `int8 per channel`.
     numbers: String,
     /// Least number of Gauss–Newton steps from the network's answer; 0 for the network alone.
     steps: u8,
@@ -62,15 +53,11 @@ struct Configuration {
 }
 
 impl TradeoffArgs {
-    /// Picks a configuration and prints it; trains it if a folder is given.
+    /// Picks a configuration; prints it and the command that makes its model.
     pub fn run(&self) -> Result<()> {
         let all = configurations()?;
         let picked = best(&all, &self.limits)?;
-        println!("{}", described(picked));
-        if let Some(folder) = &self.out {
-            let rendering = bar("rendering", model::FRAMES);
-            println!("{}", model::write(picked, folder, || rendering.inc(1))?);
-        }
+        println!("{}\n\n{}", described(picked), picked.command());
         Ok(())
     }
 }
@@ -92,14 +79,6 @@ fn configurations() -> Result<Vec<Configuration>> {
 }
 
 impl Configuration {
-    /// The estimator as the sensing's type.
-    fn estimator(&self) -> CentroidEstimator {
-        match self.centroid.as_str() {
-            "binary" => CentroidEstimator::BinaryMask,
-            _ => CentroidEstimator::RednessWeighted,
-        }
-    }
-
     fn microseconds(&self) -> f64 {
         self.modelled_cycles as f64 / CYCLES_PER_US
     }
@@ -113,23 +92,37 @@ impl Configuration {
     fn limit_error_deg(&self) -> f64 {
         self.strong_direction_deg + self.strong_direction_deg_95.unwrap_or(0.0)
     }
+
+    /// The command that makes its model.
+    fn command(&self) -> String {
+        let binary = if self.centroid == "binary" {
+            " --binary"
+        } else {
+            ""
+        };
+        format!(
+            "hivtac-calibrate default-model{binary} --hidden {} --arithmetic {} --steps {} \
+             --out-dir .",
+            self.network.replace('-', ","),
+            self.numbers.replace(' ', "-"),
+            self.steps
+        )
+    }
 }
 
 impl fmt::Display for Configuration {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
-            width,
-            height,
             centroid,
             network,
             numbers,
             steps,
             ..
         } = self;
+        let s = if *steps == 1 { "" } else { "s" };
         write!(
             f,
-            "{network} ({numbers}) with {steps} step{} on {centroid} centroids of {width}×{height}",
-            if *steps == 1 { "" } else { "s" }
+            "{network} ({numbers}) with {steps} step{s} on {centroid} centroids"
         )
     }
 }
@@ -162,9 +155,13 @@ mod tests {
         let picked = best(&all, &Limits::default()).unwrap();
         let bytes = include_bytes!("../../../calibration/models/default.hvtm");
         let model = Model::parse(bytes).unwrap();
-        assert_eq!(model.conditions.centroid, picked.estimator());
+        assert_eq!(model.conditions.centroid.name(), "redness-weighted");
         let name = format!("11-{}-5 ov7725", picked.network);
         assert_eq!(model.name().as_str(), name);
         assert_eq!(model.forward.map_or(0, |film| film.steps), picked.steps);
+        assert_eq!(
+            picked.command(),
+            "hivtac-calibrate default-model --hidden 64,64 --arithmetic int16 --steps 1 --out-dir ."
+        );
     }
 }

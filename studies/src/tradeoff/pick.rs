@@ -85,77 +85,29 @@ impl Limits {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// A configuration with a number of cycles and errors of direction (degrees) and |F| (mN).
-    fn made(cycles: i64, [direction, force]: [f64; 2]) -> Configuration {
-        Configuration {
-            width: 320,
-            height: 240,
-            centroid: "weighted".to_owned(),
-            network: "16-16".to_owned(),
-            numbers: "int16".to_owned(),
-            steps: 1,
-            direction_deg: 3.0 * direction,
-            strong_direction_deg: direction,
-            strong_direction_deg_95: Some(0.1 * direction),
-            force_rmse_mn: force,
-            place_rmse_um: 10.0,
-            unexplained: 0.001,
-            modelled_cycles: cycles,
-            latency_microseconds: 10.0,
-        }
-    }
-
-    /// Inaccurate; good; equally good; slightly better; much better in |F|.
-    fn several() -> Vec<Configuration> {
-        vec![
-            made(96_000, [0.5, 0.3]),
-            made(144_000, [0.20, 0.1]),
-            made(240_000, [0.20, 0.1]),
-            made(288_000, [0.195, 0.1]),
-            made(480_000, [0.198, 0.01]),
-        ]
-    }
+    use crate::tradeoff::configurations;
 
     #[test]
     fn the_best_is_picked_under_each_limit() {
+        let all = configurations().unwrap();
         let picked = |budget_us, min_rate, max_error_deg| {
             let limits = Limits {
                 budget_us,
                 min_rate,
                 max_error_deg,
             };
-            best(&several(), &limits).unwrap().modelled_cycles
+            best(&all, &limits)
         };
-        assert_eq!(picked(None, None, None), 480_000);
-        assert_eq!(picked(Some(600.0), None, None), 144_000);
-        assert_eq!(picked(Some(299.0), None, None), 96_000);
-        assert_eq!(picked(None, Some(2000.0), None), 144_000);
-        // The upper end of the interval counts: 0.22°.
-        assert_eq!(picked(None, None, Some(0.23)), 144_000);
-        assert_eq!(picked(None, None, Some(0.216)), 288_000);
-    }
-
-    #[test]
-    fn among_equals_as_fast_the_one_that_refuses_least_is_best() {
-        let mut all = several();
-        for (cycles, least) in [(510_000, 0.001), (500_000, 0.0005)] {
-            let mut other = made(cycles, [0.198, 0.01]);
-            other.unexplained = 0.0005;
-            all.push(other);
-            assert_eq!(best(&all, &Limits::default()).unwrap().unexplained, least);
-        }
-    }
-
-    #[test]
-    fn what_cannot_be_is_refused_with_what_comes_nearest() {
-        let limits = Limits {
-            budget_us: Some(100.0),
-            max_error_deg: Some(0.1),
-            ..Limits::default()
-        };
-        let error = best(&several(), &limits).unwrap_err().to_string();
-        for words in ["200 µs", "is within 0.21"] {
+        let name = |limits: Result<&Configuration>| limits.unwrap().to_string();
+        let network = "128-128 (int8 per channel) with 0 steps on weighted centroids";
+        assert_eq!(name(picked(Some(500.0), None, None)), network);
+        assert_eq!(name(picked(None, Some(2000.0), None)), network);
+        let on_film = "32-32 (int8 per channel) with 1 step on weighted centroids";
+        assert_eq!(name(picked(None, None, Some(0.2))), on_film);
+        // The upper end of the interval counts.
+        assert!(picked(None, None, Some(0.2)).unwrap().limit_error_deg() <= 0.2);
+        let error = picked(Some(10.0), None, Some(0.1)).unwrap_err().to_string();
+        for words in ["350 µs", "is within 0.166"] {
             assert!(error.contains(words), "no `{words}` in: {error}");
         }
     }
