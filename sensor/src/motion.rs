@@ -132,6 +132,7 @@ impl Motion {
     /// [`Motion::at_the_middle`] says: 0 while their motion is steady, or with a global shutter.
     /// Without an earlier frame that shows a marker, the marker rested before. `noise` is the
     /// factor on the modelled noise.
+    #[inline(never)]
     pub fn unsteadiness(&self, seen: &MarkerList, lost: Lost, rows: u16, noise: f32) -> Px {
         let Some((lines, before)) = self.lines.zip(self.before.as_ref()) else {
             return Px(0);
