@@ -79,10 +79,22 @@ class Alone(unittest.TestCase):
         self.assertGreater(np.abs(forces[0] - forces[1]).max(), 1e-3)
         self.assertFalse((forces[1] == forces[2]).all())
 
+    def test_a_calibrated_unit_says_what_its_model_knows(self):
+        twin = Twin(unit=MODELS / "default.hvtm")
+        self.assertFalse(twin.advance(0.1)[-1].contact)
+        force, place = np.array([0.004, -0.006, -0.09]), np.array([0.0015, -0.001])
+        twin.press(force, place)
+        for sample in twin.advance(0.2)[2:]:
+            np.testing.assert_allclose(sample.force, force, atol=1e-3)
+            np.testing.assert_allclose(sample.place, place, atol=5e-5)
+            self.assertTrue(sample.contact)
+
     def test_what_cannot_be_is_refused_and_the_press_before_stays(self):
         for words, options in [
             ("from 1 to 1000000", {"unit": 0}),
             ("no-such.hvtm", {"model": "no-such.hvtm"}),
+            ("no-such.hvtm", {"unit": "no-such.hvtm"}),
+            ("leave model out", {"unit": __file__, "model": __file__}),
             ("test_twin.py", {"model": __file__}),
             ("another camera than ov7725", {"model": MODELS / "mt9v034/default.hvtm"}),
         ]:

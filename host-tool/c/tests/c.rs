@@ -160,3 +160,28 @@ fn a_sensor_of_ros2_control_has_true_states() {
     assert!(output.status.success(), "{said}");
     check(&printed);
 }
+
+/// The package as its users build it; without ROS 2 nothing is tried.
+#[test]
+#[ignore = "needs CMake, and ROS 2 with ros2_control"]
+fn the_sensor_of_ros2_control_builds_where_ros_2_is_sourced() {
+    if std::env::var_os("AMENT_PREFIX_PATH").is_none() {
+        return eprintln!("not tried: ROS 2 is not sourced here");
+    }
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let folder = tempfile::tempdir().unwrap();
+    let named = |name: &str, path: PathBuf| format!("-D{name}={}", path.display());
+    let mut configure = Command::new("cmake");
+    configure
+        .arg("-S")
+        .arg(here.join("../../ros2/hivtac_ros2_control"));
+    configure.arg("-B").arg(folder.path());
+    configure.arg(named("HIVTAC_LIBRARY", libraries().join("libhivtac.a")));
+    configure.arg(named("HIVTAC_INCLUDE", here.join("include")));
+    let mut build = Command::new("cmake");
+    for command in [&mut configure, build.arg("--build").arg(folder.path())] {
+        let output = command.output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{command:?}: {said}");
+    }
+}

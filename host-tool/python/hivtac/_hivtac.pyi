@@ -86,6 +86,7 @@ class Twin:
         seed: int,
         unit: Optional[int],
         model: Optional[str],
+        is_unit: bool,
     ) -> None: ...
     def press(
         self,

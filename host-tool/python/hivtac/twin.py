@@ -28,8 +28,12 @@ class Twin:
     """A simulated sensor whose tare was taken; nothing touches it. `camera`: "ov7725" with 156
     frames a second, "ov5640" with 119, or "mt9v034" with 232. `contact`: what presses, as of
     `Sensor.set_contact`; the simulated film is pressed by a needle. `seed`: decides the noise.
-    `unit`: 1 to 1000000, that of `hivtac twin --unit`; without it the nominal one. `model`: the
-    file of a model, which was made for this unit; without it the built-in one.
+    `unit`: 1 to 1000000, that of `hivtac twin --unit`, or the file of a calibrated unit's model;
+    without it the nominal one. `model`: the file of a model, which was made for this drawn unit;
+    without it the built-in one.
+
+    The film and the camera of a calibrated unit are those that its model has, however the film was
+    stretched: its samples are what that unit says of a press.
 
     Raises `hivtac.Error` when there is no such camera, shape or unit, or the model does not fit.
     """
@@ -40,11 +44,16 @@ class Twin:
         *,
         contact: str = "needle",
         seed: int = 1,
-        unit: int | None = None,
+        unit: int | str | os.PathLike[str] | None = None,
         model: str | os.PathLike[str] | None = None,
     ) -> None:
-        file = None if model is None else os.fspath(model)
-        self._twin = _hivtac.Twin(camera, contact, seed, unit, file)
+        is_unit = unit is not None and not isinstance(unit, int)
+        if is_unit and model is not None:
+            raise hivtac.Error("a calibrated unit has its model: leave model out")
+        number = unit if isinstance(unit, int) else None
+        file = model if isinstance(unit, int) or unit is None else unit
+        path = None if file is None else os.fspath(file)
+        self._twin = _hivtac.Twin(camera, contact, seed, number, path, is_unit)
 
     def press(
         self, force: Sequence[float] | hivtac.Floats, place: Sequence[float] | hivtac.Floats

@@ -4,6 +4,7 @@
 use crate::error::{Error, raised};
 use crate::told::{self, SampleNumbers};
 use hivtac_host::contact_shape;
+use hivtac_host::live::calibrated::{Calibrated, CalibratedFilm};
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
@@ -11,7 +12,7 @@ use hivtac_host::live::hand::{Hand, Touch};
 use hivtac_host::live::run::{Due, Frames, device_id};
 use hivtac_host::shown::shown;
 use hivtac_host::{model_file, reply};
-use hivtac_twin::{Layout, units};
+use hivtac_twin::{Layout, Scene, units};
 use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
 use hivtac_wire::message::{Command, DeviceMessage, HostMessage, LogLevel, Request};
 use hivtac_wire::version::HelloPrefix;
@@ -41,7 +42,7 @@ struct Simulated {
 impl Twin {
     /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does
     /// yet. The seed decides its noise, the number which unit it is of those that are drawn; it
-    /// goes by the model in the file.
+    /// goes by the model in the file. With `is_unit` it is the calibrated unit of that model.
     #[new]
     fn start(
         py: Python<'_>,
@@ -50,6 +51,7 @@ impl Twin {
         seed: u64,
         unit: Option<u64>,
         model: Option<&str>,
+        is_unit: bool,
     ) -> PyResult<Twin> {
         let kinds = [Kind::Ov7725, Kind::Ov5640, Kind::Mt9v034];
         let kind = kinds.into_iter().find(|kind| kind.name() == camera);
@@ -63,13 +65,17 @@ impl Twin {
         let model = model.map(model_file::read).transpose();
         let model = model.map_err(raised)?;
         let started = py.detach(|| {
-            let mut twin = Simulated::start(kind, seed, unit)?;
-            for request in model
-                .iter()
-                .flat_map(|(file, _)| model_file::requests(file))
-            {
-                twin.ask(request)?;
-            }
+            let mut twin = match model {
+                Some((file, _)) if is_unit => Simulated::calibrated(kind, seed, file.leak())?,
+                model => {
+                    let mut twin = Simulated::drawn(kind, seed, unit)?;
+                    let files = model.iter().map(|(file, _)| file);
+                    for request in files.flat_map(|file| model_file::requests(file)) {
+                        twin.ask(request)?;
+                    }
+                    twin
+                }
+            };
             twin.command(Request::SetContactShape(shape));
             twin.command(Request::Tare {
                 frames: TARE_FRAMES,
@@ -119,7 +125,7 @@ impl Twin {
 }
 
 impl Simulated {
-    fn start(kind: Kind, seed: u64, unit: Option<u64>) -> Result<Simulated, String> {
+    fn drawn(kind: Kind, seed: u64, unit: Option<u64>) -> Result<Simulated, String> {
         let layout = Layout::default();
         let scene = kind.scene("rest", layout, seed);
         let scene = scene.and_then(|scene| match unit {
@@ -127,12 +133,34 @@ impl Simulated {
             None => Ok(scene),
         });
         let scene = scene.map_err(|error| error.to_string())?;
-        let hand = Hand::at_once();
-        let usual = Disturbances::default();
-        let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
-            .map_err(|error| error.to_string())?;
         let id = device_id(kind, unit.unwrap_or(units::NOMINAL));
         let device = Device::new(kind, layout, id, 1.0);
+        Simulated::start(kind, scene, None, device)
+    }
+
+    /// A calibrated unit, whose model is kept until the program ends.
+    fn calibrated(kind: Kind, seed: u64, file: &'static [u8]) -> Result<Simulated, String> {
+        let unit = Calibrated::of(kind, file)?;
+        let scene = kind.scene("rest", unit.layout, seed);
+        let seen = scene.and_then(|scene| unit.seen(scene));
+        let (scene, film) = seen.map_err(|error| error.to_string())?;
+        let device = Device::with_model(kind, unit.file, unit.device_id, 1.0);
+        Simulated::start(kind, scene, Some(film), device)
+    }
+
+    fn start(
+        kind: Kind,
+        scene: Scene,
+        film: Option<CalibratedFilm>,
+        device: Device,
+    ) -> Result<Simulated, String> {
+        let hand = Hand::at_once();
+        let usual = Disturbances::default();
+        let mut eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone())
+            .map_err(|error| error.to_string())?;
+        if let Some(film) = film {
+            eye = eye.with_film(film);
+        }
         let frames = Frames::new(eye, &device.camera(), 0);
         let mut twin = Simulated {
             device,

@@ -90,9 +90,19 @@ pub struct Device {
 impl Device {
     /// A new device for a film with these dots, in light of a brightness; 1 is nominal.
     pub fn new(kind: Kind, layout: Layout, device_id: [u8; 12], light: f64) -> Self {
-        let fitting = kind.fitting(device_id);
         // The project's own files: a test reads them.
-        let built_in = kind.model(layout);
+        Self::with_model(kind, kind.model(layout), device_id, light)
+    }
+
+    /// As [`Device::new`], with another model as the built-in one. One that does not fit is left
+    /// out.
+    pub fn with_model(
+        kind: Kind,
+        built_in: &'static [u8],
+        device_id: [u8; 12],
+        light: f64,
+    ) -> Self {
+        let fitting = kind.fitting(device_id);
         let model = Model::parse(built_in).ok();
         let mut sensor = Box::new(Sensor::<64>::new());
         let settings = fitting.settings(model.as_ref(), None);

@@ -1,5 +1,6 @@
 //! What the camera sees: the scene, its disturbances, and what presses it.
 
+use super::calibrated::CalibratedFilm;
 use super::camera::{Camera, Kind};
 use super::course::Course;
 use super::hand::{Following, Hand, Touch};
@@ -70,6 +71,8 @@ pub struct Eye {
     following: [Following; 2],
     /// What both do together, where that is known.
     pair: Option<PairFilm>,
+    /// The film of a calibrated unit in place of the scene's.
+    calibrated: Option<CalibratedFilm>,
 }
 
 /// What a scene as it is seen depends on.
@@ -152,9 +155,19 @@ impl Eye {
             presses,
             following: [0, 1].map(|finger| Following::new(hand.clone(), finger)),
             pair: PairFilm::of(kind.model(layout), layout),
+            calibrated: None,
         };
         // A drift that leaves the range of mountings would end the view later.
         Ok(eye)
+    }
+
+    /// The same view of a calibrated unit's film, which two fingers press as one.
+    pub fn with_film(self, film: CalibratedFilm) -> Eye {
+        Eye {
+            pair: None,
+            calibrated: Some(film),
+            ..self
+        }
     }
 
     /// The brightness of the light on the film.
@@ -174,11 +187,17 @@ impl Eye {
         if let Some(frame) = self.both(number, time_s) {
             return taken(frame);
         }
-        let own = |load: &dyn Fn(f64) -> Load| scene.frame_under(&shutter, number, load);
+        let own = |load: &dyn Fn(f64) -> Load| match &self.calibrated {
+            None => scene.frame_under(&shutter, number, load),
+            Some(film) => film.frame(scene, &shutter, number, load),
+        };
         let finger = |nth: usize| own(&|after_s| self.following[nth].load(after_s));
         let frame = match (&self.presses, hand) {
             (_, [true, _]) => finger(0),
             (_, [_, true]) => finger(1),
+            (Presses::Scene, _) if self.calibrated.is_some() => {
+                own(&|after_s| scene.motion().load(time_s + after_s))
+            }
             (Presses::Scene, _) => Ok(scene.frame_by(&shutter, number, time_s)),
             (Presses::Course(course), _) => own(&|after_s| course.load(time_s + after_s)),
         };

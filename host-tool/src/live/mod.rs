@@ -11,6 +11,7 @@
 //!
 //! | module | subject |
 //! |---|---|
+//! | [`calibrated`] | a calibrated unit, whose dots move as its model has it |
 //! | [`camera`] | the camera: its settings, the light that it needs, its times |
 //! | [`device`] | frames and a host's bytes in, messages out |
 //! | [`eye`] | what the camera sees: the scene, its disturbances, and what presses |
@@ -20,6 +21,7 @@
 //! | [`run`] | the clock: one frame after the other, in real time |
 //! | [`line`] | bytes to and from a host |
 
+pub mod calibrated;
 pub mod camera;
 pub mod course;
 pub mod device;

@@ -105,16 +105,9 @@ impl PairFilm {
             };
             (0..CORRECTIONS).fold([0.0; 2], |[right, down], _| {
                 let here = at([right, down]);
-                let slope =
-                    |there: [f64; 2]| [0, 1].map(|axis| (there[axis] - here[axis]) / STEP_MM);
-                let [a, c] = slope(at([right + STEP_MM, down]));
-                let [b, d] = slope(at([right, down + STEP_MM]));
                 let px = [0, 1].map(|axis| wanted[axis] - here[axis]);
-                let whole = a * d - b * c;
-                [
-                    right + (d * px[0] - b * px[1]) / whole,
-                    down + (a * px[1] - c * px[0]) / whole,
-                ]
+                let [x, y] = step(here, |[x, y]| at([right + x, down + y]), px);
+                [right + x, down + y]
             })
         });
         Some(shifts.collect())
@@ -133,6 +126,19 @@ impl PairFilm {
         let both = Both::new([first?, second?], &self.forward);
         Some(self.interaction.moved(&both))
     }
+}
+
+/// The shift along the film, mm, that moves an image by so many px, from the slopes of `at`: where
+/// the image is after a shift, `here` without one.
+pub(super) fn step(here: [f64; 2], at: impl Fn([f64; 2]) -> [f64; 2], px: [f64; 2]) -> [f64; 2] {
+    let slope = |there: [f64; 2]| [0, 1].map(|axis| (there[axis] - here[axis]) / STEP_MM);
+    let [a, c] = slope(at([STEP_MM, 0.0]));
+    let [b, d] = slope(at([0.0, STEP_MM]));
+    let whole = a * d - b * c;
+    [
+        (d * px[0] - b * px[1]) / whole,
+        (a * px[1] - c * px[0]) / whole,
+    ]
 }
 
 /// The load of a touch.

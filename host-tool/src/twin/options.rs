@@ -2,12 +2,14 @@
 
 use clap::{Args, ValueEnum};
 use hivtac_host::failure::Failure;
+use hivtac_host::live::calibrated::Calibrated;
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::course::Course;
 use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::Hand;
 use hivtac_host::live::run::device_id;
+use hivtac_host::model_file;
 use hivtac_twin::units;
 use hivtac_twin::{Layout, Scene};
 use std::ops::RangeInclusive;
@@ -30,10 +32,10 @@ pub struct Simulated {
     /// The dots on the film of a scene by name, and the model for them: 4 when not given, or 8v
     #[arg(long, value_name = "NAME", value_parser = layout)]
     layout: Option<Layout>,
-    /// Unit N of those that are drawn as people build them, 1 to 1000000; without it the nominal
-    /// one, that of the built-in model
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(units::DRAWN))]
-    unit: Option<u64>,
+    /// Unit N of those that are drawn as people build them, 1 to 1000000, or a calibrated one, by
+    /// the file of its model; without it the nominal one, that of the built-in model
+    #[arg(long, value_name = "N|FILE", value_parser = unit)]
+    unit: Option<Unit>,
     /// Decides the noise, and where the demo starts, of a scene by name; 1 when not given
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -51,6 +53,14 @@ pub struct Simulated {
         allow_negative_numbers = true
     )]
     drift: Option<f64>,
+}
+
+/// Which unit is simulated.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Unit {
+    Drawn(u64),
+    /// The file of a calibrated unit's model.
+    Calibrated(String),
 }
 
 /// A camera's name on the command line.
@@ -86,7 +96,18 @@ impl Simulated {
             Before::Demo => "demo",
             Before::Rest => "rest",
         });
-        let scene = self.as_unit(name, self.scene(name, kind)?)?;
+        let calibrated = match &self.unit {
+            Some(Unit::Calibrated(path)) => Some(self.calibrated(path, kind)?),
+            _ => None,
+        };
+        let layout = calibrated.as_ref().map(|unit| unit.layout);
+        let (scene, film) = match (&calibrated, self.scene(name, kind, layout)?) {
+            (None, scene) => (self.as_unit(name, scene)?, None),
+            (Some(unit), scene) => {
+                let seen = unit.seen(scene).map_err(|error| refused(name, error))?;
+                (seen.0, Some(seen.1))
+            }
+        };
         let presses = match self.course.as_deref() {
             Some(path) => Presses::Course(course(path)?),
             None => Presses::Scene,
@@ -104,18 +125,35 @@ impl Simulated {
             ));
         }
         let eye = Eye::new(kind, scene, presses, disturbances, hand);
-        let eye = eye.map_err(|error| refused(name, error))?;
+        let mut eye = eye.map_err(|error| refused(name, error))?;
+        eye = match film {
+            Some(film) => eye.with_film(film),
+            None => eye,
+        };
         // Exposure is found in the light as it is before it dims.
-        let device = Device::new(
-            kind,
-            layout,
-            device_id(kind, self.unit.unwrap_or(units::NOMINAL)),
-            1.0,
-        );
+        let device = match (calibrated, &self.unit) {
+            (Some(unit), _) => Device::with_model(kind, unit.file, unit.device_id, 1.0),
+            (None, Some(Unit::Drawn(unit))) => {
+                Device::new(kind, layout, device_id(kind, *unit), 1.0)
+            }
+            (None, _) => Device::new(kind, layout, device_id(kind, units::NOMINAL), 1.0),
+        };
         Ok((device, eye))
     }
 
-    fn scene(&self, name: &str, kind: Kind) -> Result<Scene, Failure> {
+    /// Reads a calibrated unit's model, which is kept until the program ends.
+    fn calibrated(&self, path: &str, kind: Kind) -> Result<Calibrated, Failure> {
+        let refused = |why: String| Failure::input(format!("unit {path}: {why}"));
+        if self.layout.is_some() {
+            return Err(refused(
+                "its model says which dots it has: leave --layout out".to_owned(),
+            ));
+        }
+        let (file, _) = model_file::read(path)?;
+        Calibrated::of(kind, file.leak()).map_err(refused)
+    }
+
+    fn scene(&self, name: &str, kind: Kind, layout: Option<Layout>) -> Result<Scene, Failure> {
         if self.layout.is_some() && name.ends_with(".toml") {
             let why = "the file says which dots it has: leave --layout out";
             return Err(refused(name, why));
@@ -124,7 +162,7 @@ impl Simulated {
             let text = read(name)?;
             return Scene::from_toml(&text).map_err(|error| refused(name, error));
         }
-        let layout = self.layout.unwrap_or_default();
+        let layout = layout.or(self.layout).unwrap_or_default();
         kind.scene(name, layout, self.seed.unwrap_or(1))
             .map_err(|error| {
                 Failure::input(format!(
@@ -135,9 +173,20 @@ impl Simulated {
 
     fn as_unit(&self, name: &str, scene: Scene) -> Result<Scene, Failure> {
         match self.unit {
-            Some(unit) => units::as_unit(unit, scene).map_err(|error| refused(name, error)),
-            None => Ok(scene),
+            Some(Unit::Drawn(unit)) => {
+                units::as_unit(unit, scene).map_err(|error| refused(name, error))
+            }
+            _ => Ok(scene),
         }
+    }
+}
+
+/// Reads a unit's number, or the name of a file.
+fn unit(text: &str) -> Result<Unit, String> {
+    match text.parse() {
+        Ok(number) if units::DRAWN.contains(&number) => Ok(Unit::Drawn(number)),
+        Ok(_) => Err("a unit's number is from 1 to 1000000".to_owned()),
+        Err(_) => Ok(Unit::Calibrated(text.to_owned())),
     }
 }
 

@@ -5,8 +5,9 @@ use crate::fake::*;
 use crate::run::*;
 use hivtac_terms::force::Force;
 use hivtac_terms::status::Status;
+use hivtac_wire::failure::{Failure, FailureKind};
 use hivtac_wire::frame::encode;
-use hivtac_wire::health::{Health, ResetReason};
+use hivtac_wire::health::{BrownOut, Health, ResetReason};
 use hivtac_wire::message::{DeviceHello, DeviceMessage, Outcome, Sample};
 use serde_json::Value;
 use std::io::Read;
@@ -134,6 +135,41 @@ fn every_finding_of_a_self_test_is_named_with_its_code() {
         codes.push(code.to_owned());
     }
     assert_eq!(codes, first_cells(table));
+}
+
+/// Each kind of failure of the page, and no other, is told by `hivtac info`; also a low supply that
+/// resets nothing.
+#[test]
+fn every_kind_of_failure_is_told_by_its_name() {
+    let page = page();
+    let table = first_cells(section(&page, "What `hivtac info` tells of a failure"));
+    let mut named: Vec<_> = table.iter().flat_map(|cell| cell.split(", ")).collect();
+    for kind in FailureKind::ALL {
+        let failure = Failure {
+            kind,
+            starts_ago: 1,
+            count: 1,
+            program_counter: Some(0x0806_1234),
+            link_register: None,
+            address: None,
+            fault_status: 0,
+            exception: 0,
+            place: Default::default(),
+        };
+        let failed = device(move |device| {
+            device.health.failure = Some(failure);
+            device.health.brown_out = BrownOut::Off;
+        });
+        let info = run(&["info", "--port", &failed.port]).stdout;
+        let name = kind.name();
+        assert!(
+            info.contains(&format!("\n           {name}, address 0x08061234\n")),
+            "{info}"
+        );
+        assert!(info.contains("no reset when it is low"), "{info}");
+        named.retain(|cell| cell.trim_matches('`') != name);
+    }
+    assert!(named.is_empty(), "nothing tells {named:?}");
 }
 
 /// How a test provokes an exit code: the run that ends with it.

@@ -336,6 +336,17 @@ fn units_are_drawn_by_their_number() {
     assert_ne!(seventh.1, eighth.1);
 }
 
+/// A calibrated unit has its model at once, and its dots rest where that has them.
+#[test]
+fn a_calibrated_unit_goes_by_its_own_model() {
+    let (twin, _) = Twin::pressed(&["--unit", MODEL]);
+    let samples = twin.samples(&["--frames", "20"]);
+    let force = &samples[19]["force"];
+    assert!(force["magnitude_n"].as_f64().unwrap() > 0.05, "{force}");
+    let status = status(&samples[19]);
+    assert!(!status.contains(&"rest_moved"), "{status:?}");
+}
+
 #[test]
 fn a_recorded_course_is_pressed_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -418,7 +429,8 @@ fn what_cannot_be_simulated_is_said() {
         (["--scene", &unknown_key], 1, "motoin"),
         (["--scene", &large], 1, "640 × 480"),
         (["--course", &course], 1, "line 2: \"a\" is not a number"),
-        (["--unit", "0"], 2, "0 is not in 1..=1000000"),
+        (["--unit", "0"], 2, "from 1 to 1000000"),
+        (["--unit", &missing], 1, "none.toml"),
         (["--dim", "9"], 2, "from 0.05 to 2"),
         (["--listen", taken], 1, "choose another with --listen"),
     ] {
