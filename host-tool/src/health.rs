@@ -15,7 +15,7 @@ use std::time::Duration;
 
 /// A device's report on its own state, for people and as JSON.
 #[derive(Serialize)]
-pub struct Told {
+pub struct HealthJson {
     reset: &'static str,
     temperature_c: Option<f64>,
     stack_used: u32,
@@ -34,7 +34,7 @@ struct Report {
     device_id: String,
     good: bool,
     problems: Vec<Found>,
-    health: Told,
+    health: HealthJson,
 }
 
 #[derive(Serialize)]
@@ -43,10 +43,10 @@ struct Found {
     name: &'static str,
 }
 
-impl Told {
+impl HealthJson {
     /// From the device's message.
-    pub fn of(health: &Health) -> Told {
-        Told {
+    pub fn of(health: &Health) -> HealthJson {
+        HealthJson {
             reset: reset_name(health.reset),
             temperature_c: (health.temperature_centidegrees).map(|it| f64::from(it) / 100.0),
             stack_used: health.stack_used,
@@ -126,7 +126,7 @@ pub fn run(arguments: &SelfTestArguments) -> Result<(), Failure> {
                 name: problem.name(),
             })
             .collect(),
-        health: Told::of(&health),
+        health: HealthJson::of(&health),
     };
     output::report(arguments.json, &report, || lines(&health).join("\n"))?;
     match found.len() {

@@ -1,7 +1,7 @@
 //! `hivtac info`: the device's identity, settings and counters.
 
 use crate::device::Device;
-use crate::health::{self, Told};
+use crate::health::{self, HealthJson};
 use crate::output::{self, note};
 use crate::settings;
 use crate::settings::temporal::FilterJson;
@@ -42,7 +42,7 @@ pub fn run(arguments: &InfoArguments) -> Result<(), Failure> {
     let health = health::ask(&mut link, patience)?;
     let info = Info {
         tare: Some(Tare::of(&settings)),
-        health: Some(Told::of(&health)),
+        health: Some(HealthJson::of(&health)),
         ..Info::new(&link.name, &hello, stats)
     };
     output::report(arguments.json, &info, || info.lines().join("\n")).map(|_| ())
@@ -89,7 +89,7 @@ pub struct Info<'a> {
     tare: Option<Tare>,
     /// `None` for callers that do not show it.
     #[serde(skip_serializing_if = "Option::is_none")]
-    health: Option<Told>,
+    health: Option<HealthJson>,
 }
 
 /// The rest position in use.
@@ -240,7 +240,7 @@ impl<'a> Info<'a> {
         let tare = self.tare.iter();
         lines.extend(tare.map(|tare| format!("tare       {}", tare.text())));
         lines.extend(self.stats.iter().flat_map(stats_lines));
-        lines.extend(self.health.iter().flat_map(Told::lines));
+        lines.extend(self.health.iter().flat_map(HealthJson::lines));
         lines
     }
 

@@ -55,7 +55,7 @@ fn names(status: Status) -> Vec<&'static str> {
 }
 
 /// Whether `bit` (contact or slip) is set; `None` without a force.
-fn told(sample: &Sample, bit: Status) -> Option<bool> {
+fn known_bit(sample: &Sample, bit: Status) -> Option<bool> {
     let is_set = sample.status.contains(bit);
     sample.force.is_some().then_some(is_set)
 }
@@ -99,7 +99,7 @@ fn human_row(row: &Row) -> String {
     let time = Decimal::new(*time_us, 6);
     let mut line = format!("{sequence:>8}{frame:>8}{time:>13}");
     line += &human_force(force.as_ref());
-    let contact = contact_text(told(row.sample, Status::CONTACT));
+    let contact = contact_text(known_bit(row.sample, Status::CONTACT));
     let contact = match status.contains(Status::SLIP) {
         true => "slips",
         false => contact,
@@ -205,8 +205,8 @@ fn json_row(row: &Row) -> String {
             .copied()
             .map(ForceJson)
             .collect(),
-        contact: told(sample, Status::CONTACT),
-        slip: told(sample, Status::SLIP),
+        contact: known_bit(sample, Status::CONTACT),
+        slip: known_bit(sample, Status::SLIP),
         status: names(sample.status),
         truth: row.truth,
     };
@@ -240,7 +240,7 @@ fn csv_row(row: &Row) -> String {
     ];
     fields.extend(csv_force(sample.force.as_ref()));
     for bit in [Status::CONTACT, Status::SLIP] {
-        fields.push(field(told(sample, bit)));
+        fields.push(field(known_bit(sample, bit)));
     }
     fields.push(names(sample.status).join("|"));
     let contacts = sample.each_contact();

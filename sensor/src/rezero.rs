@@ -42,7 +42,7 @@ const MOST_FRAMES: u32 = 1 << 16;
 
 /// What a frame shows about the rest position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Told {
+pub(crate) enum RestChange {
     /// No result: no second of the untouched film ends with this frame.
     Nothing,
     /// A new drift: how far the film rests from the rest position.
@@ -196,10 +196,10 @@ impl Tare {
         limits: Option<&Rezero>,
         time_us: u64,
         features: Option<&Features>,
-    ) -> Told {
+    ) -> RestChange {
         let Some(features) = features.filter(|features| self.rest.is_near(features)) else {
             self.quiet = None;
-            return Told::Nothing;
+            return RestChange::Nothing;
         };
         let since = |quiet: &Quiet| time_us.saturating_sub(quiet.newest_us);
         let follows = |quiet: &Quiet| since(quiet) <= LONGEST_GAP_US;
@@ -218,7 +218,7 @@ impl Tare {
         }
         self.quiet = Some(quiet);
         if !is_due {
-            return Told::Nothing;
+            return RestChange::Nothing;
         }
         let there = mean.beside(&self.hung);
         let quiet_us = mean.begun_us.saturating_sub(quiet.since_us);
@@ -236,10 +236,10 @@ impl Tare {
         }
         self.drift.seen_px = Some(seen_px);
         if self.moved == before {
-            return Told::Drift;
+            return RestChange::Drift;
         }
         self.rezero();
-        Told::Moved
+        RestChange::Moved
     }
 
     fn move_towards(&mut self, limits: &Rezero, there: &[Q<16, i64>]) {
@@ -323,8 +323,8 @@ mod tests {
                 let before = self.tare;
                 let told = self.tare.follow(Some(limits), self.time_us, features);
                 let has_moved = before.rest != self.tare.rest;
-                assert_eq!(has_moved, told == Told::Moved);
-                assert!(told != Told::Nothing || before.drift == self.tare.drift);
+                assert_eq!(has_moved, told == RestChange::Moved);
+                assert!(told != RestChange::Nothing || before.drift == self.tare.drift);
             }
         }
 

@@ -37,7 +37,7 @@ fn held(down: [f64; 3]) -> Scene {
     scene.with_options(options).unwrap()
 }
 
-fn told(down: [f64; 3]) -> Down {
+fn down_of(down: [f64; 3]) -> Down {
     Down::Told(Direction::of_unit(down.map(|part| part as f32)))
 }
 
@@ -124,10 +124,10 @@ fn a_sensor_that_is_told_how_it_is_held_measures_as_one_that_stays() {
     // For the default model a film that hangs belongs to another unit; one that does not is its
     // own.
     for (before, most) in [(TOWARDS, [0.7, 1.0, 0.035]), (ALONG, [0.5, 0.2, 0.015])] {
-        let mut sensor = tared(before, told(before));
+        let mut sensor = tared(before, down_of(before));
         let stays = press(&mut sensor, &held(before));
         println!("stays: {stays:?}");
-        for turned in turned_every_way(&mut sensor, told) {
+        for turned in turned_every_way(&mut sensor, down_of) {
             assert_eq!(turned.wrong, Vec::<String>::new());
             assert!(turned.refused <= 3 && turned.beyond <= 4, "{turned:?}");
             for (off, most) in turned.off.iter().zip(most) {
@@ -143,16 +143,16 @@ fn a_sensor_that_is_told_how_it_is_held_measures_as_one_that_stays() {
 
 #[test]
 fn an_untouched_film_that_is_turned_reads_no_contact_and_can_be_tared() {
-    let mut sensor = tared(TOWARDS, told(TOWARDS));
+    let mut sensor = tared(TOWARDS, down_of(TOWARDS));
     for way in [AWAY, ALONG].into_iter().chain(BETWEEN) {
-        sensor.set_down(told(way));
+        sensor.set_down(down_of(way));
         let seen = untouched(&mut sensor, way);
         assert!(!seen.status.contains(Status::CONTACT), "{way:?}: {seen:?}");
         assert!(seen.force.unwrap().magnitude.0 < 1_000, "{way:?}: {seen:?}");
         sensor.tare(FRAMES, at_rest(&held(way))).unwrap().unwrap();
     }
     // The host did not report that the sensor was turned: the film looks touched.
-    sensor.set_down(told(AWAY));
+    sensor.set_down(down_of(AWAY));
     sensor.tare(FRAMES, at_rest(&held(AWAY))).unwrap().unwrap();
     let refused = sensor.tare(FRAMES, at_rest(&held(TOWARDS))).unwrap();
     assert!(matches!(refused, Err(Refusal::Touched(_))));
@@ -188,7 +188,7 @@ fn a_sensor_that_may_be_turned_says_how_little_it_knows() {
 #[test]
 fn a_tare_that_is_older_than_what_is_told_counts_as_any_way() {
     let mut sensor = tared(TOWARDS, Down::Fixed);
-    sensor.set_down(told(AWAY));
+    sensor.set_down(down_of(AWAY));
     assert!(
         untouched(&mut sensor, AWAY)
             .status

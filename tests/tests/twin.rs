@@ -37,7 +37,7 @@ const PATIENCE: Duration = Duration::from_secs(TIMEOUT_S as u64);
 
 /// What a new device is sent. A threshold makes what earlier frames left be forgotten. The first
 /// one is not the model's: samples say so, until the first frame under the second.
-fn told(kind: Kind) -> [Request; 4] {
+fn set_up(kind: Kind) -> [Request; 4] {
     let [other, own]: [Threshold; 2] = match kind {
         Kind::Ov7725 | Kind::Ov5640 => {
             let [mut other, own] = [HsvBox::RED; 2];
@@ -92,7 +92,7 @@ fn next_sample(link: &mut Link, is_mismatch: bool) -> Sample {
 fn from_the_rig(rig: &Rig, kind: Kind, count: usize) -> (DeviceHello, SettingsReport, Vec<Sample>) {
     let address = Address::Tty(rig.port().to_owned());
     let (mut link, hello) = Link::connect(&address, PATIENCE).unwrap();
-    let [start, shape, other, own] = told(kind);
+    let [start, shape, other, own] = set_up(kind);
     for request in [start, shape, other] {
         link.request(request, PATIENCE, |_| {}).unwrap();
     }
@@ -180,7 +180,7 @@ fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>)
         .iter()
         .map(|line| (line["frame"].as_u64().unwrap(), line))
         .collect();
-    for request in told(kind) {
+    for request in set_up(kind) {
         let (id, outcome) = (1, Outcome::Done);
         assert_eq!(
             twin.ask(request),
@@ -243,7 +243,7 @@ fn a_twin_is_as_the_program(kind: Kind, scene: &Scene, rig: Rig) {
         ..own
     };
     assert_eq!(same, hello);
-    let [_, shape, other, _] = told(kind);
+    let [_, shape, other, _] = set_up(kind);
     for request in [shape, other].into_iter().chain(fixed(kind)) {
         twin.ask(request);
     }

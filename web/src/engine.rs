@@ -6,7 +6,7 @@ use crate::simulated::Simulated;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::live::camera;
 use hivtac_host::live::hand::Touch;
-use hivtac_host::live::run::Told;
+use hivtac_host::live::run::FrameTruth;
 use hivtac_host::page::rows::{self, Event};
 use hivtac_host::page::{self, Cursor, Feed, Order, Press, State, Truth};
 use hivtac_host::usual_tare::TARE_PATIENCE;
@@ -294,7 +294,7 @@ impl Engine {
             Order::StopRecording => {
                 let recorded = self.recorder.end("as asked");
                 self.keep(recorded);
-                let text = self.recorder.told().text;
+                let text = self.recorder.state().text;
                 self.answer(ticket, true, &text);
                 self.tell(now_us);
             }
@@ -352,7 +352,7 @@ impl Engine {
     fn tell(&mut self, now_us: u64) {
         self.told_us = now_us;
         if let Some(state) = &self.state {
-            self.feed.state(state.json(self.recorder.told()));
+            self.feed.state(state.json(self.recorder.state()));
         }
     }
 
@@ -382,7 +382,7 @@ fn touch(press: Press) -> Touch {
     }
 }
 
-fn truth(told: &Told) -> Truth {
+fn truth(told: &FrameTruth) -> Truth {
     let (newtons, angles, place) = told.integers();
     Truth(told.frame, newtons, angles, place)
 }

@@ -64,7 +64,7 @@ impl Recorder {
                 now_us,
             });
         }
-        Ok(self.told().text)
+        Ok(self.state().text)
     }
 
     /// Keeps a message. Returns the recording when it is full.
@@ -122,7 +122,7 @@ impl Recorder {
     }
 
     /// The recording's state, for the page.
-    pub fn told(&self) -> page::Recording {
+    pub fn state(&self) -> page::Recording {
         match &self.under_way {
             Some(UnderWay {
                 name,

@@ -4,7 +4,7 @@ use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
 use hivtac_host::live::hand::{Fingers, Hand, Touch};
-use hivtac_host::live::run::{Due, Frames, Told, device_id};
+use hivtac_host::live::run::{Due, FrameTruth, Frames, device_id};
 use hivtac_twin::{Layout, units};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
 
@@ -49,7 +49,7 @@ impl Simulated {
     }
 
     /// Takes the frames that are due; returns the truth in each, and the time to the next one, µs.
-    pub fn turn(&mut self, now: &dyn Fn() -> u64) -> (Vec<Told>, u64) {
+    pub fn turn(&mut self, now: &dyn Fn() -> u64) -> (Vec<FrameTruth>, u64) {
         let mut truths = Vec::new();
         for _ in 0..AT_ONCE {
             let camera = self.device.camera();

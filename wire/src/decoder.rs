@@ -154,7 +154,7 @@ impl<const N: usize> Decoder<N> {
     }
 }
 
-/// Decodes a frame of any protocol version in place, without its closing zero, and returns its body;
+/// Decodes a frame of any protocol version in place, without its closing zero. Returns its body;
 /// `None` if it is damaged.
 pub fn body(frame: &mut [u8]) -> Option<&[u8]> {
     checked_body(frame).ok()

@@ -87,7 +87,11 @@ pub fn reason(answer: Result<(), Failure>) -> Result<Option<String>, Failure> {
 }
 
 /// The device's state, as `hivtac info --json` prints it.
-pub fn told(link: &mut Link, patience: Duration, hello: DeviceHello) -> Result<Value, Failure> {
+pub fn described(
+    link: &mut Link,
+    patience: Duration,
+    hello: DeviceHello,
+) -> Result<Value, Failure> {
     let (hello, stats) = ask(link, patience, hello)?;
     Ok(json!(Info::new(&link.name, &hello, stats)))
 }

@@ -103,7 +103,7 @@ impl<'a> BringUp<'a> {
             report,
             device::usb(&mut link, arguments.device.timeout)?,
         );
-        report.device = device::told(&mut link, arguments.device.timeout, hello.clone())?;
+        report.device = device::described(&mut link, arguments.device.timeout, hello.clone())?;
         Ok(BringUp {
             arguments,
             link,

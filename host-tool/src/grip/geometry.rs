@@ -53,7 +53,7 @@ impl Default for Geometry {
 /// A geometry as a file has it.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Told {
+struct GeometryFile {
     friction: Option<f64>,
     fingers: [ToldPose; 2],
 }
@@ -82,17 +82,17 @@ impl Geometry {
     /// # Errors
     /// What is wrong, for a person.
     pub fn parse(text: &str) -> Result<Geometry, String> {
-        let told: Told = serde_json::from_str(text).map_err(|error| {
+        let file: GeometryFile = serde_json::from_str(text).map_err(|error| {
             format!("it is no geometry of a grip: {error} (docs/robots.md has an example)")
         })?;
-        let friction = told.friction.unwrap_or(FRICTION);
+        let friction = file.friction.unwrap_or(FRICTION);
         if !(friction > 0.0 && friction <= LARGEST_FRICTION) {
             return Err(format!(
                 "friction is {friction}; a coefficient of friction is above 0, up to \
                  {LARGEST_FRICTION}"
             ));
         }
-        let [first, second] = told.fingers;
+        let [first, second] = file.fingers;
         let poses = [first.pose("first")?, second.pose("second")?];
         let between = add(poses[1].middle, poses[0].middle.map(|part| -part));
         let distance = dot(between, between).sqrt();

@@ -14,7 +14,7 @@ const LATE: u64 = 2;
 
 /// The true press in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Told {
+pub struct FrameTruth {
     /// Number of the frame, as in its sample.
     pub frame: u32,
     /// When it was exposed, µs, as in its sample.
@@ -23,7 +23,7 @@ pub struct Told {
     pub truth: Truth,
 }
 
-impl Told {
+impl FrameTruth {
     /// The press in the integers of the wire format: Fx, Fy, Fz and |F|, µN; α and β, thousandths
     /// of a degree; and the place, µm along x and y, or `None` without a press.
     pub fn integers(&self) -> ([i64; 4], [i64; 2], Option<[i64; 2]>) {
@@ -141,11 +141,11 @@ impl Frames {
 
     /// Takes the next frame, and the truth in it. Returns, too, whether frames before it are
     /// missing.
-    pub fn take(&mut self, camera: Camera) -> (Captured, Told, bool) {
+    pub fn take(&mut self, camera: Camera) -> (Captured, FrameTruth, bool) {
         let begun_us = self.begins_us;
         let time_us = begun_us.saturating_add_signed(camera.middle_us().into());
         let shot = (self.eye).shot(&camera, self.number, 1e-6 * time_us as f64);
-        let told = Told {
+        let told = FrameTruth {
             frame: self.number,
             time_us,
             truth: shot.truth,
@@ -183,7 +183,7 @@ impl Clock {
 
     /// Takes frames in real time until `stop` says so. `tell` hears of each frame's true press
     /// before its sample can be read.
-    pub fn run(&mut self, stop: impl Fn() -> bool, mut tell: impl FnMut(Told)) {
+    pub fn run(&mut self, stop: impl Fn() -> bool, mut tell: impl FnMut(FrameTruth)) {
         while !stop() {
             let camera = self.shared.device().camera();
             match self.frames.due(&camera, self.shared.now_us()) {

@@ -14,19 +14,19 @@ mod request;
 #[cfg(not(target_family = "wasm"))]
 mod response;
 pub mod rows;
+mod sensor_state;
 #[cfg(not(target_family = "wasm"))]
 mod server;
 mod state;
 #[cfg(not(target_family = "wasm"))]
 mod token;
-mod told;
 #[cfg(not(target_family = "wasm"))]
 mod unstalled;
 
 pub use feed::{Cursor, Feed, News};
-pub use order::{Answer, Asked, Order, Posted, parse as parse_order};
+pub use order::{Answer, DeviceCommand, Order, Posted, parse as parse_order};
 pub use press::{Fingers, Hand, Press, Truth};
+pub use sensor_state::{Coverage, Covered, Limits, Map, Recording, SensorState};
 #[cfg(not(target_family = "wasm"))]
 pub use server::{Sensor, Server};
 pub use state::State;
-pub use told::{Coverage, Covered, Limits, Map, Recording, Told};

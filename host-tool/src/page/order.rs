@@ -39,7 +39,7 @@ pub enum Order {
 }
 
 /// What an order asks of a device.
-pub struct Asked {
+pub struct DeviceCommand {
     /// The command.
     pub request: Request,
     /// Longest wait for its reply.
@@ -54,7 +54,11 @@ impl Order {
     ///
     /// # Errors
     /// When the device has no model whose threshold it could use.
-    pub fn asked(&self, hello: &DeviceHello, patience: Duration) -> Result<Option<Asked>, Failure> {
+    pub fn asked(
+        &self,
+        hello: &DeviceHello,
+        patience: Duration,
+    ) -> Result<Option<DeviceCommand>, Failure> {
         let (request, patience, done) = match self {
             Order::Tare => usual_tare(patience),
             Order::Expose => {
@@ -85,7 +89,7 @@ impl Order {
                 return Ok(None);
             }
         };
-        Ok(Some(Asked {
+        Ok(Some(DeviceCommand {
             request,
             patience,
             done,

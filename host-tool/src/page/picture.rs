@@ -12,7 +12,7 @@ use serde::Serialize;
 
 /// The data about a frame in the line of JSON.
 #[derive(Serialize)]
-struct Told {
+struct PictureJson {
     frame: u32,
     width: u16,
     height: u16,
@@ -35,7 +35,7 @@ pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
     let sample = taken.sample.as_ref();
     let is_pressed = sample.is_some_and(|sample| sample.status.contains(Status::CONTACT));
     let markers = sample.and_then(Sample::found);
-    let told = Told {
+    let header = PictureJson {
         frame: frame.number,
         width: frame.width,
         height: frame.height,
@@ -47,6 +47,6 @@ pub fn bytes(taken: &Taken, device: &DeviceHello) -> Vec<u8> {
             false => Focus::of(frame, device).map_or_else(|_| Vec::new(), |focus| focus.wrong),
         },
     };
-    let line = to_json(&told) + "\n";
+    let line = to_json(&header) + "\n";
     [line.as_bytes(), &look::levels(frame), &mask].concat()
 }

@@ -1,6 +1,6 @@
 //! The state of a device: identity, connection, rate, losses and latency.
 
-use super::{Recording, Told};
+use super::{Recording, SensorState};
 use crate::contact_shape;
 use crate::reply::log_text;
 use crate::tally::Tally;
@@ -108,7 +108,7 @@ impl State {
 
     /// One JSON object; `recording` is the state of the page's recording.
     pub fn json(&self, recording: Recording) -> String {
-        let told = Told {
+        let state = SensorState {
             trouble: self.trouble.clone(),
             contact: self.contact_shape.map(contact_shape::text),
             rate_hz: self.rate_hz(),
@@ -119,9 +119,9 @@ impl State {
             recording,
             grip: self.grip.clone(),
             lines: self.lines.iter().cloned().collect(),
-            ..Told::of(&self.port, &self.hello)
+            ..SensorState::of(&self.port, &self.hello)
         };
-        told.json()
+        state.json()
     }
 }
 

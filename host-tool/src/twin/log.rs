@@ -1,7 +1,7 @@
 //! The truth log: one JSON object per frame, as `hivtac monitor --truth` reads it.
 
 use hivtac_host::failure::Failure;
-use hivtac_host::live::run::Told;
+use hivtac_host::live::run::FrameTruth;
 use hivtac_host::shown::to_json;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -31,14 +31,14 @@ impl TruthLog {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write(&mut self, told: &Told) -> Result<(), Failure> {
+    pub fn write(&mut self, told: &FrameTruth) -> Result<(), Failure> {
         let line = to_json(&line(told)) + "\n";
         let written = self.file.write_all(line.as_bytes());
         written.map_err(|error| Failure::of_file(&self.name, error))
     }
 }
 
-fn line(told: &Told) -> Value {
+fn line(told: &FrameTruth) -> Value {
     let force = told.truth.force;
     let [x, y, z] = force.vector_n();
     let place = told.truth.touches_mm;

@@ -10,7 +10,7 @@ use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::live::hand::Hand;
 use hivtac_host::live::line::Tcp;
-use hivtac_host::live::run::{Clock, Shared, Told};
+use hivtac_host::live::run::{Clock, FrameTruth, Shared};
 use hivtac_host::shown::to_json;
 use hivtac_host::stop;
 pub use options::{Before, Simulated};
@@ -114,7 +114,7 @@ impl Inside {
     }
 
     /// Runs it until the program is interrupted; `tell` hears of each frame's true press.
-    pub fn run(mut self, tell: impl FnMut(Told)) {
+    pub fn run(mut self, tell: impl FnMut(FrameTruth)) {
         self.clock.run(stop::requested, tell);
     }
 }

@@ -52,7 +52,7 @@ impl Gripping {
     }
 
     /// The newest grip for a person; `None` before the first, and when a finger is silent.
-    pub fn told(&self) -> Option<String> {
+    pub fn cause(&self) -> Option<String> {
         let both = self.lock();
         let (grip, came) = both.newest.as_ref()?;
         if came.at.elapsed() > OLD {

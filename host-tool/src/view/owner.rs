@@ -64,9 +64,9 @@ impl Watched {
         self.is_new = false;
         // The first finger's page has it.
         if let Some((0, grip)) = &self.grip {
-            self.state.grip = grip.told();
+            self.state.grip = grip.cause();
         }
-        self.feed.state(self.state.json(self.recorder.told()));
+        self.feed.state(self.state.json(self.recorder.state()));
     }
 
     fn trouble(&mut self, why: String) {

@@ -48,7 +48,7 @@ impl Recorder {
                 flushed: Instant::now(),
             });
         }
-        Ok(self.told().text)
+        Ok(self.state().text)
     }
 
     /// Keeps a device's message. A full disk only ends the file.
@@ -86,7 +86,7 @@ impl Recorder {
     }
 
     /// The recording's state, for the page.
-    pub fn told(&self) -> page::Recording {
+    pub fn state(&self) -> page::Recording {
         match &self.under_way {
             Some(UnderWay {
                 name, recording, ..

@@ -5,7 +5,7 @@ use crate::twin::Inside;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
 use hivtac_host::live::hand::{Hand, Touch};
-use hivtac_host::live::run::Told;
+use hivtac_host::live::run::FrameTruth;
 use hivtac_host::page::{Feed, Fingers, Press, Sensor, Truth};
 use hivtac_host::port::Address;
 use hivtac_terms::contact_shape::ContactShape;
@@ -51,7 +51,7 @@ fn touch(press: Press) -> Touch {
     }
 }
 
-fn truth(told: &Told) -> Truth {
+fn truth(told: &FrameTruth) -> Truth {
     let (newtons, angles, place) = told.integers();
     Truth(told.frame, newtons, angles, place)
 }

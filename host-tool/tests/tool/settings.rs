@@ -230,7 +230,7 @@ fn a_reset_is_the_devices_own() {
 }
 
 /// The commands that a device received, and the tool's output.
-fn told(arguments: &[&str]) -> (Vec<Request>, String) {
+fn sent(arguments: &[&str]) -> (Vec<Request>, String) {
     let device = device();
     let run = run(&[arguments, &["--port", &device.port]].concat());
     assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
@@ -239,7 +239,7 @@ fn told(arguments: &[&str]) -> (Vec<Request>, String) {
 
 /// The settings that a device received, and the tool's output.
 fn changed(arguments: &[&str]) -> (TemporalSettings, String) {
-    let (commands, text) = told(arguments);
+    let (commands, text) = sent(arguments);
     let [Request::GetSettings, Request::SetTemporal(settings), keep] = &commands[..] else {
         panic!("{commands:?}");
     };
@@ -384,7 +384,7 @@ fn the_guide_shows_what_setting_prints() {
 
 /// The camera settings that a device received, and the tool's output.
 fn camera_changed(arguments: &[&str]) -> (CameraSettings, String) {
-    let (commands, text) = told(arguments);
+    let (commands, text) = sent(arguments);
     let [
         Request::GetSettings,
         Request::SetCamera(settings),
@@ -496,7 +496,7 @@ fn down_changed(arguments: &[&str]) -> String {
 /// The shape of what presses that a device received, and the tool's output. It is kept only when
 /// asked for.
 fn shape_set(arguments: &[&str]) -> (ContactShape, String) {
-    let (commands, text) = told(arguments);
+    let (commands, text) = sent(arguments);
     let [Request::SetContactShape(shape), kept @ ..] = &commands[..] else {
         panic!("{commands:?}");
     };

@@ -32,8 +32,7 @@ pub struct FrameNoise {
     pub times: f32,
     /// An additional standard uncertainty of each coordinate, 0 or more.
     pub blur: Px,
-    /// Another one, of markers whose motion changes
-    /// ([`Motion::unsteadiness`](crate::motion::Motion::unsteadiness)).
+    /// Another one, of markers whose motion changes (`Motion::unsteadiness`).
     pub motion: Px,
 }
 

@@ -4,7 +4,7 @@
 use super::{Measurement, Sensor};
 use crate::force::rest::Rest;
 use crate::markers::tables::Table;
-use crate::rezero::{Tare, Told};
+use crate::rezero::{RestChange, Tare};
 use crate::temporal::{Followed, Moment};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{TemporalError, TemporalSettings};
@@ -29,11 +29,11 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         followed.status |= tare.status();
         let rezero = self.temporal.settings().rezero.as_ref();
         let told = tare.follow(rezero, at.time_us, features);
-        followed.tells_rest = told != Told::Nothing;
+        followed.tells_rest = told != RestChange::Nothing;
         match told {
-            Told::Nothing => {}
-            Told::Drift => self.apply_drift(),
-            Told::Moved => self.prepare(),
+            RestChange::Nothing => {}
+            RestChange::Drift => self.apply_drift(),
+            RestChange::Moved => self.prepare(),
         }
         followed
     }

@@ -52,7 +52,7 @@ mod tests {
     use hivtac_terms::units::Px;
 
     /// Whether each of the forces, µN with standard uncertainty, a frame apart, is a contact.
-    fn told(forces: &[(i32, u32)]) -> std::vec::Vec<bool> {
+    fn contacts(forces: &[(i32, u32)]) -> std::vec::Vec<bool> {
         let mut contact = Contact::NONE;
         let mut time_us = 0;
         let frames = forces.iter().map(|&(magnitude, sigma)| {
@@ -68,7 +68,7 @@ mod tests {
     fn it_begins_high_and_ends_low() {
         let forces = [1_999, 2_000, 1_999, 1_000, 999, 1_999, 2_000].map(|f| (f, 300));
         let expected = [false, true, true, true, false, false, true];
-        assert_eq!(told(&forces), expected);
+        assert_eq!(contacts(&forces), expected);
     }
 
     #[test]
@@ -79,9 +79,9 @@ mod tests {
             (4_500, 3_000),
             (4_499, 3_000),
         ];
-        assert_eq!(told(&forces), [false, true, true, false]);
+        assert_eq!(contacts(&forces), [false, true, true, false]);
         let extremes = [(i32::MAX, u32::MAX), (i32::MIN, 1), (0, 0)];
-        assert_eq!(told(&extremes), [false, true, false]);
+        assert_eq!(contacts(&extremes), [false, true, false]);
     }
 
     /// A film's strength may be as uncertain as its force is large; the frame's status judges by

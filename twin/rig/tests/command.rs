@@ -150,7 +150,7 @@ fn a_signal_keeps_the_flash() {
     }
 }
 
-/// Before the rig is ready, while the firmware runs, and while the file is written, since the second
+/// Before the rig is ready, while the firmware runs, and while the file is written: the second
 /// signal comes then.
 #[test]
 #[ignore = "10 s"]

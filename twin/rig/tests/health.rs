@@ -21,10 +21,10 @@ fn ask(request: Request, virtual_ms: u64) -> Setup {
 }
 
 fn health(setup: Setup) -> Health {
-    told(&setup.run())
+    health_of(&setup.run())
 }
 
-fn told(run: &Run) -> Health {
+fn health_of(run: &Run) -> Health {
     assert_eq!(run.outcome(ASKED), Outcome::Done);
     run.health().clone()
 }
@@ -65,7 +65,7 @@ fn a_register_that_does_not_hold_what_was_written_is_told() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
     let setup = Setup::new(firmware(), 920).at(900, asked);
     let run = setup.fault(FORGETS).run();
-    let health = told(&run);
+    let health = health_of(&run);
     let expected = (0, Problem::CameraRegisters.bit());
     assert_eq!(
         (health.problems, health.at_start),
@@ -82,7 +82,7 @@ fn frames_that_take_another_time_than_they_should_are_told() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
     let setup = Setup::new(firmware(), 400).at(380, asked);
     let run = setup.fault("camera-slow").run();
-    let health = told(&run);
+    let health = health_of(&run);
     let clocks = Problem::Clocks.bit();
     assert_eq!((health.problems, health.at_start), (clocks, clocks));
     assert!(!run.samples().is_empty(), "forces go on");

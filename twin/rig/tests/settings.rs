@@ -63,12 +63,12 @@ fn naming(flash: &Path, text: &str, virtual_ms: u64) -> Setup {
 
 /// Returns the settings of a device after a restart.
 fn restarted(flash: &Path) -> SettingsReport {
-    told(setup(flash, RESTART_MS)).0
+    settings_of(setup(flash, RESTART_MS)).0
 }
 
 /// Returns the settings that a device reports in a run, and the words of the flash that decided
 /// them.
-fn told(setup: Setup) -> Start<SettingsReport> {
+fn settings_of(setup: Setup) -> Start<SettingsReport> {
     let run = setup.run();
     assert!(!run.samples().is_empty(), "it measures");
     let sample = run.samples()[0];
@@ -244,7 +244,7 @@ fn every_cut_of_a_new_name(before: &Contents) {
     assert_eq!(run.outcome(KEEP), Outcome::Done);
     let start = |flash: &Path| {
         // An incomplete record is written anew at the start, which may need an erase.
-        let (first, words) = told(setup(flash, ERASED_MS).fault("camera-absent@225"));
+        let (first, words) = settings_of(setup(flash, ERASED_MS).fault("camera-absent@225"));
         let again = setup(flash, RESTART_MS).fault("camera-absent").run();
         assert_eq!(again.settings().name, first.name);
         (

@@ -28,7 +28,7 @@ fn setup() -> Setup {
 
 /// A status, and a force's components, µN. Uncertainties are left out: they include what the film
 /// may remember, which a sample that is followed again would include twice.
-type Told = (Status, Option<[MicroNewtons; 3]>);
+type Reported = (Status, Option<[MicroNewtons; 3]>);
 
 /// Returns a sample of another run with only the values of its own frame.
 fn measured(sample: &Sample) -> Measurement {
@@ -44,7 +44,7 @@ fn measured(sample: &Sample) -> Measurement {
 
 /// Returns the results of the sensing on this computer for samples, with other settings from the
 /// index `from` on.
-fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<Told> {
+fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<Reported> {
     let mut temporal = Temporal::new();
     let followed = samples.iter().enumerate().map(|(nth, sample)| {
         if nth == from {
@@ -60,7 +60,7 @@ fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<To
     followed.collect()
 }
 
-fn told(run: &Run) -> Vec<Told> {
+fn reported(run: &Run) -> Vec<Reported> {
     let samples = run.samples();
     let told = |s: &&Sample| (s.status, s.force.map(|force| force.cartesian));
     samples.iter().map(told).collect()
@@ -84,7 +84,7 @@ fn a_drag_is_a_contact_and_slips_and_new_settings_hold_for_whole_frames() {
     run.assert_only_setup_drops();
     let samples = run.samples();
     let usual = TemporalSettings::USUAL;
-    assert_eq!(told(&run), followed(&samples, usual, usize::MAX));
+    assert_eq!(reported(&run), followed(&samples, usual, usize::MAX));
     check_truth(&run);
 
     // Another filter, and limits above every touch.
@@ -110,7 +110,7 @@ fn a_drag_is_a_contact_and_slips_and_new_settings_hold_for_whole_frames() {
     assert_eq!(changed.hellos().last().unwrap().filter, other.filter);
     // The reply overtakes waiting samples, by one or two.
     let before = changed.answers(SET)[0].1;
-    let fits = |from: &usize| told(&changed) == followed(&samples, other, *from);
+    let fits = |from: &usize| reported(&changed) == followed(&samples, other, *from);
     let from = (before - 1..before + 3).find(fits);
     assert!(from.is_some(), "every frame by one of the two settings");
 }

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use hivtac_host::link::Link;
-use hivtac_host::page::{Coverage, Feed, Recording, Sensor, Server, Told};
+use hivtac_host::page::{Coverage, Feed, Recording, Sensor, SensorState, Server};
 use hivtac_wire::message::{DeviceHello, Sample};
 
 use super::take::Take;
@@ -18,7 +18,7 @@ const TELL_EVERY: Duration = Duration::from_millis(200);
 /// The state that the page shows.
 pub(super) struct Watched {
     feed: Arc<Feed>,
-    told: Told,
+    state: SensorState,
     at: Instant,
 }
 
@@ -39,7 +39,7 @@ impl Watched {
         thread::spawn(move || server.run());
         let mut watched = Self {
             feed,
-            told: Told::of(&link.name, hello),
+            state: SensorState::of(&link.name, hello),
             at: Instant::now(),
         };
         watched.recording(
@@ -51,7 +51,7 @@ impl Watched {
 
     /// Updates the state of the recording.
     pub fn recording(&mut self, on: bool, text: String) {
-        self.told.recording = Recording { on, text };
+        self.state.recording = Recording { on, text };
         self.tell();
     }
 
@@ -70,15 +70,15 @@ impl Watched {
             .last_us
             .saturating_sub(take.first_us.unwrap_or(take.last_us));
         let steps = take.samples.saturating_sub(1) as f64;
-        self.told.rate_hz = (lasted_us > 0).then(|| 1e6 * steps / lasted_us as f64);
-        self.told.lost = take.lost.into();
-        self.told.coverage = coverage().or(self.told.coverage.take());
+        self.state.rate_hz = (lasted_us > 0).then(|| 1e6 * steps / lasted_us as f64);
+        self.state.lost = take.lost.into();
+        self.state.coverage = coverage().or(self.state.coverage.take());
         self.tell();
     }
 
     /// Ends a take of presses anywhere, with its final coverage.
     pub fn ended(&mut self, coverage: Coverage) {
-        self.told.coverage = Some(coverage);
+        self.state.coverage = Some(coverage);
         self.recording(
             false,
             "recorded: the terminal says what comes next".to_owned(),
@@ -87,6 +87,6 @@ impl Watched {
 
     fn tell(&mut self) {
         self.at = Instant::now();
-        self.feed.state(self.told.json());
+        self.feed.state(self.state.json());
     }
 }

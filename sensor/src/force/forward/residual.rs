@@ -1,5 +1,5 @@
-//! Knows how large the residual of honest frames is: χ² of as many degrees of freedom as there are
-//! coordinates beyond the five unknowns.
+//! Limits of the residual: χ² with as many degrees of freedom as there are coordinates beyond the
+//! five unknowns. Few frames with nothing wrong exceed them.
 
 use super::solve::UNKNOWNS;
 

@@ -1,4 +1,4 @@
-//! Knows how a contact of another shape moves the images, compared with the tables' tip under the
+//! Predicts how a contact of another shape moves the images, compared with the tables' tip under the
 //! same force at the same centre of pressure.
 //!
 //! A wide contact moves the images as a slightly larger force does, and off the middle to one side.

@@ -1,4 +1,4 @@
-//! Tests the follower alone, with events that a tracker tells rarely or never.
+//! Tests the follower alone, with events that a tracker sends rarely or never.
 
 use crate::capture::{Action, Band, Delivery, Edge, Ending, Event, Follower, Shape, Tally};
 

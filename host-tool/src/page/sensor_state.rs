@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// A sensor's state, as the page reads it.
 #[derive(Debug, Serialize)]
-pub struct Told {
+pub struct SensorState {
     /// The port's name.
     pub port: String,
     /// Why samples are missing; `None` while they come.
@@ -105,11 +105,11 @@ pub enum Covered {
     Unneeded,
 }
 
-impl Told {
+impl SensorState {
     /// The identity of a device, before it has sent anything else.
-    pub fn of(port: &str, hello: &DeviceHello) -> Told {
+    pub fn of(port: &str, hello: &DeviceHello) -> SensorState {
         let model = hello.model.as_ref();
-        Told {
+        SensorState {
             port: port.to_owned(),
             trouble: None,
             name: shown(&hello.name),
