@@ -4,7 +4,7 @@ use crate::device::Device;
 use crate::health::{self, HealthJson};
 use crate::output::{self, note};
 use crate::settings;
-use crate::settings::temporal::FilterJson;
+use crate::settings::temporal::{FilterJson, filter_text};
 use clap::Args;
 use hivtac_host::failure::Failure;
 use hivtac_host::link::Link;
@@ -12,6 +12,7 @@ use hivtac_host::reply::log_text;
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_host::threshold::{text, to_json as threshold_json};
 use hivtac_terms::conditions::CentroidEstimator;
+use hivtac_terms::temporal::Filter;
 use hivtac_terms::threshold::Threshold;
 use hivtac_terms::units::{MilliPx, Px};
 use hivtac_wire::message::{
@@ -82,7 +83,8 @@ pub struct Info<'a> {
     preset: &'a str,
     dilations: u8,
     centroid: CentroidEstimator,
-    filter: FilterJson,
+    #[serde(with = "FilterJson")]
+    filter: Filter,
     stats: Option<Stats>,
     /// `None` for callers that do not show it.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -195,7 +197,7 @@ impl<'a> Info<'a> {
             preset: &hello.preset,
             dilations: hello.dilations,
             centroid: hello.centroid,
-            filter: FilterJson::new(hello.filter),
+            filter: hello.filter,
             stats,
             tare: None,
             health: None,
@@ -226,7 +228,7 @@ impl<'a> Info<'a> {
                 text(made_for)
             ));
         }
-        lines.push(format!("filter     {}", self.filter.text()));
+        lines.push(format!("filter     {}", filter_text(self.filter)));
         if self
             .model
             .as_ref()

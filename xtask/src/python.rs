@@ -7,6 +7,7 @@ use anyhow::Result;
 
 use crate::artifacts::{self, Board};
 use crate::report::{Tally, run_tests};
+use crate::test::Shared;
 use crate::{process, toolchain};
 
 /// An environment of Python, with packages of PyPI.
@@ -137,7 +138,7 @@ fn pip(python: &Path) -> Command {
 
 /// Installs Python's `hivtac`, runs its tests on the firmware in the rig, and checks its
 /// annotations.
-pub fn test_package(tally: &mut Tally) -> Result<()> {
+pub fn test_package(_: &Shared, tally: &mut Tally) -> Result<()> {
     let python = PACKAGE.ready()?;
     python.install(&["./host-tool/python"])?;
     let mut types = Command::new(&python.0);
@@ -151,7 +152,7 @@ pub fn test_package(tally: &mut Tally) -> Result<()> {
 }
 
 /// Records with LeRobot from the simulated sensor, and loads what was recorded.
-pub fn test_lerobot(tally: &mut Tally) -> Result<()> {
+pub fn test_lerobot(_: &Shared, tally: &mut Tally) -> Result<()> {
     let python = LEROBOT.ready()?;
     python.install(&["./host-tool/python", "./host-tool/lerobot"])?;
     let tool = artifacts::host_tool()?;
@@ -162,7 +163,7 @@ pub fn test_lerobot(tally: &mut Tally) -> Result<()> {
 }
 
 /// Logs the simulated sensor and a recording into files of Rerun, and reads these.
-pub fn test_rerun(tally: &mut Tally) -> Result<()> {
+pub fn test_rerun(_: &Shared, tally: &mut Tally) -> Result<()> {
     let python = RERUN.ready()?;
     python.install(&["./host-tool/python"])?;
     let tool = artifacts::host_tool()?;
@@ -173,7 +174,7 @@ pub fn test_rerun(tally: &mut Tally) -> Result<()> {
 }
 
 /// Presses the simulated sensor in a program's own time, and in a simulation of MuJoCo.
-pub fn test_mujoco(tally: &mut Tally) -> Result<()> {
+pub fn test_mujoco(_: &Shared, tally: &mut Tally) -> Result<()> {
     let python = MUJOCO.ready()?;
     python.install(&["./host-tool/python"])?;
     let tool = artifacts::host_tool()?;
@@ -184,7 +185,7 @@ pub fn test_mujoco(tally: &mut Tally) -> Result<()> {
 }
 
 /// Serves the firmware in the rig, and tests what a receiver gets.
-pub fn test_serve(tally: &mut Tally) -> Result<()> {
+pub fn test_serve(_: &Shared, tally: &mut Tally) -> Result<()> {
     let tool = artifacts::serving_tool()?;
     let tests = SERVE
         .ready()?
@@ -193,7 +194,7 @@ pub fn test_serve(tally: &mut Tally) -> Result<()> {
 }
 
 /// Checks the kit's solids, alone and assembled.
-pub fn test_kit(tally: &mut Tally) -> Result<()> {
+pub fn test_kit(_: &Shared, tally: &mut Tally) -> Result<()> {
     let options = ["-W", "error::UserWarning"];
     let tool = artifacts::host_tool()?;
     let mut tests = KIT

@@ -10,6 +10,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 
 use crate::artifacts::{self, Programs};
+use crate::python::{KIT, LEROBOT, MUJOCO, PACKAGE, RERUN, SERVE};
 use crate::report::{Report, Tally, run_tests};
 use crate::toolchain::{self, cargo};
 use crate::{bench, fuzz, linux_host, packages, process, python, web};
@@ -26,73 +27,52 @@ pub struct Test {
 
 /// A step: its name, its work, and for a step of `--all` a function that finds an obstacle to it
 /// here.
-type Step = (&'static str, Work, Option<fn() -> Option<String>>);
+type Step = (&'static str, Work, Option<Obstacle>);
 type Work = fn(&Shared, &mut Tally) -> Result<()>;
+type Obstacle = fn() -> Option<String>;
+
+const fn always(name: &'static str, work: Work) -> Step {
+    (name, work, None)
+}
+
+const fn slow(name: &'static str, obstacle: Obstacle, work: Work) -> Step {
+    (name, work, Some(obstacle))
+}
 
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
 /// the microcontroller come first, in their own folder, while the lints hold the common one. Long
 /// steps follow; those after them fill the time until both threads end.
 static STEPS: [Step; 20] = [
-    ("format", |_, _| format(), None),
-    (
-        "lints: microcontroller",
-        |shared, _| shared.target_lints(),
-        None,
-    ),
-    ("lints: host", |shared, _| host_lints(shared.all), None),
-    (BUILD, |shared, _| shared.build(), None),
-    ("tests: rig", rig_tests, None),
-    ("tests: host", host_tests, None),
-    ("tests: across rooms", cross_room_tests, None),
-    ("attacks", |_, _| fuzz::run(), Some(fuzz::obstacle)),
-    (
+    always("format", |_, _| format()),
+    always("lints: microcontroller", |shared, _| shared.target_lints()),
+    always("lints: host", |shared, _| host_lints(shared.all)),
+    always(BUILD, |shared, _| shared.build()),
+    always("tests: rig", rig_tests),
+    always("tests: host", host_tests),
+    always("tests: across rooms", cross_room_tests),
+    slow("attacks", fuzz::obstacle, |_, _| fuzz::run()),
+    slow(
         "tests: linux host",
+        linux_host::obstacle,
         |shared, tally| shared.linux_host(tally),
-        Some(linux_host::obstacle),
     ),
-    (
-        "tests: rig at half speed",
-        rig_tests_at_half_speed,
-        Some(|| None),
-    ),
-    (
-        "tests: python",
-        |_, tally| python::test_package(tally),
-        Some(|| python::PACKAGE.obstacle()),
-    ),
-    (
-        "tests: serve",
-        |_, tally| python::test_serve(tally),
-        Some(|| python::SERVE.obstacle()),
-    ),
-    (
+    slow("tests: rig at half speed", || None, rig_tests_at_half_speed),
+    slow("tests: python", || PACKAGE.obstacle(), python::test_package),
+    slow("tests: serve", || SERVE.obstacle(), python::test_serve),
+    slow(
         "tests: lerobot",
-        |_, tally| python::test_lerobot(tally),
-        Some(|| python::LEROBOT.obstacle()),
+        || LEROBOT.obstacle(),
+        python::test_lerobot,
     ),
-    (
-        "tests: rerun",
-        |_, tally| python::test_rerun(tally),
-        Some(|| python::RERUN.obstacle()),
-    ),
-    (
-        "tests: mujoco",
-        |_, tally| python::test_mujoco(tally),
-        Some(|| python::MUJOCO.obstacle()),
-    ),
-    (
-        "tests: kit",
-        |_, tally| python::test_kit(tally),
-        Some(|| python::KIT.obstacle()),
-    ),
-    ("benchmark", |shared, _| shared.benchmark(), None),
-    ("build: board benchmark", |_, _| bench::board::lint(), None),
-    (
-        "build: other systems",
-        |_, _| other_systems(),
-        Some(no_other_systems),
-    ),
-    ("licences", |_, _| licences(), Some(no_cargo_deny)),
+    slow("tests: rerun", || RERUN.obstacle(), python::test_rerun),
+    slow("tests: mujoco", || MUJOCO.obstacle(), python::test_mujoco),
+    slow("tests: kit", || KIT.obstacle(), python::test_kit),
+    always("benchmark", |shared, _| shared.benchmark()),
+    always("build: board benchmark", |_, _| bench::board::lint()),
+    slow("build: other systems", no_other_systems, |_, _| {
+        other_systems()
+    }),
+    slow("licences", no_cargo_deny, |_, _| licences()),
 ];
 
 /// The build, which also runs if a chosen step needs it.
@@ -107,7 +87,7 @@ const NEED_BUILD: [&str; 3] = [
 const WORKSPACES: [&str; 2] = ["", "tests/qemu"];
 
 /// The state that the steps share.
-struct Shared {
+pub struct Shared {
     all: bool,
     /// Set by the step that builds them; `None` after a failure.
     programs: OnceLock<Option<Programs>>,

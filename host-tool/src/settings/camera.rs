@@ -6,27 +6,35 @@ use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_wire::settings::CameraReport;
 use serde::{Deserialize, Serialize};
 
-/// In whole numbers of the device's units; null where the camera adapts to the light.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// [`CameraSettings`] as JSON, in whole numbers of the device's units; null where the camera adapts
+/// to the light. Unchecked.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "CameraSettings", deny_unknown_fields)]
 pub struct CameraJson {
-    exposure_us: Option<u32>,
-    gain_sixteenths: Option<Sixteenths>,
-    rate: RateJson,
+    #[serde(default, rename = "exposure_us")]
+    exposure: Option<Microseconds>,
+    #[serde(default, rename = "gain_sixteenths")]
+    gain: Option<Sixteenths>,
+    #[serde(with = "RateJson")]
+    rate: Rate,
     /// Null for gains in the middle of the maker's presets.
-    #[serde(default)]
-    white: Option<WhiteJson>,
+    #[serde(default, with = "optional_white")]
+    white: Option<White>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "White", deny_unknown_fields)]
 struct WhiteJson {
-    red_64ths: u8,
-    blue_64ths: u8,
+    #[serde(rename = "red_64ths")]
+    red: u8,
+    #[serde(rename = "blue_64ths")]
+    blue: u8,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+optional_json!(optional_white, White, "super::WhiteJson");
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Rate", rename_all = "kebab-case")]
 enum RateJson {
     Full,
     Half,
@@ -39,42 +47,6 @@ pub struct InUse {
     exposure_us: u32,
     gain_sixteenths: Sixteenths,
     frames_per_second: u16,
-}
-
-impl CameraJson {
-    /// From a device's settings.
-    pub fn new(settings: &CameraSettings) -> CameraJson {
-        CameraJson {
-            exposure_us: settings.exposure.map(|exposure| exposure.0),
-            gain_sixteenths: settings.gain,
-            rate: match settings.rate {
-                Rate::Full => RateJson::Full,
-                Rate::Half => RateJson::Half,
-                Rate::Quarter => RateJson::Quarter,
-            },
-            white: settings.white.map(|White { red, blue }| WhiteJson {
-                red_64ths: red,
-                blue_64ths: blue,
-            }),
-        }
-    }
-
-    /// As a device's settings, without a check whether its camera supports them.
-    pub fn settings(&self) -> CameraSettings {
-        CameraSettings {
-            exposure: self.exposure_us.map(Microseconds),
-            gain: self.gain_sixteenths,
-            rate: match self.rate {
-                RateJson::Full => Rate::Full,
-                RateJson::Half => Rate::Half,
-                RateJson::Quarter => Rate::Quarter,
-            },
-            white: self.white.map(|white| White {
-                red: white.red_64ths,
-                blue: white.blue_64ths,
-            }),
-        }
-    }
 }
 
 impl InUse {
@@ -215,21 +187,6 @@ mod tests {
                 RateLimits::new(78, [47, 12_810].map(Microseconds)),
                 RateLimits::new(39, [93, 25_620].map(Microseconds)),
             ]),
-        }
-    }
-
-    #[test]
-    fn they_come_back_from_json() {
-        for rate in Rate::ALL {
-            let settings = CameraSettings {
-                exposure: Some(Microseconds(2_500)),
-                gain: None,
-                rate,
-                white: Some(White { red: 76, blue: 132 }),
-            };
-            let text = serde_json::to_string(&CameraJson::new(&settings)).unwrap();
-            let read: CameraJson = serde_json::from_str(&text).unwrap();
-            assert_eq!(read.settings(), settings, "{text}");
         }
     }
 

@@ -189,9 +189,9 @@ impl Conversation {
                 shown(&file.device_id)
             ));
         }
-        let tare = file.rest().filter(|_| is_own);
+        let tare = file.tare.filter(|_| is_own);
         let camera = self.settings()?.camera;
-        let can = camera.limits.check(&file.camera());
+        let can = camera.limits.check(&file.camera);
         can.map_err(|error| Failure::of_file(path, format!("{error}; nothing was changed")))?;
         self.set(file, tare, camera.settings)?;
         let line = format!("settings of {path} are in use and kept");
@@ -214,7 +214,7 @@ impl Conversation {
         camera: CameraSettings,
     ) -> Result<(), Failure> {
         let name = name(&file.name).unwrap_or_default();
-        let threshold = file.threshold();
+        let threshold = file.threshold;
         let unkept = |failure: Failure| {
             let what = "nothing was kept: a restart brings back the settings from before";
             Failure::new(failure.kind, format!("{failure}; {what}"))
@@ -224,14 +224,14 @@ impl Conversation {
             self.send(Request::SetThreshold(threshold))
                 .map_err(unkept)?;
         }
-        if file.camera() != camera {
-            set_camera(&mut self.link, file.camera(), self.patience).map_err(unkept)?;
+        if file.camera != camera {
+            set_camera(&mut self.link, file.camera, self.patience).map_err(unkept)?;
         }
-        self.link.set_down(file.down()).map_err(unkept)?;
+        self.link.set_down(file.down).map_err(unkept)?;
         self.send(Request::SetTare(tare)).map_err(unkept)?;
-        let temporal = file.temporal();
+        let temporal = file.temporal;
         self.send(Request::SetTemporal(temporal)).map_err(unkept)?;
-        let shape = file.contact_shape();
+        let shape = file.contact_shape;
         self.send(Request::SetContactShape(shape)).map_err(unkept)?;
         self.send(Request::SetName(name)).map_err(unkept)?;
         keep(&mut self.link, Selection::ALL)

@@ -1,5 +1,30 @@
 //! `hivtac settings`: shows, changes, exports, imports and resets what a device keeps.
 
+/// Makes a module for `#[serde(with)]` of a value that may be missing, by what writes and reads it
+/// when it is there.
+macro_rules! optional_json {
+    ($module:ident, $type:ty, $json:literal) => {
+        mod $module {
+            use super::*;
+            use serde::{Deserializer, Serializer};
+
+            #[derive(Serialize, Deserialize)]
+            struct There(#[serde(with = $json)] $type);
+
+            pub fn serialize<S: Serializer>(it: &Option<$type>, to: S) -> Result<S::Ok, S::Error> {
+                it.map(There).serialize(to)
+            }
+
+            pub fn deserialize<'d, D>(from: D) -> Result<Option<$type>, D::Error>
+            where
+                D: Deserializer<'d>,
+            {
+                Ok(Option::<There>::deserialize(from)?.map(|There(it)| it))
+            }
+        }
+    };
+}
+
 mod arguments;
 mod camera;
 mod conversation;

@@ -10,177 +10,113 @@ use hivtac_terms::units::{
 };
 use serde::{Deserialize, Serialize};
 
-/// In whole numbers of the device's units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// [`TemporalSettings`] as JSON, in whole numbers of the device's units, unchecked.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "TemporalSettings", deny_unknown_fields)]
 pub struct TemporalJson {
-    contact: ContactJson,
-    slip: SlipJson,
-    filter: FilterJson,
-    rezero: Option<RezeroJson>,
-    creep: CreepJson,
+    #[serde(with = "ContactJson")]
+    contact: ContactLimits,
+    #[serde(with = "SlipJson")]
+    slip: SlipLimits,
+    #[serde(with = "FilterJson")]
+    filter: Filter,
+    #[serde(default, with = "optional_rezero")]
+    rezero: Option<Rezero>,
+    #[serde(with = "CreepJson")]
+    creep: Creep,
     /// Files of earlier versions have none.
-    #[serde(default)]
-    output: OutputJson,
+    #[serde(default, with = "OutputJson")]
+    output: Output,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "ContactLimits", deny_unknown_fields)]
 struct ContactJson {
-    begins_un: u32,
-    ends_un: u32,
+    #[serde(rename = "begins_un")]
+    begins: UnsignedMicroNewtons,
+    #[serde(rename = "ends_un")]
+    ends: UnsignedMicroNewtons,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "SlipLimits", deny_unknown_fields)]
 struct SlipJson {
-    distance_um: u32,
-    within_ms: u32,
-    ratio_permille: u16,
+    #[serde(rename = "distance_um")]
+    distance: Micrometres,
+    #[serde(rename = "within_ms")]
+    within: Milliseconds,
+    #[serde(rename = "ratio_permille")]
+    ratio: Permille,
 }
 
 /// A filter, as in the settings and in the output of `info`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Serialize, Deserialize)]
+#[serde(
+    remote = "Filter",
+    tag = "kind",
+    rename_all = "kebab-case",
+    deny_unknown_fields
+)]
 pub enum FilterJson {
     /// Each frame's own force.
     None,
     /// A first-order low-pass.
     LowPass {
         /// Its time constant.
-        time_constant_ms: u32,
+        #[serde(rename = "time_constant_ms")]
+        time_constant: Milliseconds,
     },
     /// The median of each component in three frames.
     MedianOfThree,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Rezero", deny_unknown_fields)]
 struct RezeroJson {
-    after_ms: u32,
-    rate_mpx_per_s: u16,
-    total_mpx: u16,
+    #[serde(rename = "after_ms")]
+    after: Milliseconds,
+    #[serde(rename = "rate_mpx_per_s")]
+    rate: MilliPx,
+    #[serde(rename = "total_mpx")]
+    total: MilliPx,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+optional_json!(optional_rezero, Rezero, "super::RezeroJson");
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Creep", deny_unknown_fields)]
 struct CreepJson {
-    parts_permille: [u8; 2],
+    #[serde(rename = "parts_permille")]
+    parts: [SmallPermille; 2],
 }
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "high", rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Serialize, Deserialize)]
+#[serde(
+    remote = "Output",
+    tag = "high",
+    rename_all = "kebab-case",
+    deny_unknown_fields
+)]
 enum OutputJson {
-    #[default]
-    Never,
+    #[serde(rename = "never")]
+    Off,
     Contact,
     Slip,
     Force {
-        limit_un: u32,
+        #[serde(rename = "limit_un")]
+        limit: UnsignedMicroNewtons,
     },
 }
 
-impl TemporalJson {
-    /// From a device's settings.
-    pub fn new(settings: &TemporalSettings) -> TemporalJson {
-        let TemporalSettings {
-            contact,
-            slip,
-            filter,
-            rezero,
-            creep,
-            output,
-        } = *settings;
-        TemporalJson {
-            contact: ContactJson {
-                begins_un: contact.begins.0,
-                ends_un: contact.ends.0,
-            },
-            slip: SlipJson {
-                distance_um: slip.distance.0,
-                within_ms: slip.within.0,
-                ratio_permille: slip.ratio.0,
-            },
-            filter: FilterJson::new(filter),
-            rezero: rezero.map(|Rezero { after, rate, total }| RezeroJson {
-                after_ms: after.0,
-                rate_mpx_per_s: rate.0,
-                total_mpx: total.0,
-            }),
-            creep: CreepJson {
-                parts_permille: creep.parts.map(|part| part.0),
-            },
-            output: match output {
-                Output::Off => OutputJson::Never,
-                Output::Contact => OutputJson::Contact,
-                Output::Slip => OutputJson::Slip,
-                Output::Force { limit } => OutputJson::Force { limit_un: limit.0 },
-            },
+/// The filter and the delay it causes, for a person.
+pub fn filter_text(filter: Filter) -> String {
+    match filter {
+        Filter::None => "none: each frame's own force".to_owned(),
+        Filter::LowPass { time_constant } => {
+            let ms = time_constant.0;
+            format!("low-pass of {ms} ms: a steady change comes {ms} ms later")
         }
-    }
-
-    /// As a device's settings, without a check of their ranges.
-    pub fn settings(&self) -> TemporalSettings {
-        TemporalSettings {
-            contact: ContactLimits {
-                begins: UnsignedMicroNewtons(self.contact.begins_un),
-                ends: UnsignedMicroNewtons(self.contact.ends_un),
-            },
-            slip: SlipLimits {
-                distance: Micrometres(self.slip.distance_um),
-                within: Milliseconds(self.slip.within_ms),
-                ratio: Permille(self.slip.ratio_permille),
-            },
-            filter: match self.filter {
-                FilterJson::None => Filter::None,
-                FilterJson::LowPass { time_constant_ms } => Filter::LowPass {
-                    time_constant: Milliseconds(time_constant_ms),
-                },
-                FilterJson::MedianOfThree => Filter::MedianOfThree,
-            },
-            rezero: self.rezero.map(|rezero| Rezero {
-                after: Milliseconds(rezero.after_ms),
-                rate: MilliPx(rezero.rate_mpx_per_s),
-                total: MilliPx(rezero.total_mpx),
-            }),
-            creep: Creep {
-                parts: self.creep.parts_permille.map(SmallPermille),
-            },
-            output: match self.output {
-                OutputJson::Never => Output::Off,
-                OutputJson::Contact => Output::Contact,
-                OutputJson::Slip => Output::Slip,
-                OutputJson::Force { limit_un } => Output::Force {
-                    limit: UnsignedMicroNewtons(limit_un),
-                },
-            },
-        }
-    }
-}
-
-impl FilterJson {
-    /// From a device's filter.
-    pub fn new(filter: Filter) -> FilterJson {
-        match filter {
-            Filter::None => FilterJson::None,
-            Filter::LowPass { time_constant } => FilterJson::LowPass {
-                time_constant_ms: time_constant.0,
-            },
-            Filter::MedianOfThree => FilterJson::MedianOfThree,
-        }
-    }
-
-    /// The filter and the delay it causes, for a person.
-    pub fn text(self) -> String {
-        match self {
-            FilterJson::None => "none: each frame's own force".to_owned(),
-            FilterJson::LowPass {
-                time_constant_ms: ms,
-            } => format!("low-pass of {ms} ms: a steady change comes {ms} ms later"),
-            FilterJson::MedianOfThree => {
-                "median of three: a steady change comes a frame later".to_owned()
-            }
-        }
+        Filter::MedianOfThree => "median of three: a steady change comes a frame later".to_owned(),
     }
 }
 
@@ -221,7 +157,7 @@ pub fn texts(settings: &TemporalSettings) -> [(&'static str, String); 6] {
                 Decimal::thousandths(slip.ratio.0)
             ),
         ),
-        ("filter", FilterJson::new(*filter).text()),
+        ("filter", filter_text(*filter)),
         ("rezero", rezero),
         ("creep", creep_text(creep)),
         ("output", output_text(*output)),
@@ -429,18 +365,6 @@ mod tests {
     }
 
     #[test]
-    fn they_come_back_from_json() {
-        for filter in [Filter::None, Filter::MedianOfThree, unusual().filter] {
-            for settings in [unusual(), TemporalSettings::default()] {
-                let settings = TemporalSettings { filter, ..settings };
-                let text = serde_json::to_string(&TemporalJson::new(&settings)).unwrap();
-                let read: TemporalJson = serde_json::from_str(&text).unwrap();
-                assert_eq!(read.settings(), settings, "{text}");
-            }
-        }
-    }
-
-    #[test]
     fn a_person_reads_units() {
         let [touch, slip, filter, rezero, creep, output] = texts(&unusual()).map(|(_, text)| text);
         assert_eq!(touch, "from 3.500 mN on, until below 1.000 mN");
@@ -457,15 +381,6 @@ mod tests {
         let expected = "0.031 of a force within 0.500 s, 0.042 within 20.000 s";
         assert_eq!(creep, expected);
         assert_eq!(output, "high from 200.000 mN on, until a tenth below");
-    }
-
-    #[test]
-    fn files_of_earlier_versions_have_no_output() {
-        let usual = TemporalSettings::default();
-        let mut file = serde_json::to_value(TemporalJson::new(&usual)).unwrap();
-        file.as_object_mut().unwrap().remove("output");
-        let read: TemporalJson = serde_json::from_value(file).unwrap();
-        assert_eq!(read.settings(), usual);
     }
 
     #[test]

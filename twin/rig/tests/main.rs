@@ -6,6 +6,7 @@ mod common;
 mod attack;
 mod camera;
 mod camera_settings;
+mod cameras;
 mod command;
 mod cuts;
 mod energy;

@@ -1,9 +1,7 @@
 //! Tests of the second board, an OpenMV Cam H7 with an MT9V034: it has the properties of the first
 //! one.
 
-use crate::common::{
-    Bug, Run, Setup, assert_usual, command, firmware, openmv, other, set_threshold,
-};
+use crate::common::{Run, Setup, assert_usual, command, firmware, openmv, set_threshold};
 use crate::led;
 use hivtac_rig::board;
 use hivtac_rig::camera::part;
@@ -13,7 +11,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold, Yuv422};
 use hivtac_wire::message::{Outcome, Request};
 
-fn assert_good(run: &Run) {
+pub fn assert_good(run: &Run) {
     let samples = run.samples();
     assert!(samples.len() >= 6, "{}: {}", samples.len(), run.log());
     for sample in &samples {
@@ -49,20 +47,6 @@ fn forces_are_the_true_ones() {
     assert!(worst_un < 600.0, "{worst_un} µN");
 }
 
-#[test]
-#[ignore = "10 s: as on the first board"]
-fn half_as_many_instructions_per_second_are_enough() {
-    let setup = openmv(420);
-    let instructions_per_second = setup.instructions_per_second / 2;
-    let run = Setup {
-        instructions_per_second,
-        ..setup
-    }
-    .run();
-    assert_good(&run);
-    assert_eq!(run.missing_frames(), Vec::<u32>::new());
-}
-
 /// A camera of the other kind is reported by its name, on either board, and nothing is written to
 /// it.
 #[test]
@@ -90,48 +74,6 @@ fn a_camera_with_another_version_is_refused() {
     assert_eq!((run.samples().len(), run.report.sccb_writes), (0, 0));
 }
 
-#[test]
-#[ignore = "as on the other board"]
-fn an_absent_camera_is_reported_and_found_later() {
-    let run = openmv(1_340).fault("camera-absent@0-700").run();
-    assert!(run.log().contains("no MT9V034"), "{}", run.log());
-    assert!(run.samples().len() >= 6, "{:?}", run.stats());
-}
-
-/// Its reset line and its register reset undo the settings of another program.
-#[test]
-#[ignore = "as on the other board"]
-fn what_another_program_left_in_the_camera_is_reset() {
-    assert_good(&openmv(420).fault("camera-used").run());
-}
-
-#[test]
-#[ignore = "as on the other board"]
-fn a_silent_camera_is_restarted() {
-    let run = openmv(840).fault("camera-silent@330-400").run();
-    let stats = run.stats();
-    assert!(
-        stats.camera_timeouts >= 1 && stats.camera_restarts >= 1,
-        "{stats:?}"
-    );
-    let told = |status: Status| status.contains(Status::CAMERA_RESTARTED);
-    let samples = run.samples();
-    let restarted = samples.iter().find(|sample| told(sample.status));
-    let restarted = restarted.expect("a sample says so").frame;
-    assert!(samples.iter().any(|sample| sample.frame > restarted + 3));
-    run.assert_times();
-}
-
-/// A frame of the wrong size costs itself and no other.
-#[test]
-#[ignore = "as on the other board"]
-fn a_short_frame_is_dropped() {
-    let run = openmv(420).fault("frame-short@340").run();
-    assert!(run.stats().dropped_size >= 1, "{:?}", run.stats());
-    let after = run.frames_after_a_loss();
-    assert_eq!(after.len(), 1, "{after:?}");
-}
-
 /// The camera sees no colours: a threshold of its luma is accepted at once, others are refused.
 #[test]
 fn only_thresholds_of_its_luma_are_taken() {
@@ -149,14 +91,6 @@ fn only_thresholds_of_its_luma_are_taken() {
     assert_eq!(outcomes, [Unsupported, Unsupported, Done, Done]);
     let last = run.samples().pop().unwrap().status;
     assert!(!last.contains(Status::MODEL_MISMATCH), "{last:?}");
-}
-
-/// Its automatic control may move in small steps, too.
-#[test]
-#[ignore = "as on the other board"]
-fn an_exposure_that_is_found_in_small_steps_is_waited_for() {
-    let run = openmv(700).fault("camera-hesitant").run();
-    assert_good(&run);
 }
 
 #[test]
@@ -198,24 +132,4 @@ fn on_the_other_board_it_breaks_a_rule_of_the_chip() {
     let directory = tempfile::tempdir().unwrap();
     let error = setup.try_run(&directory.path().join("truth")).unwrap_err();
     assert!(error.to_string().contains("HCLK"), "{error}");
-}
-
-/// In one bug DCMI takes blank rows for a frame; in the other a camera without binning sends four
-/// times the data.
-#[test]
-#[ignore = "7 s: as on the other board"]
-fn seeded_bugs_are_noticed() {
-    for bug in [Bug::Polarities, Bug::CameraRegister] {
-        let setup = Setup {
-            elf: other("openmv-h7-seeded-bugs"),
-            ..openmv(420)
-        };
-        let run = setup.run_with(bug);
-        let samples = run.samples();
-        let forces = samples.iter().filter(|sample| sample.force.is_some());
-        assert_eq!(forces.count(), 0, "{bug:?}");
-        let stats = run.stats();
-        assert!(stats.dropped_size >= 4, "{bug:?}: {stats:?}");
-        assert_eq!(stats.frames_processed, 0, "{bug:?}: {stats:?}");
-    }
 }

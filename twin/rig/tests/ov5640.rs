@@ -1,7 +1,7 @@
 //! Tests of the first board with an OV5640 in its camera's socket: the firmware is the same as with
 //! an OV7725, and so are the properties.
 
-use crate::common::{Bug, Run, Setup, assert_usual, command, firmware, other, set_threshold};
+use crate::common::{Run, Setup, assert_usual, command, firmware, set_threshold};
 use hivtac_rig::camera::part;
 use hivtac_rig::script::Action;
 use hivtac_terms::camera::{CameraSettings, Rate, White};
@@ -16,7 +16,7 @@ const READY_MS: u64 = 480;
 /// 463 of the 467 lines of a frame.
 const LONGEST_US: u32 = 8_322;
 
-fn ov5640(virtual_ms: u64) -> Setup {
+pub fn ov5640(virtual_ms: u64) -> Setup {
     Setup {
         camera: part::Kind::Ov5640,
         ..Setup::new(firmware(), virtual_ms)
@@ -29,7 +29,7 @@ fn send(id: u16, request: Request) -> Action {
 
 /// Returns the samples with a force. More noise than usual is not known in the first frames, and
 /// one of fifty is not explained later.
-fn forces(run: &Run) -> Vec<&Sample> {
+pub fn forces(run: &Run) -> Vec<&Sample> {
     let samples = run.followed();
     let count = samples.len();
     let forces: Vec<_> = samples
@@ -46,7 +46,7 @@ fn forces(run: &Run) -> Vec<&Sample> {
     forces
 }
 
-fn assert_good(run: &Run) {
+pub fn assert_good(run: &Run) {
     for sample in forces(run) {
         assert_usual(sample);
     }
@@ -81,20 +81,6 @@ fn forces_are_the_true_ones() {
     let samples = forces(&run);
     let worst_un = run.worst_force_un(&samples);
     assert!(samples.len() >= 20 && worst_un < 1_500.0, "{worst_un} µN");
-}
-
-#[test]
-#[ignore = "as on the other camera"]
-fn half_as_many_instructions_per_second_are_enough() {
-    let setup = ov5640(700);
-    let instructions_per_second = setup.instructions_per_second / 2;
-    let run = Setup {
-        instructions_per_second,
-        ..setup
-    }
-    .run();
-    assert_good(&run);
-    assert_eq!(run.missing_frames(), Vec::<u32>::new());
 }
 
 /// The light is that of the OV7725's tests. Its smaller pixels need the longest exposure and three
@@ -189,52 +175,6 @@ fn a_camera_with_another_number_is_refused() {
     assert_eq!((run.samples().len(), run.report.sccb_writes), (0, 0));
 }
 
-#[test]
-#[ignore = "as on the other camera"]
-fn an_absent_camera_is_reported_and_found_later() {
-    let run = ov5640(1_700).fault("camera-absent@0-700").run();
-    let told = "no OV7725 or OV5640";
-    assert!(run.log().contains(told), "{}", run.log());
-    assert!(run.samples().len() >= 6, "{:?}", run.stats());
-}
-
-/// Its register reset undoes the settings of another program.
-#[test]
-#[ignore = "as on the other camera"]
-fn what_another_program_left_in_the_camera_is_reset() {
-    assert_good(&ov5640(700).fault("camera-used").run());
-}
-
-#[test]
-#[ignore = "as on the other camera"]
-fn a_silent_camera_is_restarted() {
-    let run = ov5640(1_300).fault("camera-silent@600-700").run();
-    let stats = run.stats();
-    assert!(
-        stats.camera_timeouts >= 1 && stats.camera_restarts >= 1,
-        "{stats:?}"
-    );
-    run.assert_times();
-}
-
-/// A frame of the wrong size costs itself and no other.
-#[test]
-#[ignore = "as on the other camera"]
-fn a_short_frame_is_dropped() {
-    let run = ov5640(700).fault("frame-short@600-608").run();
-    assert!(run.stats().dropped_size >= 1, "{:?}", run.stats());
-    let after = run.frames_after_a_loss();
-    assert_eq!(after.len(), 1, "{after:?}");
-}
-
-/// Its automatic control may move in small steps, too.
-#[test]
-#[ignore = "as on the other camera"]
-fn an_exposure_that_is_found_in_small_steps_is_waited_for() {
-    let run = ov5640(2_200).fault("camera-hesitant").run();
-    forces(&run);
-}
-
 /// Too little light for its longest exposure and highest gain is reported.
 #[test]
 #[ignore = "as on the other camera"]
@@ -249,31 +189,4 @@ fn a_search_that_finds_no_good_exposure_says_so() {
         .run();
     assert_eq!(run.answers(50)[0].0, Outcome::Done);
     assert_eq!(run.health().problems, Problem::Exposure.bit());
-}
-
-/// In one bug DCMI takes blank rows for a frame; in the other the camera sends YUV for RGB.
-#[test]
-#[ignore = "10 s: as for the other cameras"]
-fn seeded_bugs_are_noticed() {
-    for bug in [Bug::Polarities, Bug::CameraRegister] {
-        let setup = Setup {
-            elf: other("seeded-bugs"),
-            ..ov5640(700)
-        };
-        let run = setup.run_with(bug);
-        let samples = run.samples();
-        let forces = samples.iter().filter(|sample| sample.force.is_some());
-        assert_eq!(forces.count(), 0, "{bug:?}");
-        let stats = run.stats();
-        match bug {
-            Bug::Polarities => {
-                let dropped = stats.dropped_size + stats.dropped_overrun;
-                assert!(
-                    dropped >= 2 && stats.frames_processed == 0,
-                    "{bug:?}: {stats:?}"
-                );
-            }
-            _ => assert!(samples.len() >= 3, "{bug:?}: {stats:?}"),
-        }
-    }
 }
