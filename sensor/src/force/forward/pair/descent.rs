@@ -9,11 +9,14 @@ use crate::force::forward::descent::{LIKELY, unlikely, within};
 use crate::force::forward::estimate::{Estimate, Observed, Start};
 use crate::force::forward::mounting::Mounting;
 use crate::force::forward::pose::Pose;
-use crate::force::forward::solve::{Column, PRIOR, Rows, Solved, solve_here, square};
+use crate::force::forward::solve::{Column, PRIOR, Rows, Solved, norm, solve_here, square};
 
-/// Most steps of a descent, and how often one step is halved.
-pub(super) const STEPS: usize = 12;
-const HALVINGS: usize = 4;
+/// Most steps of a descent.
+pub(super) const STEPS: usize = 16;
+/// If a step does not explain more, shorter ones are tried (Marquardt 1963): equations hold each
+/// unknown where it is, with these parts of the strength with which the markers determine it. Near
+/// contacts have nearly the same slopes, so that without them a step may lead anywhere, or nowhere.
+const HOLDS: [f32; 3] = [0.01, 0.05, 0.2];
 /// The steps have converged if the next one would explain at most this.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// The longest step of a place along an axis, mm, and of a size, relative to the largest. A longer
@@ -35,6 +38,9 @@ pub struct Problem<'a> {
     /// What is unknown of the unit.
     pub unknown: Unknown<'a>,
 }
+
+/// Changes of the unknowns.
+type Step = [f32; INPUTS];
 
 /// Two contacts, and the equations of the markers there.
 struct Point {
@@ -85,16 +91,20 @@ impl Problem<'_> {
         let here = Point::new(self, pair);
         let mut whitening = Whitening::EMPTY;
         let found = self.solved(&here, &mut whitening);
-        let step = found.solved.filter(|own| own.explained > LEFT_TO_EXPLAIN);
-        let next = step.and_then(|step| self.lower(&here, &step, &whitening));
+        let is_over = |own: &Solved<INPUTS>| own.explained <= LEFT_TO_EXPLAIN;
+        let next = match &found.solved {
+            _ if !found.unexplained.is_finite() => None,
+            Some(own) if is_over(own) => None,
+            own => self.lower(&here, own.as_ref().map(|own| own.unknowns), &whitening),
+        };
         Stepped { here: found, next }
     }
 
-    /// Returns the contacts after a part of a step that explains more; `None` if no part does.
+    /// Returns the contacts after a step, or a shorter one, that explains more; `None` if none does.
     fn lower(
         &self,
         here: &Point,
-        step: &Solved<INPUTS>,
+        step: Option<Step>,
         whitening: &Whitening,
     ) -> Option<(Pair, f32)> {
         let squares = |pair: &Pair, left: &Column| {
@@ -104,9 +114,9 @@ impl Problem<'_> {
             (square(&left), unlikely.sum::<f32>())
         };
         let (explained, likely) = squares(&here.both.poses, &here.left);
-        let mut part = self.longest(step);
-        for _ in 0..HALVINGS {
-            let pair = self.after(&here.both, step, part);
+        let shorter = HOLDS.iter().map(|hold| here.held(whitening, *hold));
+        for step in core::iter::once(step).chain(shorter).flatten() {
+            let pair = self.after(&here.both, &step);
             let mut left = self.moved(&pair);
             for (left, seen) in left.iter_mut().zip(self.observed.moved.iter()) {
                 *left = seen - *left;
@@ -115,7 +125,6 @@ impl Problem<'_> {
             if there + unlikely < explained + likely {
                 return Some((pair, there));
             }
-            part *= 0.5;
         }
         None
     }
@@ -156,7 +165,7 @@ impl Problem<'_> {
         {
             return estimate;
         }
-        let (mut columns, mut side) = here.equations(whitening);
+        let (mut columns, mut side) = here.equations(whitening, 0.0);
         let markers = side.get(..here.left.len());
         estimate.unexplained = square(markers.unwrap_or_default());
         estimate.solved = solve_here(&mut columns, &mut side);
@@ -164,8 +173,8 @@ impl Problem<'_> {
     }
 
     /// The part of a step that is not too long.
-    fn longest(&self, solved: &Solved<INPUTS>) -> f32 {
-        let [first, second, _, _, _, _, places @ ..] = solved.unknowns;
+    fn longest(&self, step: &Step) -> f32 {
+        let [first, second, _, _, _, _, places @ ..] = step;
         let change = first.abs().max(second.abs()) / self.forward.limits.size;
         let far = places
             .iter()
@@ -173,10 +182,10 @@ impl Problem<'_> {
         (LARGEST_CHANGE / change.max(LARGEST_CHANGE)).min(LONGEST_MM / far.max(LONGEST_MM))
     }
 
-    /// The contacts after a part of a step.
-    fn after(&self, both: &Both, solved: &Solved<INPUTS>, part: f32) -> Pair {
-        let step = solved.unknowns.map(|own| part * own);
-        let [s, t, a, b, c, d, x, y, z, w] = step;
+    /// The contacts after a step, or after the part of it that is not too long.
+    fn after(&self, both: &Both, step: &Step) -> Pair {
+        let part = self.longest(step);
+        let [s, t, a, b, c, d, x, y, z, w] = step.map(|own| part * own);
         let [first, second] = both.poses;
         let moved = |pose: Pose, size: f32, tilt: [f32; 2], place: [f32; 2]| {
             let moved = Pose {
@@ -245,13 +254,25 @@ impl Point {
         interaction.add_uncertainty(&self.both, covariance);
     }
 
+    /// The step if equations hold each unknown with this part of the markers' strength; `None` if
+    /// they do not determine all unknowns.
+    #[inline(never)]
+    fn held(&self, whitening: &Whitening, hold: f32) -> Option<Step> {
+        let (mut columns, mut side) = self.equations(whitening, hold);
+        solve_here(&mut columns, &mut side).map(|solved| solved.unknowns)
+    }
+
     /// The equations of the markers and of the prior, in units of their standard uncertainties.
-    fn equations(&self, whitening: &Whitening) -> ([Rows; INPUTS], Rows) {
+    /// Then, if `hold` is not 0, those that hold the unknowns with this part of the strength of the
+    /// equations before.
+    fn equations(&self, whitening: &Whitening, hold: f32) -> ([Rows; INPUTS], Rows) {
         let markers = self.left.len();
-        let mut columns = [Rows::defaults(markers + 2 * PRIOR); INPUTS];
-        let mut side = Rows::defaults(markers + 2 * PRIOR);
-        let all = columns.iter_mut().zip(&self.prediction.slopes);
-        for (rows, column) in all.chain([(&mut side, &self.left)]) {
+        let all = markers + 2 * PRIOR;
+        let rows = if hold > 0.0 { all + INPUTS } else { all };
+        let mut columns = [Rows::defaults(rows); INPUTS];
+        let mut side = Rows::defaults(rows);
+        let slopes = columns.iter_mut().zip(&self.prediction.slopes);
+        for (rows, column) in slopes.chain([(&mut side, &self.left)]) {
             if let Some(rows) = rows.get_mut(..markers) {
                 for (row, own) in rows.iter_mut().zip(column.iter()) {
                     *row = *own;
@@ -268,6 +289,12 @@ impl Point {
                 if let Some((one, side)) = one.zip(side.get_mut(row)) {
                     (*one, *side) = (1.0 / likely, own);
                 }
+            }
+        }
+        for (unknown, column) in columns.iter_mut().enumerate() {
+            let own = hold * norm(column);
+            if let Some(row) = column.get_mut(all + unknown) {
+                *row = own;
             }
         }
         (columns, side)

@@ -395,6 +395,27 @@ mod tests {
         );
     }
 
+    /// Steps from the nearest starts lead to contacts that explain the markers, even where slopes by
+    /// both are nearly the same, or all starts are far off.
+    #[test]
+    fn steps_do_not_end_on_the_way() {
+        let forward = forward();
+        let pose = |size, place_mm| Pose {
+            size,
+            place_mm,
+            ..Pose::default()
+        };
+        for pair in [
+            [pose(0.36, [-1.65, 2.45]), pose(0.36, [4.35, 2.16])],
+            [pose(0.36, [3.09, 3.31]), pose(0.36, [-2.88, 2.75])],
+            [pose(0.42, [3.67, 2.95]), pose(0.26, [0.2, 0.96])],
+            [pose(0.36, [3.55, -3.06]), pose(0.36, [3.85, -4.02])],
+        ] {
+            let found = found(&forward, &observed(moved(&forward, pair))).unwrap();
+            assert!(found.is_explained(), "{pair:?} {found:?}");
+        }
+    }
+
     /// In parts a search finds what it finds at once. Then contacts that move are followed with one
     /// step a frame, and explain the next frame without one.
     #[test]
