@@ -76,6 +76,7 @@ fn the_sensing_runs_from_itcm() {
         "hivtac_sensor4tare",
         "hivtac_sensor8temporal",
         "hivtac_sensor6rezero",
+        "6Motion12unsteadiness",
         "8pipeline9following",
         "serde_core",
         "$GT$7prepare17h",
