@@ -20,6 +20,7 @@ mod places;
 mod recordings;
 mod rig;
 mod rooms;
+mod sigma;
 mod snapshots;
 mod status_bits;
 mod steps;

@@ -96,6 +96,8 @@ fn the_sensing_runs_from_itcm() {
         "7forward6shapes",
         "7forward6widths",
         "8pipeline7hanging",
+        "5force6misfit",
+        "10NoiseLevel9end_frame",
         "5force10of_outputs",
         "8Geometry9rest_area",
         "8Geometry10along_flat",

@@ -262,12 +262,11 @@ fn a_twin_sends_the_bytes_of_the_flashed_program() {
     a_twin_is_as_the_program(kind, &scene, rig);
 }
 
-/// The scene has an OV7725's noise. With its own, forces depend on whether the program had time for
-/// a second look at an earlier frame.
+/// Its noise makes frames have specks, and second looks.
 #[test]
 #[ignore = "slow: the second of three cameras"]
 fn a_twin_with_an_ov5640_sends_the_bytes_of_the_flashed_program() {
-    let text = format!("seed = {SEED}\n[load]\nmotion = \"demo\"\n");
+    let text = format!("seed = {SEED}\n[camera]\npreset = \"ov5640\"\n[load]\nmotion = \"demo\"\n");
     let rig = Rig::start_under(&text, &["--camera", "ov5640"]).unwrap();
     let scene = Scene::from_toml(&text).unwrap();
     a_twin_is_as_the_program(Kind::Ov5640, &scene, rig);

@@ -11,7 +11,7 @@
 //! | `model`, `layer`, `packing` | the model file |
 //! | `network`, `rescale` | the quantized network |
 //! | `forward` | the film run forwards, and Gauss–Newton steps on it |
-//! | `contact`, `explained`, `noise`, `place` | the answer: force, uncertainty, status |
+//! | `contact`, `explained`, `noise`, `misfit`, `place` | the answer: force, uncertainty, status |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
 //!
 //! Film frame, right-handed: x right and y down in the image, z = x × y out of the film, away from
@@ -35,6 +35,7 @@ pub mod rest;
 mod contact;
 mod explained;
 mod kernels;
+mod misfit;
 mod noise;
 #[cfg(test)]
 mod numerics;

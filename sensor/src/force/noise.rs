@@ -6,8 +6,10 @@
 //! half the squared difference of two frames is the variance of noise alone. It shows little light,
 //! a high gain or flickering specks, but no force, not even a fast one.
 
-use crate::force::forward::{Column, residual, square};
+use super::misfit::Misfit;
+use crate::force::forward::{Column, Estimate, residual, square};
 use crate::force::kernels::sqrt;
+use hivtac_terms::marker::Marker;
 use hivtac_terms::units::Px;
 
 /// Time constants of the mean variances, in frames: 0.1 s and 1.6 s at 156 frames a second.
@@ -58,6 +60,8 @@ pub struct NoiseLevel {
     lasting: f32,
     /// Uncertainty of the current frame's markers by their motion.
     motion: Px,
+    /// What stays for as long as the markers do.
+    misfit: Misfit,
 }
 
 impl NoiseLevel {
@@ -68,6 +72,7 @@ impl NoiseLevel {
         variance: 1.0,
         lasting: 1.0,
         motion: Px(0),
+        misfit: Misfit::NONE,
     };
 
     /// Call before a frame that does not immediately follow the previous one.
@@ -88,8 +93,7 @@ impl NoiseLevel {
 
     /// Returns the noise to expect of a frame, at least the model's, with this additional blur.
     pub fn of_frame(&self, blur: Px) -> FrameNoise {
-        let variance = (self.variance - SCATTER).max(self.lasting - LASTING_SCATTER);
-        let variance = variance.clamp(1.0, LARGEST);
+        let variance = self.variance_of_frames().max(self.misfit.variance());
         FrameNoise {
             times: sqrt(variance),
             blur,
@@ -97,10 +101,17 @@ impl NoiseLevel {
         }
     }
 
+    /// The variance of frames that show the same, relative to the modelled one: 1 to [`LARGEST`].
+    pub fn variance_of_frames(&self) -> f32 {
+        let variance = (self.variance - SCATTER).max(self.lasting - LASTING_SCATTER);
+        variance.clamp(1.0, LARGEST)
+    }
+
     /// Call before the blobs of a frame are measured. What was [seen](Self::saw) of the same frame
     /// before more blobs came is forgotten.
     pub fn begin_measurement(&mut self) {
         self.now = None;
+        self.misfit.begin();
     }
 
     /// Takes the residual of a frame, in units of the expected `noise`.
@@ -110,8 +121,16 @@ impl NoiseLevel {
         self.now = (square(&left) <= LARGEST * residual::unexplained(left.len())).then_some(left);
     }
 
-    /// Call at the end of each frame: what was seen of it counts.
+    /// Takes a press of a frame with this expected `noise`, which explains the markers.
+    pub fn saw_press(&mut self, noise: FrameNoise, estimate: &Estimate, markers: &[Marker]) {
+        self.misfit.saw(noise.times, estimate, markers);
+    }
+
+    /// Call at the end of each frame: what was seen of it counts. Not inlined, so that it stays out
+    /// of the near memory.
+    #[inline(never)]
     pub fn end_frame(&mut self) {
+        self.misfit.end();
         let Some((before, left)) = self.before.as_ref().zip(self.now.as_ref()) else {
             return;
         };

@@ -155,7 +155,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let has_specks = specks >= pixels / SPECKS_PART;
         let is_dim = 4 * first.set_pixels < DIM_FOURTHS * set_pixels
             && !status.contains(Status::BLOB_OVERFLOW);
-        let is_noisy = self.noise.of_frame(Px(0)).times >= NOISY;
+        let is_noisy = self.noise.variance_of_frames() >= NOISY * NOISY;
         (has_specks || (is_dim || is_noisy) && !status.intersects(BADLY))
             && specks <= pixels / MOST_SPECKS_PART
             && holes <= set_pixels / HOLES_PART

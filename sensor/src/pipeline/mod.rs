@@ -585,7 +585,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);
                 }
-                resting.force_and_status(forward, &model.range, noise, &estimate)
+                let told = resting.force_and_status(forward, &model.range, noise, &estimate);
+                if !is_again && is_a_press(told.1) {
+                    self.noise.saw_press(noise, &estimate, markers);
+                }
+                told
             }
             None => force::of_outputs(model, &output),
         };
@@ -612,6 +616,17 @@ fn at_the_middle(
     let times = noise.of_frame(Px(0)).times;
     noise.set_motion(motion.unsteadiness(seen, lost, rows, times));
     motion.at_the_middle(seen, lost, rows)
+}
+
+/// Whether a force of this status is a contact as the model's, which explains the markers.
+fn is_a_press(status: Status) -> bool {
+    const NONE_OF: Status = Status(
+        Status::LOOSELY_EXPLAINED.0
+            | Status::DIRECTION_OUT_OF_RANGE.0
+            | Status::MAGNITUDE_OUT_OF_RANGE.0
+            | Status::PLACE_OUT_OF_RANGE.0,
+    );
+    status.contains(Status::CONTACT) && !status.intersects(NONE_OF)
 }
 
 impl<const BLOBS: usize, T: Table> Default for Sensor<'_, BLOBS, T> {

@@ -6,7 +6,7 @@
 //! from the others ([`Status::MARKER_LOST`]), with its own uncertainty.
 
 use super::again::BLUR;
-use super::{Look, Measurement, Prepared, Sensor, at_the_middle};
+use super::{Look, Measurement, Prepared, Sensor, at_the_middle, is_a_press};
 use crate::force::features::Features;
 use crate::force::forward::{Column, Estimate, Forward, Pose, Start};
 use crate::force::rest::Rest;
@@ -220,6 +220,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             self.noise.saw(noise, &estimate.left);
         }
         let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
+        if !is_again && lost == Lost::NONE && is_a_press(found) {
+            self.noise.saw_press(noise, &estimate, &placed.markers);
+        }
         *status |= found;
         if lost != Lost::NONE {
             *status |= Status::MARKER_LOST;
