@@ -129,12 +129,14 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             Ok(()) => self.measure_blobs(),
             Err(reason) => self.measurement(Err(reason)),
         };
-        // The markers' positions show their motion to the next frame, even without a force.
-        if second.markers.is_some() {
+        let counts = second.force.is_some() && self.is_disturbed(&again);
+        // The markers' positions show their motion to the next frame, even without a force. If that
+        // has seen them at the first look, it does not depend on whether there was time for this.
+        if second.markers.is_some() && (counts || again.measurement.markers.is_none()) {
             let seen = second.markers.as_ref();
             self.motion.ended(seen.map(|seen| (seen, second.lost)));
         }
-        if second.force.is_none() || !self.is_disturbed(&again) {
+        if !counts {
             return again.measurement;
         }
         second.status |= Status::FRAME_DISTURBED;
