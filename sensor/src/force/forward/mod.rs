@@ -126,8 +126,8 @@ pub struct Strength {
     largest_size: f32,
 }
 
-/// No |F| is known better than to this part of it. How much of a marker's rim counts depends on how
-/// bright the film is beside it, in comparison: 0.14 % of |F| behind a film that lets a room through
+/// No |F| is known better than to this part of it. How much of a marker's rim counts depends on the
+/// brightness of the film next to it: 0.14 % of |F| behind a film that lets a room through
 /// (`hivtac-studies scene effects`).
 const OF_RIMS: f32 = 8e-4;
 

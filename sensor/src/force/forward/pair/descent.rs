@@ -100,7 +100,7 @@ impl Problem<'_> {
         Stepped { here: found, next }
     }
 
-    /// Returns the contacts after a step, or a shorter one, that explains more; `None` if none does.
+    /// Returns the contacts after a step, or a shorter one, that explains more; `None` without one.
     fn lower(
         &self,
         here: &Point,
