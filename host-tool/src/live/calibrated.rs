@@ -1,8 +1,8 @@
 //! The simulated sensor as a calibrated unit: its dots move as the unit's own model has it.
 //!
 //! A unit's model holds its film as it was mounted, stretched or not, and its camera: how the image
-//! of each dot moves under any press. The simulated camera shows dots that rest and move there. So its
-//! samples are what that unit says of a press, with noise. They do not show how well the model
+//! of each dot moves under any press. The simulated camera shows dots that rest and move there. So
+//! its samples are what that unit says of a press, with noise. They do not show how well the model
 //! knows the unit: what it is wrong by is not in it.
 
 use super::camera::Kind;
@@ -131,15 +131,17 @@ impl CalibratedFilm {
         load: &dyn Fn(f64) -> Load,
     ) -> Result<Frame, SceneError> {
         let now = load(0.0);
-        scene.pressed(&now)?;
+        // The scene's film completes a load, by its place.
+        let taken = scene.pressed(&now)?;
         let mut pressed = Pressed {
-            force_n: now.vector_n(),
-            ..scene.pressed(&self.on_nominal(&now))?
+            force_n: taken.force_n,
+            ..scene.pressed(&self.on_nominal(&taken))?
         };
         let height = f64::from(scene.camera().height());
         let aims = (0..).zip(self.rest_px).map(|(dot, rest_px)| {
             let row_s = (rest_px[1] / height - 0.5) * shutter.readout_s;
-            let moved_px = self.moved_px(&load(row_s), dot);
+            let then = scene.pressed(&load(row_s)).unwrap_or(taken);
+            let moved_px = self.moved_px(&then, dot);
             [0, 1].map(|i| rest_px[i] + moved_px[i])
         });
         let aims = Dots::of(aims);
@@ -161,30 +163,31 @@ impl CalibratedFilm {
     }
 
     /// The load that moves the nominal film about as this one moves the unit's: how near the dots
-    /// come to the camera, and how they lean, is that film's.
-    fn on_nominal(&self, load: &Load) -> Load {
-        let size = self.pose(load).size;
+    /// come to the camera, and how they lean, is that film's. No load if that film cannot take it.
+    fn on_nominal(&self, taken: &Pressed) -> Load {
+        let size = self.pose(taken).size;
         let wanted_n = f64::from(self.nominal.magnitude_n(size)).min(MOST_N);
-        let part = wanted_n / load.magnitude_n().max(f64::MIN_POSITIVE);
-        let scaled = Load::from_vector(load.vector_n().map(|force_n| part * force_n));
-        let placed = scaled.and_then(|scaled| scaled.with_offset_mm(load.offset_mm()));
-        placed.unwrap_or(*load)
+        let [x, y, z] = taken.force_n;
+        let part = wanted_n / libm::hypot(libm::hypot(x, y), z).max(f64::MIN_POSITIVE);
+        let scaled = Load::from_vector(taken.force_n.map(|force_n| part * force_n));
+        let placed = scaled.and_then(|scaled| scaled.with_offset_mm(taken.touches_mm));
+        placed.unwrap_or(Load::REST)
     }
 
-    fn pose(&self, load: &Load) -> Pose {
-        let force_n = load.vector_n().map(|part| part as f32);
-        let place_mm = load.offset_mm().map(|part| part as f32);
+    fn pose(&self, taken: &Pressed) -> Pose {
+        let force_n = taken.force_n.map(|part| part as f32);
+        let place_mm = taken.touches_mm.map(|part| part as f32);
         let Forward {
             stiffness, limits, ..
         } = &self.forward;
         Pose::of_force(force_n, place_mm, stiffness, limits)
     }
 
-    /// How far a dot's image moves under a load, px.
-    fn moved_px(&self, load: &Load, dot: usize) -> [f64; 2] {
+    /// How far a dot's image moves under a press, px.
+    fn moved_px(&self, taken: &Pressed, dot: usize) -> [f64; 2] {
         let Forward { limits, tables, .. } = &self.forward;
         let beside_mm = &self.mounting.beside_mm;
-        let Prediction { moved, .. } = tables.predict(&self.pose(load), limits, beside_mm);
+        let Prediction { moved, .. } = tables.predict(&self.pose(taken), limits, beside_mm);
         let moved = [2 * dot, 2 * dot + 1].map(|k| moved.at(k));
         self.mounting.px(moved).map(f64::from)
     }

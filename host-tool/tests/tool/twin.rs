@@ -342,7 +342,15 @@ fn a_calibrated_unit_goes_by_its_own_model() {
     let (twin, _) = Twin::pressed(&["--unit", MODEL]);
     let samples = twin.samples(&["--frames", "20"]);
     let force = &samples[19]["force"];
-    assert!(force["magnitude_n"].as_f64().unwrap() > 0.05, "{force}");
+    let true_values = [
+        ("magnitude_n", 0.12),
+        ("place_x_mm", 1.5),
+        ("place_y_mm", -1.0),
+    ];
+    for (name, expected) in true_values {
+        let found = force[name].as_f64().unwrap();
+        assert!((found - expected).abs() < 0.05 * expected.abs(), "{force}");
+    }
     let status = status(&samples[19]);
     assert!(!status.contains(&"rest_moved"), "{status:?}");
 }
