@@ -1,4 +1,5 @@
-//! The firmware that this program came with: next to it in an archive, in `share` of a wheel.
+//! The firmware that this program came with: in the same folder of an archive, in `share` of a
+//! wheel.
 
 use crate::device::Device;
 use hivtac_host::failure::{Failure, Kind};
