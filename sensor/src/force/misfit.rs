@@ -91,3 +91,48 @@ fn are_apart(before: &Markers, now: &Markers) -> bool {
         .map(|(before, now)| (before - now).abs())
         .any(|apart| apart >= APART_PX)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After `presses` at places this far apart, px, each with this variance.
+    fn after(presses: usize, apart_px: f32, variance: f32) -> f32 {
+        let mut misfit = Misfit::NONE;
+        for press in 0..presses {
+            misfit.begin();
+            let at = apart_px * press as f32;
+            misfit.now = Some((Markers::filled(4, [at, 100.0]), variance));
+            misfit.end();
+        }
+        misfit.variance()
+    }
+
+    #[test]
+    fn honest_presses_leave_the_variance_as_modelled() {
+        assert_eq!(after(0, 2.0, 1.0), 1.0);
+        assert_eq!(after(100, 2.0, 0.7), 1.0);
+    }
+
+    #[test]
+    fn what_presses_leave_is_known_after_a_few_and_limited() {
+        let told = after(8, 2.0, 2.4);
+        assert!((2.0..3.0).contains(&told), "{told}");
+        assert_eq!(after(1_000, 2.0, f32::MAX), LARGEST);
+    }
+
+    #[test]
+    fn a_press_that_stays_counts_once() {
+        assert_eq!(after(100, 0.001, 2.4), after(1, 0.001, 2.4));
+    }
+
+    /// What was measured ahead, and not at the end, does not count.
+    #[test]
+    fn a_press_that_is_measured_anew_is_forgotten() {
+        let mut misfit = Misfit::NONE;
+        misfit.now = Some((Markers::filled(4, [0.0; 2]), 4.0));
+        misfit.begin();
+        misfit.end();
+        assert_eq!(misfit, Misfit::NONE);
+    }
+}
