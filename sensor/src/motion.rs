@@ -88,27 +88,29 @@ impl Motion {
     pub fn begin_frame(&mut self) {
         let missed_before = self.missed;
         self.missed = core::mem::take(&mut self.missing);
-        let is_near = self.missed <= MOST_MISSED;
-        let none_is_missed = missed_before == 0 && self.missed == 0;
-        self.earlier = self.before.take().filter(|_| none_is_missed);
-        self.before = self.now.take().filter(|_| is_near);
+        match self.now.take() {
+            Some(now) => {
+                let none_is_missed = missed_before == 0 && self.missed == 0;
+                self.earlier = self.before.take().filter(|_| none_is_missed);
+                self.before = Some(now);
+            }
+            None => {
+                self.earlier = None;
+                self.missed = self.missed.saturating_add(missed_before).saturating_add(1);
+            }
+        }
+        if self.missed > MOST_MISSED {
+            self.before = None;
+        }
     }
 
     /// Call at the end of each frame, with its markers and those that are lost, whose places are
     /// not used. A frame that showed no markers, `None`, is as one that was missed.
     pub fn ended(&mut self, seen: Option<(&MarkerList, Lost)>) {
-        match seen {
-            Some((markers, lost)) => {
-                self.now = Some(Seen {
-                    markers: *markers,
-                    lost,
-                });
-            }
-            None => {
-                self.now = self.before.take();
-                self.missing = self.missed.saturating_add(1);
-            }
-        }
+        self.now = seen.map(|(markers, lost)| Seen {
+            markers: *markers,
+            lost,
+        });
     }
 
     /// Returns the markers as they were while the middle row of a frame of `rows` rows was exposed.

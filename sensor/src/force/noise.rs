@@ -120,9 +120,12 @@ impl NoiseLevel {
         self.now = (square(&left) <= LARGEST * residual::unexplained(left.len())).then_some(left);
     }
 
-    /// Takes a press of a frame with this expected `noise`, which explains the markers.
+    /// Takes a press of a frame with this expected `noise`, which explains the markers. While their
+    /// motion changes, the press says nothing of what stays.
     pub fn saw_press(&mut self, noise: FrameNoise, estimate: &Estimate, markers: &[Marker]) {
-        self.misfit.saw(noise.times, estimate, markers);
+        if noise.motion == Px(0) {
+            self.misfit.saw(noise.times, estimate, markers);
+        }
     }
 
     /// Call at the end of each frame: what was seen of it counts. Not inlined, so that it stays out
