@@ -127,8 +127,8 @@ pub struct Strength {
 }
 
 /// No |F| is known better than to this part of it. How much of a marker's rim counts depends on how
-/// bright the film is beside it, in comparison: 0.14 % of |F| behind a film that lets a room through
-/// (`hivtac-studies scene effects`).
+/// bright the film is beside it, in comparison: 0.14 % of |F| behind a film that lets a room
+/// through (`hivtac-studies scene effects`).
 const OF_RIMS: f32 = 8e-4;
 
 impl Strength {

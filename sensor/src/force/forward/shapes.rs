@@ -1,5 +1,5 @@
-//! Predicts how a contact of another shape moves the images, compared with the tables' tip under the
-//! same force at the same centre of pressure.
+//! Predicts how a contact of another shape moves the images, compared with the tables' tip under
+//! the same force at the same centre of pressure.
 //!
 //! A wide contact moves the images as a slightly larger force does, and off the middle to one side.
 //! A table holds this motion at knots of size and place: its mean over all shapes, its covariance

@@ -100,7 +100,8 @@ impl Problem<'_> {
         Stepped { here: found, next }
     }
 
-    /// Returns the contacts after a step, or a shorter one, that explains more; `None` if none does.
+    /// Returns the contacts after a step, or a shorter one, that explains more; `None` if none
+    /// does.
     fn lower(
         &self,
         here: &Point,

@@ -395,8 +395,8 @@ mod tests {
         );
     }
 
-    /// Steps from the nearest starts lead to contacts that explain the markers, even where slopes by
-    /// both are nearly the same, or all starts are far off.
+    /// Steps from the nearest starts lead to contacts that explain the markers, even where slopes
+    /// by both are nearly the same, or all starts are far off.
     #[test]
     fn steps_do_not_end_on_the_way() {
         let forward = forward();
