@@ -346,8 +346,8 @@ pub fn longest_host_messages() -> Vec<HostMessage> {
         .collect()
 }
 
-/// Any value, read from these first bytes and random ones. Most of these are small, as most choose a
-/// variant or say how long something is.
+/// Any value, read from these first bytes and random ones. Most of these are small, as most choose
+/// a variant or say how long something is.
 pub fn any_value<T: DeserializeOwned + Debug>(
     first: impl Strategy<Value = Vec<u8>>,
 ) -> impl Strategy<Value = T> {

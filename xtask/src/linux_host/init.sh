@@ -99,8 +99,8 @@ for action in reset configured suspended pulled; do
     for n in $(seq "$TIMES"); do check "$action, time $n of $TIMES" "$action" "$n"; done
 done
 # Each warning of the kernel, but for those that it prints whatever the device does: the driver of
-# USB/IP has no name for full speed when it resets a port, and the emulated PC stands still while its
-# process waits for a processor.
+# USB/IP has no name for full speed when it resets a port, and the emulated PC stands still while
+# its process waits for a processor.
 dmesg -r | awk -F '[<>]' '/^<[0-9]+>/ && $2 % 8 <= 4' |
     grep -v -e "vhci_hcd: vhci_device speed not set" -e "clocksource: " | sed 's/$/ ... FAIL/'
 echo "Linux has ended"
