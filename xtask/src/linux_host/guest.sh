@@ -35,8 +35,8 @@ for module in usb-common usbcore usbip-core vhci-hcd cdc-acm e1000; do
     case $file in *.xz) "$busybox" unxz "root/modules/$module.ko.xz" ;; esac
     modules="$modules $module"
 done
-usbreset=packages/usbutils/usr/bin/usbreset
-for program in "$busybox" packages/usbip/usr/sbin/usbip "$usbreset" "$tool"; do
+for program in "$busybox" packages/usbip/usr/sbin/usbip packages/usbutils/usr/bin/usbreset \
+    "$tool"; do
     cp "$program" root/bin
     # Its shared libraries, at the same places; a static program has none.
     for library in $(ldd "$program" 2> /dev/null | grep -o '/[^ ]*'); do
