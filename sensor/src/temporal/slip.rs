@@ -12,7 +12,7 @@
 //!
 //! with the smaller |F| of the two frames, ΔF the vector between their forces, and σ the place's
 //! stated uncertainty. The places of a frame whose markers change their motion are less certain
-//! than those of the steady frames beside it: twice that difference of σ is added for either frame.
+//! than those of the steady frames beside it: for either frame, that difference of σ is added.
 //! It must also have moved by three times the noise of the frames between: the
 //! mean length of the place's second differences, which are 0 in a steady motion. A slip begins
 //! with the second such frame in a row: when a force begins to change, a rolling shutter gives one
@@ -34,8 +34,8 @@ const DOUBLES_AT: u64 = 10_000;
 const NOISES: u64 = 3;
 /// Larger uncertainties of a place count as this large, µm.
 const LARGEST_SIGMA: u32 = 1 << 30;
-/// A place of an uncertain frame must have moved by this many times what its σ is larger.
-const UNSTEADY: u64 = 2;
+/// A place of an uncertain frame must have moved farther by this many times the growth of its σ.
+const UNSTEADY: u64 = 1;
 /// Fraction of the distance that is enough while it slips.
 const GOES_ON: [u64; 2] = [3, 5];
 
