@@ -47,6 +47,9 @@ const BESIDE: [u32; 3] = [3, 4, 3];
 /// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on
 /// presses of the layout `8v` before it had one.
 const WITHOUT_TABLE: [u32; 3] = [3, 3, 2];
+/// A model that does not say how other units' films differ has too small uncertainties on them: by
+/// these factors. Chosen on six units with the layout `8v` and a tare alone.
+const OF_OTHER_UNITS: [u32; 3] = [3, 1, 1];
 /// Where the search for a light touch begins, as a fraction of the largest size.
 const FIRST_SIZE: f32 = 0.1;
 /// How exactly units are built, as standard deviations. `GLUED_MM`: a marker's place along each
@@ -327,6 +330,9 @@ impl Resting {
         }
         if self.shape != ContactShape::Needle && forward.shapes.is_none() && !has_widths {
             widen(&mut force, WITHOUT_TABLE);
+        }
+        if !self.is_own && forward.other.is_none() {
+            widen(&mut force, OF_OTHER_UNITS);
         }
         let mut status = trust(&force, by_noise, range);
         let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;

@@ -34,8 +34,6 @@ const DOUBLES_AT: u64 = 10_000;
 const NOISES: u64 = 3;
 /// Larger uncertainties of a place count as this large, µm.
 const LARGEST_SIGMA: u32 = 1 << 30;
-/// A place of an uncertain frame must have moved farther by this many times the growth of its σ.
-const UNSTEADY: u64 = 1;
 /// Fraction of the distance that is enough while it slips.
 const GOES_ON: [u64; 2] = [3, 5];
 
@@ -197,7 +195,7 @@ fn least_moved(distance: u64, now: &Seen, before: &Seen, steady: u32) -> u64 {
         + smaller.quotient(distance * DOUBLES_AT)
         + now / 8
         + smaller.quotient(now * change) / 2
-        + UNSTEADY * unsteady
+        + unsteady
 }
 
 /// Whether the force along the film is a large enough part of the force into it.
