@@ -360,7 +360,7 @@ impl Point {
             pressing.add_uncertainty(pose, limits, covariance);
         }
         if let Some(wide) = &observed.wide {
-            wide.add_uncertainty(pose, limits, covariance);
+            wide.add_uncertainty(pose, limits, &self.prediction.moved, covariance);
         }
     }
 

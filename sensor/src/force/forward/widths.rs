@@ -56,6 +56,9 @@ const FACE: [f32; GROUPS] = [0.0, 0.2, 0.2, 0.5, 0.5, 0.6];
 /// standard deviations above, were chosen on presses of other seeds than those of
 /// `docs/results/dots.md`.
 const OF_ITSELF: f32 = 0.08;
+/// Uncertainty due to the mesh of finite elements by which all contacts are known, in parts of the
+/// motion: of each coordinate, and of all together. A finer mesh gives way differently.
+const OF_MESH: [f32; 2] = [6e-4, 8e-4];
 /// A tilted force moves the images under a wide contact as under a contact that is farther along
 /// the tilt: by this many mm for each radian, at width 1 and the largest size.
 const ALONG_TILT_MM: f32 = 0.83;
@@ -308,9 +311,16 @@ impl Wide<'_> {
         prediction.by_width = by_width;
     }
 
-    /// Adds the uncertainty of that motion to a covariance.
+    /// Adds the uncertainty of that motion to a covariance, and that of the mesh, of which `moved`
+    /// is the whole motion.
     #[inline(never)]
-    pub fn add_uncertainty(&self, pose: &Pose, limits: &Limits, covariance: &mut Covariance) {
+    pub fn add_uncertainty(
+        &self,
+        pose: &Pose,
+        limits: &Limits,
+        moved: &Column,
+        covariance: &mut Covariance,
+    ) {
         let mirror = Mirror::of(pose.place_mm);
         for (group, sigma) in self.sigmas.into_iter().enumerate() {
             if group != OF_WIDTH {
@@ -319,11 +329,10 @@ impl Wide<'_> {
             }
         }
         let of_width = mirror.column(&self.group(pose, limits, OF_WIDTH));
-        for (dot, [x, y]) in of_width.as_chunks::<2>().0.iter().enumerate() {
-            let square = OF_ITSELF * OF_ITSELF * (x * x + y * y);
-            covariance.add(2 * dot, 2 * dot, square);
-            covariance.add(2 * dot + 1, 2 * dot + 1, square);
-        }
+        add_of_markers(covariance, &of_width, OF_ITSELF);
+        let [of_each, of_all] = OF_MESH;
+        add_of_markers(covariance, moved, of_each);
+        add_square(covariance, moved, of_all);
     }
 
     /// The motion of a group along +x and +y.
@@ -344,6 +353,15 @@ impl Wide<'_> {
             }
         }
         sum
+    }
+}
+
+/// Adds independent uncertainties of the coordinates, each this part of its marker's motion.
+fn add_of_markers(covariance: &mut Covariance, moved: &Column, part: f32) {
+    for (dot, [x, y]) in moved.as_chunks::<2>().0.iter().enumerate() {
+        let square = part * part * (x * x + y * y);
+        covariance.add(2 * dot, 2 * dot, square);
+        covariance.add(2 * dot + 1, 2 * dot + 1, square);
     }
 }
 
