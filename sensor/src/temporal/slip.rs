@@ -313,14 +313,14 @@ mod tests {
         assert!(told(3), "a model that knows the place");
     }
 
-    /// A hit: for two frames the place is 300 µm off, as their stated uncertainty allows.
+    /// A hit: for two frames the place is 200 µm off, as their stated uncertainty allows.
     #[test]
     fn places_of_uncertain_frames_do_not_slip() {
         let told = |sigma: u32| {
             let mut slip = Slip::NONE;
             (0..40).any(|k: i32| {
                 let is_hit = k == 20 || k == 21;
-                let force = at(if is_hit { 300 } else { 0 }, PULLED);
+                let force = at(if is_hit { 200 } else { 0 }, PULLED);
                 let place = force.place.map(|place| Place {
                     sigma: Micrometres(if is_hit { sigma } else { 5 }),
                     ..place
