@@ -48,8 +48,9 @@ class Alone(unittest.TestCase):
         twin.press(force, place)
         pressed = twin.advance(0.2)
         self.assertEqual(pressed[0].sequence, rest[-1].sequence + 1)
-        # In its first frame a press begins while the rows are exposed.
-        for sample in pressed[2:]:
+        # A press begins while the rows of its first frame are exposed. Until the markers are steady
+        # again, the direction is uncertain.
+        for sample in pressed[3:]:
             np.testing.assert_allclose(sample.force, force, atol=2e-3)
             np.testing.assert_allclose(sample.place, place, atol=1e-4)
             self.assertTrue(sample.contact)
@@ -84,7 +85,7 @@ class Alone(unittest.TestCase):
         self.assertFalse(twin.advance(0.1)[-1].contact)
         force, place = np.array([0.004, -0.006, -0.09]), np.array([0.0015, -0.001])
         twin.press(force, place)
-        for sample in twin.advance(0.2)[2:]:
+        for sample in twin.advance(0.2)[3:]:
             np.testing.assert_allclose(sample.force, force, atol=1e-3)
             np.testing.assert_allclose(sample.place, place, atol=5e-5)
             self.assertTrue(sample.contact)
