@@ -81,9 +81,9 @@ impl Outcome {
     }
 }
 
-/// Moving cases are left out: they are about one frame's time, and their force itself moves. At most
-/// `most` faults are allowed: what some presses leave unexplained widens the uncertainties, and
-/// with them what passes.
+/// Moving cases are left out: they are about one frame's time, and their force itself moves. At
+/// most `most` faults are allowed: what some presses leave unexplained widens the uncertainties,
+/// and with them what passes.
 fn hold(presses: Range<u64>, most: usize) {
     let mut sensor = sensor();
     let mut wrong = Vec::new();
