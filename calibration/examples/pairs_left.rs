@@ -6,6 +6,7 @@
 use std::fs;
 
 use anyhow::{Context, Result, ensure};
+use hivtac_calibration::forward::{Matrix, Moved, cholesky, sum_of_squares};
 use hivtac_sensor::force::forward::pair::{Both, Interaction, PairPrediction};
 use hivtac_sensor::force::forward::{Forward, Markers, Pose};
 use hivtac_sensor::force::model::Model;
@@ -18,8 +19,6 @@ const FACTOR: usize = COORDINATES * (COORDINATES + 1) / 2;
 const FOCAL_PX: f64 = 175.0;
 const MODEL: &[u8] = include_bytes!("../models/8v/default.hvtm");
 
-type Matrix = [[f64; COORDINATES]; COORDINATES];
-
 fn main() -> Result<()> {
     let mut arguments = std::env::args().skip(1);
     let pairs = arguments.next().context("name a file of pairs")?;
@@ -30,25 +29,27 @@ fn main() -> Result<()> {
         .context("the model is not readable")?;
     let forward = model.forward.context("the model has no tables")?;
     let interaction = Interaction::new(&bytes).context("the network is not readable")?;
-    let (mut sum, mut squares, mut count) = (Matrix::default(), 0.0, 0.0);
+    let (mut lefts, mut squares) = (Vec::new(), 0.0);
     for line in fs::read_to_string(pairs)?.lines() {
         let numbers: Result<Vec<f64>, _> = line.split(',').map(str::parse).collect();
         let (left, size) = left(&numbers?, &forward, &interaction)?;
-        count += 1.0;
-        for (row, one) in sum.iter_mut().zip(left) {
-            squares += one * one;
-            for (sum, other) in row.iter_mut().zip(left) {
-                *sum += one * other / size.powi(4);
-            }
-        }
+        squares += left.iter().map(|part| part * part).sum::<f64>();
+        lefts.push(Moved::of(left.map(|part| part / (size * size))));
     }
+    let count = lefts.len() as f64;
     ensure!(count > 0.0, "there are no pairs");
     let rms_px = FOCAL_PX * (squares / count / COORDINATES as f64).sqrt();
     println!("{count} pairs: {rms_px:.4} px");
-    let factor = lower_factor(&sum.map(|row| row.map(|part| part / count)));
+    let sum = sum_of_squares(&lefts);
+    let mean: Matrix = sum
+        .iter()
+        .map(|row| row.iter().map(|part| part / count).collect())
+        .collect();
+    let factor = cholesky(mean);
+    let lower = factor.iter().enumerate().flat_map(|(i, row)| &row[..=i]);
     let end = bytes.len() - 4 * FACTOR;
     bytes.truncate(end);
-    bytes.extend(factor.iter().flat_map(|part| part.to_le_bytes()));
+    bytes.extend(lower.flat_map(|part| (*part as f32).to_le_bytes()));
     Ok(fs::write(path, bytes)?)
 }
 
@@ -81,28 +82,4 @@ fn left(
         *left -= f64::from(*told);
     }
     Ok((left, f64::from(both.size)))
-}
-
-/// Cholesky's lower factor, row by row.
-fn lower_factor(matrix: &Matrix) -> Vec<f32> {
-    let mut factor = Matrix::default();
-    for i in 0..COORDINATES {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let rest = matrix[i][j] - known;
-            factor[i][j] = if i == j {
-                rest.sqrt()
-            } else {
-                rest / factor[j][j]
-            };
-        }
-    }
-    let rows = factor.iter().enumerate();
-    rows.flat_map(|(i, row)| {
-        row[..=i]
-            .iter()
-            .map(|part| *part as f32)
-            .collect::<Vec<_>>()
-    })
-    .collect()
 }

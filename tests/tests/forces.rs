@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use crate::rig::{Rig, ToolOutput, json_lines, tool};
+use crate::rig::{Rig, ToolOutput, exposed, json_lines, tool};
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::motion::Motion;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
@@ -13,7 +13,7 @@ use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
 use hivtac_tests::artifact;
-use hivtac_twin::{Format, Options, Preset, Scene, Shutter};
+use hivtac_twin::{Format, Options, Preset, Scene};
 use serde_json::{Value, json};
 
 const SEED: u64 = 1;
@@ -99,17 +99,6 @@ fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
     lines
 }
 
-/// Returns the pixels of an exposure, from its line in the truth log.
-fn exposed(scene: &Scene, line: &Value) -> Vec<u16> {
-    let number = |key: &str| line[key].as_f64().unwrap();
-    let shutter = Shutter {
-        exposure_s: number("exposure_s"),
-        readout_s: number("readout_s"),
-    };
-    let exposure = line["exposure"].as_u64().unwrap();
-    scene.frame_by(&shutter, exposure, number("time_s")).pixels
-}
-
 /// Frames that the device may have measured before the first one of which it sent a sample.
 const EARLIER: u64 = 4;
 
@@ -124,7 +113,7 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8], motion:
     let number = |line: &Value| line["frame"].as_u64().unwrap();
     let (first, last) = (number(&lines[0]), number(&lines[lines.len() - 1]));
     let frames: HashMap<u64, Vec<u16>> = (first.saturating_sub(EARLIER)..=last)
-        .filter_map(|frame| Some((frame, exposed(scene, shown.get(&frame)?))))
+        .filter_map(|frame| Some((frame, exposed(scene, shown.get(&frame)?).pixels)))
         .collect();
     let follows_from = |earlier: u64| {
         let mut sensor = sensor_of(model, motion);

@@ -18,6 +18,7 @@ use hivtac_rig::command::Arguments;
 use hivtac_rig::mpu::Protection;
 use hivtac_rig::run::run;
 use hivtac_tests::artifact;
+use hivtac_twin::{Frame, Scene, Shutter};
 use serde_json::Value;
 use tempfile::TempDir;
 
@@ -28,6 +29,17 @@ const PATIENCE: Duration = Duration::from_secs(240);
 pub const TIMEOUT_S: u32 = 40;
 /// The same for an intended silence, during which the rig runs on.
 pub const SILENCE_S: u32 = 20;
+
+/// Returns the frame of an exposure, from its line in the truth log.
+pub fn exposed(scene: &Scene, line: &Value) -> Frame {
+    let number = |key: &str| line[key].as_f64().unwrap();
+    let shutter = Shutter {
+        exposure_s: number("exposure_s"),
+        readout_s: number("readout_s"),
+    };
+    let exposure = line["exposure"].as_u64().unwrap();
+    scene.frame_by(&shutter, exposure, number("time_s"))
+}
 
 /// A running rig with its logs; it ends when it is dropped.
 pub struct Rig {

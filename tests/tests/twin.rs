@@ -4,7 +4,7 @@
 use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
-use crate::rig::{Rig, TIMEOUT_S, tool};
+use crate::rig::{Rig, TIMEOUT_S, exposed, tool};
 use hivtac_host::link::Link;
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::{Captured, Device};
@@ -17,7 +17,7 @@ use hivtac_terms::status::Status;
 use hivtac_terms::threshold::{HsvBox, Mono, Threshold};
 use hivtac_terms::units::{Microseconds, Sixteenths};
 use hivtac_tests::artifact;
-use hivtac_twin::{Disc, Format, Layout, Scene, Shutter};
+use hivtac_twin::{Disc, Format, Layout, Scene};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, MAX_HOST_FRAME, encode};
 use hivtac_wire::health::Health;
 use hivtac_wire::message::{
@@ -141,14 +141,8 @@ impl Twin {
 
 /// Returns the pixels of an exposure as they lie in the device's memory: of mono two in a word, of
 /// the middle of the array.
-fn exposed(scene: &Scene, kind: Kind, line: &Value) -> Vec<u16> {
-    let number = |key: &str| line[key].as_f64().unwrap();
-    let shutter = Shutter {
-        exposure_s: number("exposure_s"),
-        readout_s: number("readout_s"),
-    };
-    let exposure = line["exposure"].as_u64().unwrap();
-    let frame = scene.frame_by(&shutter, exposure, number("time_s"));
+fn words(scene: &Scene, kind: Kind, line: &Value) -> Vec<u16> {
+    let frame = exposed(scene, line);
     if frame.format != Format::Mono {
         return frame
             .pixels
@@ -200,7 +194,7 @@ fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>)
             number: sample.frame,
             begun_us: sample.time_us.strict_sub_signed(camera.middle_us().into()),
             camera,
-            words: exposed(scene, kind, lines[&u64::from(sample.frame)]),
+            words: words(scene, kind, lines[&u64::from(sample.frame)]),
         };
         // Whether one was lost before the first is the program's affair.
         let is_lost = match nth {

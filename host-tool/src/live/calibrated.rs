@@ -196,13 +196,12 @@ impl CalibratedFilm {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::live::device::{Captured, Device};
+    use crate::live::device::Device;
     use crate::live::eye::{Disturbances, Eye, Presses};
     use crate::live::hand::{Hand, Touch};
+    use crate::live::tested::Tested;
     use hivtac_terms::contact_shape::ContactShape;
-    use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
-    use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request, Sample};
-    use hivtac_wire::version::HelloPrefix;
+    use hivtac_wire::message::{Request, Sample};
 
     const KIND: Kind = Kind::Ov7725;
     const PRESS: Touch = Touch {
@@ -231,12 +230,6 @@ mod tests {
         file.leak()
     }
 
-    fn ask(device: &mut Device, message: &HostMessage) {
-        let mut buffer = [0; MAX_HOST_FRAME];
-        device.receive(encode(message, &mut buffer).unwrap(), 0);
-        while device.message().is_some() {}
-    }
-
     /// The device of a unit, untouched for ten frames, then pressed: the last sample of either.
     fn samples(file: &'static [u8], touch: Touch) -> [Sample; 2] {
         let unit = Calibrated::of(KIND, file).unwrap();
@@ -245,35 +238,15 @@ mod tests {
         let hand = Hand::at_once();
         let usual = Disturbances::default();
         let eye = Eye::new(KIND, scene, Presses::Scene, usual, hand.clone());
-        let mut eye = eye.unwrap().with_film(film);
-        let mut device = Device::with_model(KIND, unit.file, unit.device_id, 1.0);
-        ask(&mut device, &HostMessage::Hello(HelloPrefix::OURS.into()));
-        for request in [
-            Request::SetContactShape(ContactShape::Needle),
-            Request::StartWithMarkers,
-        ] {
-            let command = Command { id: 1, request };
-            ask(&mut device, &HostMessage::Command(command));
-        }
-        let mut sample = |number: u32| {
-            let camera = device.camera();
-            let begun_us = u64::from(number) * 6_405;
-            let frame = Captured {
-                number,
-                begun_us,
-                camera,
-                words: eye.shot(&camera, number, begun_us as f64 * 1e-6).words,
-            };
-            device.frame(&frame, false, || begun_us + 6_405);
-            loop {
-                if let DeviceMessage::Sample(sample) = device.message().unwrap() {
-                    return sample;
-                }
-            }
-        };
-        let rest = (1..=10).map(&mut sample).last().unwrap();
+        let device = Device::with_model(KIND, unit.file, unit.device_id, 1.0);
+        let mut tested = Tested::new(device, eye.unwrap().with_film(film));
+        tested.greet();
+        tested.ask(1, Request::SetContactShape(ContactShape::Needle));
+        tested.ask(1, Request::StartWithMarkers);
+        let mut last_of_ten = || (0..10).map(|_| tested.sample()).last().unwrap();
+        let rest = last_of_ten();
         hand.set([Some(touch), None]);
-        [rest, (11..=20).map(sample).last().unwrap()]
+        [rest, last_of_ten()]
     }
 
     /// Largest difference of coordinates, px.

@@ -31,3 +31,5 @@ pub mod line;
 mod outbox;
 pub mod pair;
 pub mod run;
+#[cfg(test)]
+mod tested;

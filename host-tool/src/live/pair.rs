@@ -177,14 +177,13 @@ pub fn in_range(touches: [Touch; 2]) -> [Touch; 2] {
 mod tests {
     use super::*;
     use crate::live::camera::Kind;
-    use crate::live::device::{Captured, Device};
+    use crate::live::device::Device;
     use crate::live::eye::{Disturbances, Eye, Presses};
     use crate::live::hand::Hand;
+    use crate::live::tested::Tested;
     use hivtac_terms::contact_shape::ContactShape;
     use hivtac_terms::status::Status;
-    use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
-    use hivtac_wire::message::{Command, DeviceMessage, HostMessage, Request, Sample};
-    use hivtac_wire::version::HelloPrefix;
+    use hivtac_wire::message::{Request, Sample};
 
     const LEFT: Touch = Touch {
         place_mm: [-2.5, 1.0],
@@ -197,48 +196,19 @@ mod tests {
         angles_deg: [0.0, 3.0],
     };
 
-    fn ask(device: &mut Device, message: &HostMessage) {
-        let mut buffer = [0; MAX_HOST_FRAME];
-        device.receive(encode(message, &mut buffer).unwrap(), 0);
-        while device.message().is_some() {}
-    }
-
     /// The samples of frames under two fingers.
     fn samples(count: u32) -> Vec<Sample> {
         let (kind, layout) = (Kind::Ov7725, "8v".parse().unwrap());
         let scene = kind.scene("rest", layout, 1).unwrap();
         let hand = Hand::at_once();
         let usual = Disturbances::default();
-        let mut eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone()).unwrap();
-        let mut device = Device::new(kind, layout, [0; 12], 1.0);
-        ask(&mut device, &HostMessage::Hello(HelloPrefix::OURS.into()));
-        for request in [
-            Request::SetContactShape(ContactShape::Needle),
-            Request::Start,
-        ] {
-            ask(
-                &mut device,
-                &HostMessage::Command(Command { id: 1, request }),
-            );
-        }
+        let eye = Eye::new(kind, scene, Presses::Scene, usual, hand.clone()).unwrap();
+        let mut tested = Tested::new(Device::new(kind, layout, [0; 12], 1.0), eye);
+        tested.greet();
+        tested.ask(1, Request::SetContactShape(ContactShape::Needle));
+        tested.ask(1, Request::Start);
         hand.set([Some(LEFT), Some(RIGHT)]);
-        let sample = |number: u32| {
-            let camera = device.camera();
-            let begun_us = u64::from(number) * 6_405;
-            let frame = Captured {
-                number,
-                begun_us,
-                camera,
-                words: eye.shot(&camera, number, begun_us as f64 * 1e-6).words,
-            };
-            device.frame(&frame, false, || begun_us + 6_405);
-            loop {
-                if let DeviceMessage::Sample(sample) = device.message().unwrap() {
-                    return sample;
-                }
-            }
-        };
-        (1..=count).map(sample).collect()
+        (0..count).map(|_| tested.sample()).collect()
     }
 
     #[test]

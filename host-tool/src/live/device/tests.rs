@@ -1,74 +1,23 @@
 //! Tests a conversation with the device, message by message.
 
-use super::{Captured, Device};
+use super::Device;
 use crate::live::camera::Kind;
 use crate::live::eye::{Disturbances, Eye, Presses};
 use crate::live::hand::Hand;
+use crate::live::tested::Tested;
 use hivtac_twin::Layout;
-use hivtac_wire::frame::{MAX_HOST_FRAME, encode};
-use hivtac_wire::message::{
-    Command, DeviceMessage, HostHello, HostMessage, ModelPart, Outcome, Request,
-};
-use hivtac_wire::version::HelloPrefix;
+use hivtac_wire::message::{DeviceMessage, HostHello, HostMessage, ModelPart, Outcome, Request};
 
 /// A device with its camera's view of a film at rest.
-struct Tested {
-    device: Device,
-    eye: Eye,
-    number: u32,
-}
-
-impl Tested {
-    fn new() -> Tested {
-        let kind = Kind::Ov7725;
-        let scene = kind.scene("rest", Layout::default(), 1).unwrap();
-        let undisturbed = Disturbances::default();
-        Tested {
-            device: Device::new(kind, Layout::default(), [7; 12], 1.0),
-            eye: Eye::new(kind, scene, Presses::Scene, undisturbed, Hand::default()).unwrap(),
-            number: 0,
-        }
-    }
-
-    fn send(&mut self, message: &HostMessage) -> Vec<DeviceMessage> {
-        let mut buffer = [0; MAX_HOST_FRAME];
-        self.device
-            .receive(encode(message, &mut buffer).unwrap(), 0);
-        self.messages()
-    }
-
-    fn messages(&mut self) -> Vec<DeviceMessage> {
-        std::iter::from_fn(|| self.device.message()).collect()
-    }
-
-    fn greet(&mut self) {
-        let messages = self.send(&HostMessage::Hello(HelloPrefix::OURS.into()));
-        assert!(
-            matches!(messages[..], [DeviceMessage::Hello(_)]),
-            "{messages:?}"
-        );
-    }
-
-    /// Sends a command; returns the messages that come at once.
-    fn ask(&mut self, id: u16, request: Request) -> Vec<DeviceMessage> {
-        self.send(&HostMessage::Command(Command { id, request }))
-    }
-
-    /// The next frame; returns it with the messages that come of it.
-    fn frame(&mut self) -> (Captured, Vec<DeviceMessage>) {
-        self.number += 1;
-        let camera = self.device.camera();
-        let begun_us = 6_405 * u64::from(self.number);
-        let shot = self.eye.shot(&camera, self.number, 1e-6 * begun_us as f64);
-        let frame = Captured {
-            number: self.number,
-            begun_us,
-            camera,
-            words: shot.words,
-        };
-        self.device.frame(&frame, false, || begun_us + 6_405);
-        (frame, self.messages())
-    }
+fn at_rest() -> Tested {
+    let kind = Kind::Ov7725;
+    let scene = kind.scene("rest", Layout::default(), 1).unwrap();
+    let undisturbed = Disturbances::default();
+    let eye = Eye::new(kind, scene, Presses::Scene, undisturbed, Hand::default());
+    Tested::new(
+        Device::new(kind, Layout::default(), [7; 12], 1.0),
+        eye.unwrap(),
+    )
 }
 
 /// The outcome of a command's reply among messages; `None` without one.
@@ -81,7 +30,7 @@ fn outcome(messages: &[DeviceMessage], id: u16) -> Option<Outcome> {
 
 #[test]
 fn nothing_is_said_before_a_hello_and_after_one_of_another_version() {
-    let mut tested = Tested::new();
+    let mut tested = at_rest();
     assert_eq!(tested.ask(1, Request::GetInfo), []);
     let other = HostHello {
         protocol: u16::MAX,
@@ -102,7 +51,7 @@ fn nothing_is_said_before_a_hello_and_after_one_of_another_version() {
 
 #[test]
 fn samples_come_of_frames_once_they_are_asked_for() {
-    let mut tested = Tested::new();
+    let mut tested = at_rest();
     tested.greet();
     assert_eq!(tested.frame().1, []);
     tested.ask(1, Request::StartWithMarkers);
@@ -121,7 +70,7 @@ fn samples_come_of_frames_once_they_are_asked_for() {
 
 #[test]
 fn there_is_one_tare_at_a_time_and_it_ends_with_its_host() {
-    let mut tested = Tested::new();
+    let mut tested = at_rest();
     tested.greet();
     assert_eq!(tested.ask(1, Request::Tare { frames: 3 }), []);
     let second = tested.ask(2, Request::Tare { frames: 3 });
@@ -144,7 +93,7 @@ fn there_is_one_tare_at_a_time_and_it_ends_with_its_host() {
 
 #[test]
 fn a_snapshot_has_the_bytes_of_its_frame() {
-    let mut tested = Tested::new();
+    let mut tested = at_rest();
     tested.greet();
     assert_eq!(tested.ask(1, Request::Snapshot), []);
     assert_eq!(
@@ -172,7 +121,7 @@ fn a_snapshot_has_the_bytes_of_its_frame() {
 
 #[test]
 fn an_upload_that_is_not_whole_changes_nothing() {
-    let mut tested = Tested::new();
+    let mut tested = at_rest();
     tested.greet();
     let part = |offset| {
         let bytes = [0; 8].into_iter().collect();
