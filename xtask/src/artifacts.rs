@@ -131,7 +131,7 @@ pub fn serving_tool() -> Result<PathBuf> {
 
 fn serving_command() -> Command {
     let mut command = host_command("hivtac");
-    command.args(["--features", "hivtac/ros2,hivtac/foxglove"]);
+    command.args(["--features", "hivtac/zenoh,hivtac/foxglove"]);
     command
 }
 

@@ -39,6 +39,14 @@ pub const SERVE: Environment = Environment {
     needs: "Python 3.10, and cyclonedds for this Python and computer",
 };
 
+/// For a receiver of `hivtac serve` on Zenoh that is not of ROS 2.
+pub const ZENOH: Environment = Environment {
+    folder: "python-zenoh",
+    modules: "rosbags, zenoh_ros2_sdk",
+    packages: "zenoh-ros2-sdk>=0.1.8",
+    needs: "Python 3.10",
+};
+
 /// For LeRobot with the sensors' package; maturin and hatchling build that here. It brings PyTorch.
 /// Python 3.12 and newer have the present LeRobot, 3.10 and 3.11 the last one for them.
 pub const LEROBOT: Environment = Environment {
@@ -191,6 +199,15 @@ pub fn test_serve(_: &Shared, tally: &mut Tally) -> Result<()> {
         .ready()?
         .tests(&STRICT, "tests/python/test_serve.py", tool);
     run_tests(&mut on_rig(tests)?, tally)
+}
+
+/// Serves the simulated sensor on Zenoh, and tests what a receiver gets.
+pub fn test_zenoh(_: &Shared, tally: &mut Tally) -> Result<()> {
+    let tool = artifacts::serving_tool()?;
+    let mut tests = ZENOH
+        .ready()?
+        .tests(&[], "tests/python/test_zenoh.py", tool);
+    run_tests(&mut tests, tally)
 }
 
 /// Checks the kit's solids, alone and assembled.

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 
 use crate::artifacts::{self, Programs};
-use crate::python::{KIT, LEROBOT, MUJOCO, PACKAGE, RERUN, SERVE};
+use crate::python::{KIT, LEROBOT, MUJOCO, PACKAGE, RERUN, SERVE, ZENOH};
 use crate::report::{Report, Tally, run_tests};
 use crate::toolchain::{self, cargo};
 use crate::{bench, fuzz, linux_host, packages, process, python, web};
@@ -42,7 +42,7 @@ const fn slow(name: &'static str, obstacle: Obstacle, work: Work) -> Step {
 /// The steps. Two threads take them in this order, each the next one when it is free. Builds for
 /// the microcontroller come first, in their own folder, while the lints hold the common one. Long
 /// steps follow; those after them fill the time until both threads end.
-static STEPS: [Step; 20] = [
+static STEPS: [Step; 21] = [
     always("format", |_, _| format()),
     always("lints: microcontroller", |shared, _| shared.target_lints()),
     always("lints: host", |shared, _| host_lints(shared.all)),
@@ -59,6 +59,7 @@ static STEPS: [Step; 20] = [
     slow("tests: rig at half speed", || None, rig_tests_at_half_speed),
     slow("tests: python", || PACKAGE.obstacle(), python::test_package),
     slow("tests: serve", || SERVE.obstacle(), python::test_serve),
+    slow("tests: zenoh", || ZENOH.obstacle(), python::test_zenoh),
     slow(
         "tests: lerobot",
         || LEROBOT.obstacle(),

@@ -1,6 +1,8 @@
 //! Messages of ROS 2: their definitions, and their encoding as CDR.
 
 pub mod channel;
+#[cfg(feature = "zenoh")]
+pub mod type_hash;
 
 use crate::force_fields::{FORCE, place_m, place_si, torque_nm};
 use hivtac_terms::force::Force;

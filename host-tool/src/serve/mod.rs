@@ -4,10 +4,10 @@ mod diagnosis;
 #[cfg(feature = "foxglove")]
 mod foxglove;
 mod names;
-#[cfg(feature = "ros2")]
-mod node;
 mod outlet;
 mod rerun;
+#[cfg(feature = "ros2")]
+mod ros2;
 mod sensor;
 
 use crate::device::Devices;
@@ -47,11 +47,11 @@ const LAST_DOMAIN: u16 = 232;
 /// Serve forces to other programs, as a node of ROS 2, for Foxglove or Rerun, until Ctrl-C
 ///
 /// For a hivtac that was built with it: `cargo install --path host-tool --features
-/// ros2,foxglove`. Prints `ready` and where; goes on after a lost connection, which diagnostics
-/// tell. Topics of the node, each below its name: `wrench`, `place`, `contacts`, `markers`,
-/// `contact`, `slip`, `status`; service `tare`; and `/diagnostics`. Those of several sensors are
-/// below /NODE/SENSOR, those of a grip below /NODE/grip. Rerun needs no such build, but Python with
-/// `hivtac[rerun]`.
+/// ros2,foxglove`, or with `zenoh`, where RMW_IMPLEMENTATION is rmw_zenoh_cpp. Prints `ready` and
+/// where; goes on after a lost connection, which diagnostics tell. Topics of the node, each below
+/// its name: `wrench`, `place`, `contacts`, `markers`, `contact`, `slip`, `status`; service `tare`;
+/// and `/diagnostics`. Those of several sensors are below /NODE/SENSOR, those of a grip below
+/// /NODE/grip. Rerun needs no such build, but Python with `hivtac[rerun]`.
 ///
 /// Example: hivtac serve --ros2 --foxglove
 #[derive(Args)]
@@ -160,17 +160,25 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
     stop::check()
 }
 
+/// Whether the environment chooses Zenoh as the middleware of ROS 2's programs.
+fn is_on_zenoh() -> bool {
+    std::env::var_os("RMW_IMPLEMENTATION").is_some_and(|it| it == "rmw_zenoh_cpp")
+}
+
 /// An error if this build lacks a wanted outlet.
 fn built_with(outlets: &Outlets) -> Result<(), Failure> {
-    for (is_wanted, is_there, what, feature) in [
-        (outlets.ros2, cfg!(feature = "ros2"), "ROS 2", "ros2"),
-        (
-            outlets.foxglove,
-            cfg!(feature = "foxglove"),
-            "Foxglove",
-            "foxglove",
+    let ros2 = match is_on_zenoh() {
+        true => (
+            cfg!(feature = "zenoh"),
+            "Zenoh, and RMW_IMPLEMENTATION is rmw_zenoh_cpp",
+            "zenoh",
         ),
-    ] {
+        false => (cfg!(feature = "ros2"), "ROS 2", "ros2"),
+    };
+    let foxglove = (cfg!(feature = "foxglove"), "Foxglove", "foxglove");
+    for (is_wanted, (is_there, what, feature)) in
+        [(outlets.ros2, ros2), (outlets.foxglove, foxglove)]
+    {
         if is_wanted && !is_there {
             return Err(usage(&format!(
                 "this hivtac was built without {what}; build it with it: \
@@ -241,12 +249,7 @@ fn outlets(
     let mut outlets: Vec<Box<dyn Outlet>> = Vec::new();
     #[cfg(feature = "ros2")]
     if arguments.outlets.ros2 {
-        outlets.push(Box::new(node::Ros2::open(
-            &arguments.name,
-            domain,
-            served,
-            has_grip,
-        )?));
+        outlets.push(ros2::open(&arguments.name, domain, served, has_grip)?);
     }
     #[cfg(feature = "foxglove")]
     if arguments.outlets.foxglove {

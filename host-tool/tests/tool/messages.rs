@@ -303,9 +303,10 @@ fn saying(quoted: &str) -> String {
         "this hivtac was built without ROS 2" => run(&["serve", "--ros2"]).stderr,
         #[cfg(feature = "ros2")]
         "this hivtac was built without ROS 2" => format!("hivtac: {quoted}"),
-        "nothing else of ROS 2 is in domain"
-        | "RMW_IMPLEMENTATION is rmw_zenoh_cpp"
-        | "another node in domain" => in_tests_of("tests/python/test_serve.py", quoted),
+        "nothing else of ROS 2 is in domain" | "another node in domain" => {
+            in_tests_of("tests/python/test_serve.py", quoted)
+        }
+        "cannot take part in ROS 2's domain" => in_tests_of("tests/python/test_zenoh.py", quoted),
         quoted => panic!("nothing provokes {quoted:?}"),
     }
 }

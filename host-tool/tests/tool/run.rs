@@ -26,10 +26,10 @@ pub fn run(arguments: &[&str]) -> Finished {
     start(arguments).finish()
 }
 
-/// Runs `hivtac ARGUMENTS` to its end, with other programs from these folders alone.
-pub fn run_with_path(path: &str, arguments: &[&str]) -> Finished {
+/// Runs `hivtac ARGUMENTS` to its end, with this value of a variable of the environment.
+pub fn run_with(variable: &str, value: &str, arguments: &[&str]) -> Finished {
     let mut tool = Command::new(env!("CARGO_BIN_EXE_hivtac"));
-    Finished::new(tool.args(arguments).env("PATH", path).output().unwrap())
+    Finished::new(tool.args(arguments).env(variable, value).output().unwrap())
 }
 
 /// Runs `hivtac` to its end with `words` of the shell, on a disk that is full once a file has this

@@ -35,7 +35,7 @@ fn with_python(script: &str, options: &[&str]) -> Finished {
     std::fs::write(&python, format!("#!/bin/sh\n{script}\n")).unwrap();
     std::fs::set_permissions(&python, std::fs::Permissions::from_mode(0o755)).unwrap();
     let path = format!("{}:/usr/bin:/bin", folder.path().display());
-    run_with_path(&path, &[&["serve", "--rerun"], options].concat())
+    run_with("PATH", &path, &[&["serve", "--rerun"], options].concat())
 }
 
 #[cfg(unix)]
@@ -77,4 +77,9 @@ fn a_tool_that_was_built_without_it_says_how_to_build_it() {
         );
         assert!(said.ends_with(&how) && said.lines().count() == 1, "{said}");
     }
+    let words = ["serve", "--ros2", "--port", "no-such-port"];
+    let said = run_with("RMW_IMPLEMENTATION", "rmw_zenoh_cpp", &words).stderr;
+    let start = "hivtac: this hivtac was built without Zenoh, and RMW_IMPLEMENTATION is rmw_zenoh";
+    assert!(said.starts_with(start), "{said}");
+    assert!(said.ends_with("--features zenoh\n"), "{said}");
 }

@@ -102,7 +102,7 @@ impl Series {
         let unit = if is_named {
             ""
         } else {
-            "no reading names a unit; taken for newtons "
+            "no reading names a unit; taken for newtons, "
         };
         bail!("{unit}readings span {span_n:.3} N, and the film holds 0.25 N: {hint}");
     }
