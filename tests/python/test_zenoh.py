@@ -33,6 +33,8 @@ TRIGGER = "std_srvs/srv/Trigger"
 REQUEST, REPLY = "# no field\n", "bool success\nstring message\n"
 # A domain that nobody else is likely to use.
 DOMAIN = 97
+# How a command ends by Ctrl-C.
+INTERRUPTED = 130
 # s until something must have happened.
 PATIENCE = 40
 
@@ -144,7 +146,7 @@ class OnZenoh(unittest.TestCase):
         force = last.wrench.force
         for found, true in zip((force.x, force.y, force.z), truth, strict=True):
             self.assertAlmostEqual(found, true, delta=0.01)
-        self.assertEqual((serve.code, serve.heard), (0, ""))
+        self.assertEqual((serve.code, serve.heard), (INTERRUPTED, ""))
 
     def test_every_topic_has_the_type_that_ros_2_gives_it(self):
         kinds = {

@@ -131,7 +131,10 @@ fn configuration() -> Result<Config, Trouble> {
         let (key, value) = setting
             .split_once('=')
             .ok_or_else(|| format!("{OVERRIDE} has {setting:?}, which is not key=value"))?;
-        config.insert_json5(key.trim(), value.trim())?;
+        let is_set = config.insert_json5(key.trim(), value.trim()).is_ok();
+        if !is_set {
+            return Err(format!("{OVERRIDE} has {setting:?}, which Zenoh does not take").into());
+        }
     }
     Ok(config)
 }
