@@ -5,7 +5,7 @@
 //! subscription loses the oldest of the last ten messages of a topic.
 
 use super::outlet::{Outlet, Served};
-use super::sensor::{Answer, TareOrder, Told};
+use super::sensor::{Answer, NextDown, TareOrder};
 use crate::output::note;
 use hivtac_host::down::direction;
 use hivtac_host::failure::Failure;
@@ -107,9 +107,9 @@ struct Sensor {
     gravity: Subscription<Body>,
     /// The frame of vectors of gravity.
     frame: String,
-    down: Told,
+    down: NextDown,
     /// Whether an unusable vector was reported.
-    is_told: bool,
+    is_reported: bool,
 }
 
 /// The node.
@@ -122,7 +122,7 @@ pub struct Ros2 {
     /// Since when no other program was seen; `None` once one was, or that was reported.
     alone: Option<Instant>,
     /// Whether another node of this name was reported.
-    is_told: bool,
+    is_reported: bool,
     node: Node,
     context: Context,
     /// The topic that only this node should write, by its DDS name.
@@ -189,7 +189,7 @@ impl Ros2 {
             diagnostics: publisher(&mut node, &diagnostics, &DIAGNOSTICS)?,
             looked: Instant::now(),
             alone: Some(Instant::now()),
-            is_told: false,
+            is_reported: false,
             node,
             context,
             own_topic: format!("rt{first}/{}", Channel::Status.name()),
@@ -231,7 +231,7 @@ impl Ros2 {
             let data = &writer.publication_topic_data;
             data.topic_name == self.own_topic && data.key.prefix != own
         });
-        if is_anothers && !self.is_told {
+        if is_anothers && !self.is_reported {
             note(&format!(
                 "hivtac: another node in domain {} is called {}, too, and their messages are \
                  mixed; end one, or start it with another --name",
@@ -239,7 +239,7 @@ impl Ros2 {
                 self.node.fully_qualified_name()
             ));
         }
-        self.is_told = is_anothers;
+        self.is_reported = is_anothers;
     }
 }
 
@@ -308,7 +308,7 @@ impl Sensor {
             gravity: node.create_subscription(&topic, None)?,
             frame: served.frames.film().to_owned(),
             down: served.down.clone(),
-            is_told: false,
+            is_reported: false,
         })
     }
 
@@ -319,9 +319,9 @@ impl Sensor {
                 Ok(down) => {
                     *self.down.lock().unwrap_or_else(PoisonError::into_inner) = Some(down);
                 }
-                Err(why) if !self.is_told => {
+                Err(why) if !self.is_reported => {
                     note(&format!("hivtac: a vector of gravity is left out: {why}"));
-                    self.is_told = true;
+                    self.is_reported = true;
                 }
                 Err(_) => {}
             }
@@ -384,7 +384,7 @@ impl Waiting {
 }
 
 impl Outlet for Ros2 {
-    fn told(&self) -> Vec<(&'static str, String)> {
+    fn addresses(&self) -> Vec<(&'static str, String)> {
         vec![
             ("ros2", self.node.fully_qualified_name()),
             ("domain", self.domain.to_string()),
