@@ -75,11 +75,11 @@ fn left(
     });
     let [first, second] = poses;
     let both = Both::new([first?, second?], forward);
-    let mut told = PairPrediction::default();
-    told.put(&both, forward, interaction, &Markers::defaults(8));
+    let mut predicted = PairPrediction::default();
+    predicted.put(&both, forward, interaction, &Markers::defaults(8));
     let mut left: [f64; COORDINATES] = part(10, COORDINATES)?.try_into()?;
-    for (left, told) in left.iter_mut().zip(told.moved.iter()) {
-        *left -= f64::from(*told);
+    for (left, predicted) in left.iter_mut().zip(predicted.moved.iter()) {
+        *left -= f64::from(*predicted);
     }
     Ok((left, f64::from(both.size)))
 }

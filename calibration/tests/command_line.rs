@@ -38,15 +38,7 @@ fn a_mistake_is_told_without_a_backtrace() {
     let output = Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
         .current_dir(directory.path())
         .env("RUST_BACKTRACE", "1")
-        .args([
-            "evaluate",
-            "--model",
-            "none.hvtm",
-            "--data",
-            "none.csv",
-            "--out",
-            "x.html",
-        ])
+        .args("evaluate --model none.hvtm --data none.csv --out x.html".split(' '))
         .output()
         .unwrap();
     let error = stderr_of_failure(&output);
@@ -63,17 +55,9 @@ fn from_data_to_a_checked_model() {
     let here = directory.path();
     let made = run(
         here,
-        &[
-            "dataset",
-            "--samples",
-            "136",
-            "--seed",
-            "4",
-            "--reach-mm",
-            "0",
-            "--out",
-            "data.csv",
-        ],
+        &"dataset --samples 136 --seed 4 --reach-mm 0 --out data.csv"
+            .split(' ')
+            .collect::<Vec<_>>(),
     );
     assert!(stdout(&made).contains("200 frames, 0 rejected"));
     let fast = ["--hidden", "8", "--epochs", "2", "--rounded-epochs", "1"];
@@ -152,15 +136,9 @@ fn the_contact_reading_is_carried_through() {
 
     let force = ["dataset", "--samples", "30", "--reach-mm", "0"];
     words(&[&force[..], &["--out", "force.csv"]].concat(), "force");
-    let judge = [
-        "evaluate",
-        "--model",
-        "slip.hvtm",
-        "--data",
-        "force.csv",
-        "--out",
-        "x.html",
-    ];
+    let judge: Vec<_> = "evaluate --model slip.hvtm --data force.csv --out x.html"
+        .split(' ')
+        .collect();
     let error = stderr_of_failure(&run(here, &judge));
     assert!(error.contains("other conditions"), "{error}");
 }
@@ -191,15 +169,9 @@ fn mistakes_are_named() {
         &["'many'", "a number"],
     );
     fails(
-        &[
-            "train",
-            "--data",
-            "a.csv",
-            "--start",
-            "b.weights",
-            "--out",
-            "c",
-        ],
+        &"train --data a.csv --start b.weights --out c"
+            .split(' ')
+            .collect::<Vec<_>>(),
         &["--start", "cannot read b.weights"],
     );
     std::fs::write(directory.path().join("a.weights"), "{}").unwrap();

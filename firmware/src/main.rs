@@ -73,7 +73,7 @@ use hivtac_terms::camera::CameraSettings;
 use hivtac_wire::image::header::{Header, Mark};
 use hivtac_wire::kept::Record;
 use memory::Memory;
-use model::Chosen;
+use model::ModelFile;
 use next_model::InUse;
 use snapshot_copy::SnapshotCopy;
 use static_cell::{ConstStaticCell, StaticCell};
@@ -138,9 +138,9 @@ fn start() -> Foreground {
     let sensor = SENSOR.take();
     let mut memory = Memory::open(board.flash, board.thermometer);
     settings::set_name(memory.record().name.clone());
-    let chosen = memory.model();
-    let model = InUse::of(&chosen);
-    let format = configure(sensor, &chosen, memory.record());
+    let file = memory.model();
+    let model = InUse::of(&file);
+    let format = configure(sensor, &file, memory.record());
     set_camera(memory.record().camera);
     self_test::at_start(&memory.of_flash(), sensor);
 
@@ -165,8 +165,8 @@ fn start() -> Foreground {
 
 /// Configures the pipeline for the camera's frames and the kept settings; returns the pixel format
 /// that it needs.
-fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
-    let model = chosen.model();
+fn configure(sensor: &mut Sensor, file: &ModelFile, kept: &Record) -> Format {
+    let model = file.model();
     let settings = model::fitting().settings(model.as_ref(), kept.threshold);
     if sensor.configure(settings, model).is_err() {
         panic!("the built-in settings are out of range");
@@ -184,7 +184,7 @@ fn configure(sensor: &mut Sensor, chosen: &Chosen, kept: &Record) -> Format {
             defmt::Debug2Format(&unusable)
         );
     });
-    settings::follow(sensor, chosen.source);
+    settings::follow(sensor, file.source);
     // Always a format that the camera sends.
     Format::of(sensor.threshold().format()).unwrap_or(camera::USUAL_FORMAT)
 }

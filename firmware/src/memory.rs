@@ -8,7 +8,7 @@
 //! models; the record names the kept one, after it was read back.
 
 use crate::flash::SecondBank;
-use crate::model::{self, Chosen};
+use crate::model::{self, ModelFile};
 use crate::model_upload::{self, Whole};
 use crate::orders::{ORDERS, Order};
 use crate::self_test::{self, OfFlash};
@@ -110,10 +110,10 @@ impl Memory {
     }
 
     /// Returns the model for the start.
-    pub fn model(&mut self) -> Chosen {
+    pub fn model(&mut self) -> ModelFile {
         match self.record.model {
             Some(kept) => model::kept(self.log.flash(), &kept),
-            None => Chosen::built_in(ModelSource::BuiltIn),
+            None => ModelFile::built_in(ModelSource::BuiltIn),
         }
     }
 
@@ -205,7 +205,7 @@ impl Memory {
     }
 
     /// Checks the uploaded model before the flash is written, and keeps it.
-    async fn keep_model(&mut self) -> Result<Chosen, Outcome> {
+    async fn keep_model(&mut self) -> Result<ModelFile, Outcome> {
         let whole = model_upload::finish().ok_or(Outcome::InvalidArgument)?;
         let file = model_slots::lend(whole.slot, whole.bytes).ok_or(Outcome::Busy)?;
         let kept = self.keep_file(whole, file).await;
@@ -219,7 +219,7 @@ impl Memory {
         &mut self,
         Whole { slot, bytes }: Whole,
         file: &'static [u8],
-    ) -> Result<Chosen, Outcome> {
+    ) -> Result<ModelFile, Outcome> {
         let crc = model::checked(file).map_err(|refusal| {
             log::say(LogLevel::Error, format_args!("{refusal}"));
             refusal.outcome()
@@ -231,12 +231,12 @@ impl Memory {
         })?;
         let kept = Some(KeptModel { slot, bytes, crc });
         self.name_model(kept).await?;
-        Ok(Chosen::kept(file, slot))
+        Ok(ModelFile::kept(file, slot))
     }
 
-    async fn forget_model(&mut self) -> Result<Chosen, Outcome> {
+    async fn forget_model(&mut self) -> Result<ModelFile, Outcome> {
         self.name_model(None).await?;
-        Ok(Chosen::built_in(ModelSource::BuiltIn))
+        Ok(ModelFile::built_in(ModelSource::BuiltIn))
     }
 
     async fn name_model(&mut self, model: Option<KeptModel>) -> Result<(), Outcome> {
@@ -244,7 +244,7 @@ impl Memory {
         self.save_or_say(Record { model, ..record }).await
     }
 
-    async fn reset(&mut self) -> Result<Chosen, Outcome> {
+    async fn reset(&mut self) -> Result<ModelFile, Outcome> {
         self.save_or_say(Record::default()).await?;
         settings::set_name(Name::new());
         settings::set_down(Down::default());
@@ -253,7 +253,7 @@ impl Memory {
         if camera::report().settings != CameraSettings::default() {
             capture_task::set_afresh();
         }
-        Ok(Chosen::built_in(ModelSource::BuiltIn))
+        Ok(ModelFile::built_in(ModelSource::BuiltIn))
     }
 
     async fn save_or_say(&mut self, record: Record) -> Result<(), Outcome> {

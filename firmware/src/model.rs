@@ -49,7 +49,7 @@ const fn beginning<const N: usize>(bytes: &[u8]) -> [u8; N] {
 
 /// A model file, and its source. The file is read where it is used: a model that was read is two
 /// kilobytes long.
-pub struct Chosen {
+pub struct ModelFile {
     file: &'static [u8],
     /// Its source.
     pub source: ModelSource,
@@ -57,7 +57,7 @@ pub struct Chosen {
     pub slot: Option<u8>,
 }
 
-impl Chosen {
+impl ModelFile {
     /// The built-in model, with the reason as its source.
     pub fn built_in(source: ModelSource) -> Self {
         Self {
@@ -110,12 +110,12 @@ pub fn sectors(slot: u8) -> Range<u32> {
 
 /// Returns the kept model, read from the flash; the built-in one if the kept one is unreadable, or
 /// does not fit this sensor.
-pub fn kept(flash: &mut SecondBank, kept: &KeptModel) -> Chosen {
+pub fn kept(flash: &mut SecondBank, kept: &KeptModel) -> ModelFile {
     match read(flash, kept) {
-        Some(file) => Chosen::kept(file, kept.slot),
+        Some(file) => ModelFile::kept(file, kept.slot),
         None => {
             defmt::error!("the kept model cannot be used");
-            Chosen::built_in(ModelSource::Fallback)
+            ModelFile::built_in(ModelSource::Fallback)
         }
     }
 }

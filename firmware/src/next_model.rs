@@ -1,7 +1,7 @@
 //! Replaces the model in use by a new one, between two frames.
 
 use crate::dtcm_table::Sensor;
-use crate::model::{self, Chosen};
+use crate::model::{self, ModelFile};
 use crate::model_slots;
 use hivtac_terms::threshold::Threshold;
 use hivtac_wire::message::ModelSource;
@@ -16,10 +16,10 @@ pub struct InUse {
 
 impl InUse {
     /// The source and slot of the sensor's first model.
-    pub fn of(chosen: &Chosen) -> Self {
+    pub fn of(file: &ModelFile) -> Self {
         Self {
-            source: chosen.source,
-            slot: chosen.slot,
+            source: file.source,
+            slot: file.slot,
         }
     }
 }
@@ -27,7 +27,7 @@ impl InUse {
 /// Replaces the sensor's model, as [`hivtac_portable::device::model::Fitting::replace`] says.
 /// Returns the wanted threshold if its pixels differ from the camera's.
 pub fn bring_into_use(
-    next: Chosen,
+    next: ModelFile,
     afresh: bool,
     sensor: &mut Sensor,
     in_use: &mut InUse,

@@ -1,6 +1,6 @@
 //! Defines the host's orders for the pipeline.
 
-use crate::model::Chosen;
+use crate::model::ModelFile;
 use crate::session::Origin;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::channel::Channel;
@@ -52,7 +52,7 @@ pub enum Order {
         /// Who requested it.
         origin: Origin,
         /// The model.
-        next: Chosen,
+        next: ModelFile,
         /// True to use its threshold and no tare, regardless of those in use.
         afresh: bool,
     },

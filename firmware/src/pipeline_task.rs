@@ -6,7 +6,7 @@ use crate::camera;
 use crate::capture::{self, CAPTURE_EVENTS, CaptureEvent};
 use crate::condition::{self, Condition};
 use crate::dtcm_table::Sensor;
-use crate::model::Chosen;
+use crate::model::ModelFile;
 use crate::next_model::{self, InUse};
 use crate::next_threshold::NextThreshold;
 use crate::orders::{ORDERS, Order};
@@ -226,7 +226,7 @@ impl PipelineTask {
     }
 
     /// Called between two frames, so that no frame mixes two models.
-    fn use_model(&mut self, origin: Origin, next: Chosen, afresh: bool) {
+    fn use_model(&mut self, origin: Origin, next: ModelFile, afresh: bool) {
         self.give_up_tare();
         let before = self.sensor.threshold();
         let wanted = next_model::bring_into_use(next, afresh, self.sensor, &mut self.model);

@@ -81,7 +81,7 @@ pub fn at_start(flash: &OfFlash, sensor: &mut Sensor) {
 /// Runs the checks that are possible at any time.
 fn standing(flash: &OfFlash) -> u32 {
     let reset = faults::reset_reason();
-    let model = settings::of_pipeline().and_then(|told| told.model);
+    let model = settings::of_pipeline().and_then(|settings| settings.model);
     let source = model.as_ref().map(|model| model.source);
     bits(&[
         (Problem::ModelMissing, model.is_none()),
@@ -138,7 +138,7 @@ pub fn camera_set(problems: u32) {
 /// Returns whether a problem was found at the start that the LED's other patterns do not show, and
 /// with which forces are not to be trusted.
 pub fn failed_at_start() -> bool {
-    const TOLD_OTHERWISE: [Problem; 6] = [
+    const REPORTED_OTHERWISE: [Problem; 6] = [
         Problem::CameraSilent,
         Problem::AnotherCamera,
         Problem::CameraRegisters,
@@ -146,7 +146,7 @@ pub fn failed_at_start() -> bool {
         Problem::WatchdogReset,
         Problem::SoftwareReset,
     ];
-    let otherwise = TOLD_OTHERWISE.map(Problem::bit);
+    let otherwise = REPORTED_OTHERWISE.map(Problem::bit);
     let otherwise = otherwise.iter().fold(0, |all, bit| all | bit);
     AT_START.load(Ordering::Relaxed) & !otherwise != 0
 }

@@ -30,8 +30,8 @@ static CONTACT_SHAPE: CriticalSectionMutex<Cell<ContactShape>> =
 
 /// Publishes the pipeline's settings, with the source of its model.
 pub fn follow(sensor: &Sensor, source: ModelSource) {
-    let told = OfPipeline::of(sensor, source);
-    PIPELINE.lock(|cell| cell.set(Some(told)));
+    let settings = OfPipeline::of(sensor, source);
+    PIPELINE.lock(|cell| cell.set(Some(settings)));
 }
 
 /// Returns the pipeline's settings; `None` before it is configured.

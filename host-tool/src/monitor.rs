@@ -78,14 +78,14 @@ enum End {
 /// Time since the last sample.
 struct Silence {
     since: Instant,
-    told: bool,
+    is_reported: bool,
 }
 
 impl Silence {
     fn new() -> Silence {
         Silence {
             since: Instant::now(),
-            told: false,
+            is_reported: false,
         }
     }
 
@@ -96,7 +96,7 @@ impl Silence {
 
     /// Notes that the device answered, with a message the first time, and restarts the time.
     fn tell(&mut self) {
-        if !std::mem::replace(&mut self.told, true) {
+        if !std::mem::replace(&mut self.is_reported, true) {
             let seconds = SILENCE.as_secs();
             note(&format!(
                 "hivtac: no sample for {seconds} s, but the device answers; does the camera run? \

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
 
 static STOP: AtomicBool = AtomicBool::new(false);
-static ASKED_BESIDES: OnceLock<fn() -> bool> = OnceLock::new();
+static OTHER_CONDITION: OnceLock<fn() -> bool> = OnceLock::new();
 
 thread_local! {
     static OWN: OnceCell<Arc<AtomicBool>> = const { OnceCell::new() };
@@ -27,7 +27,7 @@ pub fn install() -> Result<(), Failure> {
 /// waiting loop calls `is_over` at least every 0.1 s. The first function stays; later ones are
 /// ignored.
 pub fn ask_besides(is_over: fn() -> bool) {
-    ASKED_BESIDES.get_or_init(|| is_over);
+    OTHER_CONDITION.get_or_init(|| is_over);
 }
 
 /// True once the program, or this thread's work, should end.
@@ -36,7 +36,7 @@ pub fn requested() -> bool {
     if let Some(is_over) = own {
         return is_over;
     }
-    STOP.load(Ordering::Relaxed) || ASKED_BESIDES.get().is_some_and(|is_over| is_over())
+    STOP.load(Ordering::Relaxed) || OTHER_CONDITION.get().is_some_and(|is_over| is_over())
 }
 
 /// An error once the program should end.

@@ -76,8 +76,13 @@ pub fn run(arguments: &TemplateArguments) -> Result<(), Failure> {
         let message = format!("cannot write the template {file}: {error}");
         Failure::input(message)
     })?;
-    let told = format!("{file}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
-    tell(*json, &told, &json!({ "file": file, "ruler_mm": RULER_MM }))
+    let message =
+        format!("{file}: print it at 100 % and check that its ruler is {RULER_MM} mm long");
+    tell(
+        *json,
+        &message,
+        &json!({ "file": file, "ruler_mm": RULER_MM }),
+    )
 }
 
 /// The drawing as SVG, with all lengths in millimetres, the page's size included.

@@ -53,7 +53,7 @@ impl Anywhere {
             }
         }
         print!("{text}");
-        page::write("anywhere.md", include_str!("anywhere.md"), &text)
+        page::write("anywhere.md", &text)
     }
 
     /// Errors and bounds at each force with `steps` steps, or with the file's number for `None`.

@@ -5,6 +5,12 @@
 `cargo xtask test --all kit` builds the tool and installs build123d first.
 """
 
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["build123d>=0.13,<0.14"]
+# ///
+# It takes 1 GB, and needs a solid modeller for this computer.
+
 import io
 import os
 import re

@@ -6,6 +6,13 @@ its own class loads what was recorded.
 `cargo xtask test --all lerobot` builds the tool, and installs LeRobot and the packages first.
 """
 
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["maturin>=1.9,<2", "hatchling>=1.26", "lerobot[core_scripts]>=0.4.4"]
+# ///
+# PyTorch takes 8 GB. On Linux with Python 3.12 one of its packages is built: that needs gcc,
+# python3-dev and linux-libc-dev. Python 3.10 and 3.11 have the last LeRobot for them.
+
 import os
 import signal
 import sys

@@ -5,6 +5,12 @@
 `cargo xtask test --all rerun` builds the tool, and installs Rerun and the package first.
 """
 
+# /// script
+# requires-python = ">=3.11"
+# dependencies = ["maturin>=1.9,<2", "rerun-sdk>=0.41"]
+# ///
+# It takes 0.9 GB.
+
 import os
 import signal
 import subprocess

@@ -7,6 +7,12 @@ HIVTAC_TOOL is built with the features `ros2` and `foxglove`. `cargo xtask test 
 these programs and installs the packages first.
 """
 
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["cyclonedds", "mcap-ros2-support", "websockets"]
+# ///
+# There must be cyclonedds for this Python and computer.
+
 import gc
 import io
 import json

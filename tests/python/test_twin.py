@@ -5,6 +5,11 @@
 `cargo xtask test --all mujoco` installs MuJoCo and the package first.
 """
 
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["maturin>=1.9,<2", "mujoco>=3.3"]
+# ///
+
 import sys
 import unittest
 from pathlib import Path

@@ -7,6 +7,11 @@ HIVTAC_TOOL is built with the feature `zenoh`. `cargo xtask test --all zenoh` bu
 installs the packages first.
 """
 
+# /// script
+# requires-python = ">=3.10"
+# dependencies = ["zenoh-ros2-sdk>=0.1.8"]
+# ///
+
 import json
 import os
 import signal

@@ -154,15 +154,9 @@ fn a_unit_gets_a_model_of_its_own() {
         &["export", "--weights", "unit.weights", "--out", "unit.hvtm"],
         "",
     );
-    let evaluate = [
-        "evaluate",
-        "--model",
-        "unit.hvtm",
-        "--data",
-        "data.csv",
-        "--out",
-        "report.html",
-    ];
+    let evaluate: Vec<_> = "evaluate --model unit.hvtm --data data.csv --out report.html"
+        .split(' ')
+        .collect();
     let judged = calibrate(here, &evaluate, "");
     let strong = "|F| ≥ 50 mN";
     let direction_deg = number(&judged, strong, "found and true force, °:");

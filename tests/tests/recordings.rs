@@ -108,15 +108,9 @@ fn a_recording_is_read_by_pypis_readers_and_played_as_it_was() {
 #[test]
 fn the_firmware_passes_a_check_and_an_impossible_one_fails() {
     let rig = Rig::start(&["--scene", "demo"]).unwrap();
-    let options = [
-        "--json",
-        "--seconds",
-        "4",
-        "--min-rate",
-        "156",
-        "--max-loss",
-        "0",
-    ];
+    let options: Vec<_> = "--json --seconds 4 --min-rate 156 --max-loss 0"
+        .split(' ')
+        .collect();
     let output = tool(&rig, "check", &options).unwrap();
     assert_eq!(output.code, Some(0), "{output:?}");
     let report = &json_lines(&output.out).unwrap()[0];

@@ -8,7 +8,7 @@ use crate::rig::{Rig, TIMEOUT_S, exposed, tool};
 use hivtac_host::link::Link;
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::{Captured, Device};
-use hivtac_host::live::hand::Touch;
+use hivtac_host::live::hand::Press;
 use hivtac_host::live::pair::PairFilm;
 use hivtac_host::port::Address;
 use hivtac_terms::camera::CameraSettings;
@@ -314,13 +314,13 @@ fn a_twin_of_eight_dots_sends_the_bytes_of_the_flashed_program() {
 }
 
 /// Two needles.
-const NEEDLES: [Touch; 2] = [
-    Touch {
+const NEEDLES: [Press; 2] = [
+    Press {
         place_mm: [-2.5, 1.0],
         force_n: 0.05,
         angles_deg: [3.0, -2.0],
     },
-    Touch {
+    Press {
         place_mm: [1.5, 0.5],
         force_n: 0.05,
         angles_deg: [0.0, 4.0],

@@ -1,6 +1,6 @@
 //! Tests of the wire format's golden vectors, `tests/vectors/wire.json`. An implementation that
-//! shares no code with the Rust one made them. They equal what `hivtac-wire` writes and reads, and
-//! what `docs/wire.md` quotes.
+//! shares no code with the Rust one made them. They equal what `hivtac-wire` writes and reads, what
+//! `docs/wire.md` quotes, and `tests/vectors/wire-annotated.txt`.
 
 use hivtac_terms::camera::{CameraLimits, CameraSettings, Rate, RateLimits, White};
 use hivtac_terms::conditions::CentroidEstimator;
@@ -27,6 +27,7 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 
 const VECTORS: &str = include_str!("../vectors/wire.json");
+const ANNOTATED: &str = include_str!("../vectors/wire-annotated.txt");
 const DOCUMENT: &str = include_str!("../../docs/wire.md");
 
 fn vectors() -> Value {
@@ -807,56 +808,32 @@ fn the_document_states_the_limits_of_the_code() {
     }
 }
 
-/// Returns the blocks of the document that open with "```text KIND NAME": name and bytes.
-fn quoted(kind: &str) -> Vec<(&'static str, Vec<u8>)> {
-    let opening = format!("text {kind} ");
+/// Returns the bytes of the document's block that opens with this line.
+fn quoted(opening: &str) -> Vec<u8> {
     let blocks = DOCUMENT.split("```").skip(1).step_by(2);
-    let blocks = blocks.filter_map(|block| block.strip_prefix(&opening));
-    blocks
-        .map(|block| {
-            let (name, text) = block.split_once('\n').expect("a line with the name");
-            (name, bytes_of(text))
-        })
-        .collect()
-}
-
-/// Returns every frame of the vectors, valid ones and invalid ones.
-fn all_frames() -> BTreeMap<String, Vec<u8>> {
-    let all = vectors();
-    let rejected = all["rejected"].as_object().unwrap().clone();
-    let rejected = rejected
-        .iter()
-        .map(|(name, entry)| (name.clone(), hex(&entry["frame"])));
-    let sections = ["device", "host", "foreign"].map(frames);
-    sections.into_iter().flatten().chain(rejected).collect()
+    let mut blocks = blocks.filter_map(|block| block.strip_prefix(opening));
+    bytes_of(blocks.next().expect("the block"))
 }
 
 #[test]
 fn the_document_quotes_the_vectors() {
-    let quotes = quoted("frame");
-    assert!(
-        quotes.len() >= 11,
-        "only {} frames are quoted",
-        quotes.len()
-    );
-    let frames = all_frames();
-    for (name, bytes) in quotes {
-        assert_eq!(frames.get(name), Some(&bytes), "{name}");
-    }
+    let frame = &frames("device")["sample-force"];
+    assert_eq!(quoted("text frame sample-force\n"), *frame);
+    let body = quoted("text body sample-force\n");
+    assert_eq!(body, remove_cobs(frame));
 }
 
 #[test]
-fn the_documents_field_by_field_bytes_are_the_contents_of_the_frames() {
-    let quotes = quoted("body");
-    assert!(
-        quotes.len() >= 10,
-        "only {} bodies are quoted",
-        quotes.len()
-    );
-    let frames = all_frames();
-    for (name, bytes) in quotes {
-        assert_eq!(remove_cobs(&frames[name]), bytes, "{name}");
-    }
+fn the_bytes_field_by_field_are_the_contents_of_the_frames() {
+    let blocks = ANNOTATED.split("\n\n").map(|block| {
+        let (name, text) = block.split_once('\n').expect("a line with the name");
+        (name.to_owned(), bytes_of(text))
+    });
+    let sections = ["device", "host", "foreign"].map(frames);
+    let frames = sections.into_iter().flatten();
+    let contents = frames.map(|(name, frame)| (name, remove_cobs(&frame)));
+    let contents: BTreeMap<_, _> = contents.collect();
+    assert_eq!(blocks.collect::<BTreeMap<_, _>>(), contents);
 }
 
 /// Returns the content of a good frame, which is given with its closing zero.

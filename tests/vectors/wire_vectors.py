@@ -3,7 +3,8 @@
 
 An implementation of its own, sharing nothing with the Rust one, so that the two check each other:
     python3 tests/vectors/wire_vectors.py
-rewrites wire.json beside this file, and the schema hash and annotated bytes of docs/wire.md.
+rewrites wire.json and wire-annotated.txt beside this file, and the schema hash and example of
+docs/wire.md.
 """
 
 import json
@@ -564,26 +565,26 @@ def document():
     }
 
 
-def annotated(name, fields):
-    """Blocks of docs/wire.md by their titles: the body field by field, and the frame."""
+def annotated(fields):
+    """The body of a message field by field, and its checksum."""
     content = body(fields)
     crc = zlib.crc32(content)
     rows = list(fields) + [(crc.to_bytes(4, "little"), f"CRC-32 {crc:#010x}")]
     width = [35 if len(data) < 12 else 0 for data, _ in rows]
-    lines = [f"{data.hex(' '):<{w}} # {note}\n" for w, (data, note) in zip(width, rows)]
-    return {f"body {name}": "".join(lines), f"frame {name}": frame(content).hex(" ") + "\n"}
+    return "".join(
+        f"{data.hex(' '):<{w}} # {note}\n" for w, (data, note) in zip(width, rows)
+    )
 
 
-def written_into(text):
+def written_into(text, messages):
     """docs/wire.md with this schema hash and these bytes."""
-    blocks = {"frame bad-crc": bad_crc().hex(" ") + "\n"}
-    for name, fields in {**HOST, **DEVICE, **FOREIGN}.items():
-        blocks |= annotated(name, fields)
 
     def block(match):
-        return f"```text {match[1]}\n{blocks[match[1]]}```"
+        kind, fields = match[1], messages[match[2]]
+        data = annotated(fields) if kind == "body" else frame(body(fields)).hex(" ") + "\n"
+        return f"```text {kind} {match[2]}\n{data}```"
 
-    text = re.sub(r"```text ((?:body|frame) [\w-]+)\n.*?```", block, text, flags=re.S)
+    text = re.sub(r"```text (body|frame) ([\w-]+)\n.*?```", block, text, flags=re.S)
     return re.sub(r"schema hash \*\*0x\w+\*\*", f"schema hash **{SCHEMA:#018x}**", text)
 
 
@@ -591,5 +592,8 @@ if __name__ == "__main__":
     here = pathlib.Path(__file__).parent
     vectors = json.dumps(document(), indent=2, ensure_ascii=False)
     (here / "wire.json").write_text(vectors + "\n")
+    messages = {**HOST, **DEVICE, **FOREIGN}
+    blocks = [f"{name}\n{annotated(fields)}" for name, fields in messages.items()]
+    (here / "wire-annotated.txt").write_text("\n".join(blocks))
     page = here.parent.parent / "docs" / "wire.md"
-    page.write_text(written_into(page.read_text()))
+    page.write_text(written_into(page.read_text(), messages))

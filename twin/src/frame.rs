@@ -126,11 +126,4 @@ impl Frame {
         }
         Cow::Borrowed(&self.pixels)
     }
-
-    /// Returns the frame as a binary PPM picture.
-    pub fn to_ppm(&self) -> Vec<u8> {
-        let mut ppm = format!("P6\n{} {}\n255\n", self.width, self.height).into_bytes();
-        ppm.extend(self.to_rgb888());
-        ppm
-    }
 }

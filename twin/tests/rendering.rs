@@ -218,17 +218,6 @@ fn extremes_render() {
     assert!(middle.iter().all(|&p| is_red(p)), "red from side to side");
 }
 
-#[test]
-fn a_ppm_holds_the_pixels() {
-    let frame = rendered(Preset::Paper, (160, 120), &Options::default(), &Load::REST);
-    let ppm = frame.to_ppm();
-    let header = b"P6\n160 120\n255\n";
-    assert_eq!(&ppm[..header.len()], header);
-    let first = channels(frame.pixels[0]).map(|c| c as u8);
-    assert_eq!(&ppm[header.len()..][..3], first);
-    assert_eq!(ppm.len(), header.len() + 160 * 120 * 3);
-}
-
 /// Returns the area that passes each format's counterpart of the default threshold, as a share of
 /// the true discs.
 fn markers_found(format: Format, passes: impl Fn(&Frame, usize) -> bool) -> f64 {

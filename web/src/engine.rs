@@ -5,10 +5,8 @@ use crate::recorder::{Recorded, Recorder};
 use crate::simulated::Simulated;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::live::camera;
-use hivtac_host::live::hand::Touch;
-use hivtac_host::live::run::FrameTruth;
 use hivtac_host::page::rows::{self, Event};
-use hivtac_host::page::{self, Cursor, Feed, Order, Press, State, Truth};
+use hivtac_host::page::{self, Cursor, Feed, Order, State};
 use hivtac_host::usual_tare::TARE_PATIENCE;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_twin::Layout;
@@ -38,7 +36,7 @@ pub struct Engine {
     recorder: Recorder,
     /// Time since 1970 when the page's time was 0, ns.
     epoch_ns: u64,
-    told_us: u64,
+    delivered_us: u64,
     heard_us: u64,
     events: Vec<Event>,
     /// Bytes that events announce, in their order.
@@ -91,7 +89,7 @@ impl Engine {
             feed,
             recorder: Recorder::default(),
             epoch_ns,
-            told_us: now_us,
+            delivered_us: now_us,
             heard_us: now_us,
             events: Vec::new(),
             blobs: VecDeque::new(),
@@ -121,7 +119,9 @@ impl Engine {
         let mut wait_us = TURN_EVERY_US;
         if let Some(mut simulated) = self.simulated.take() {
             let (truths, next_us) = simulated.turn(now);
-            truths.iter().for_each(|told| self.feed.truth(truth(told)));
+            truths
+                .iter()
+                .for_each(|frame| self.feed.truth(frame.of_page()));
             wait_us = wait_us.min(next_us);
             self.exchange(&mut simulated, now());
             self.simulated = Some(simulated);
@@ -277,7 +277,7 @@ impl Engine {
                 let Some(simulated) = &self.simulated else {
                     return self.answer(ticket, false, "only a simulated film can be pressed");
                 };
-                simulated.press(fingers.map(|press| press.map(touch)));
+                simulated.press(fingers);
                 self.answer(ticket, true, "");
             }
             Order::Record => {
@@ -298,16 +298,16 @@ impl Engine {
                 self.answer(ticket, true, &text);
                 self.tell(now_us);
             }
-            order => match order.asked(&state.hello, PATIENCE) {
-                Ok(Some(asked)) => {
+            order => match order.command(&state.hello, PATIENCE) {
+                Ok(Some(command)) => {
                     let commands = [
-                        (asked.request, asked.patience),
+                        (command.request, command.patience),
                         (Request::GetInfo, PATIENCE),
                     ];
                     self.conversation.ask(Job {
                         ticket: Some(ticket),
                         commands: commands.into(),
-                        done: asked.done,
+                        done: command.done,
                     });
                     // A device that does not tell its settings has obeyed all the same.
                     self.ask(None, Request::GetSettings);
@@ -344,13 +344,13 @@ impl Engine {
     }
 
     fn tell_now_and_then(&mut self, now_us: u64) {
-        if now_us - self.told_us >= TELL_EVERY_US {
+        if now_us - self.delivered_us >= TELL_EVERY_US {
             self.tell(now_us);
         }
     }
 
     fn tell(&mut self, now_us: u64) {
-        self.told_us = now_us;
+        self.delivered_us = now_us;
         if let Some(state) = &self.state {
             self.feed.state(state.json(self.recorder.state()));
         }
@@ -372,17 +372,4 @@ impl Engine {
     pub fn blob(&mut self) -> Vec<u8> {
         self.blobs.pop_front().unwrap_or_default()
     }
-}
-
-fn touch(press: Press) -> Touch {
-    Touch {
-        place_mm: press.place_mm,
-        force_n: press.force_n,
-        angles_deg: press.angles_deg,
-    }
-}
-
-fn truth(told: &FrameTruth) -> Truth {
-    let (newtons, angles, place) = told.integers();
-    Truth(told.frame, newtons, angles, place)
 }

@@ -127,17 +127,17 @@ pub extern "C" fn start_loader(ticket: u32) {
 #[unsafe(no_mangle)]
 pub extern "C" fn firmware() -> usize {
     let board = with(|engine| engine.board().map(str::to_owned));
-    let told =
+    let facts =
         FIRMWARE.with_borrow_mut(|firmware| input(|file| firmware.choose(file, board.as_deref())));
-    put(told.to_string().into_bytes())
+    put(facts.to_string().into_bytes())
 }
 
 /// Puts out what is written into a device whose flash begins with the bytes that were put in: a
 /// line of JSON, then the bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn firmware_parts() -> usize {
-    let (told, bytes) = FIRMWARE.with_borrow(|firmware| input(|found| firmware.parts(found)));
-    put([told.to_string().into_bytes(), vec![b'\n'], bytes].concat())
+    let (facts, bytes) = FIRMWARE.with_borrow(|firmware| input(|found| firmware.parts(found)));
+    put([facts.to_string().into_bytes(), vec![b'\n'], bytes].concat())
 }
 
 /// Puts the events since the last call out, as JSON; returns their length.

@@ -35,12 +35,12 @@ impl Firmware {
         };
         match image.parts(found) {
             Ok(parts) => {
-                let told: Vec<_> = parts
+                let listed: Vec<_> = parts
                     .iter()
                     .map(|part| (part.address, part.bytes.len()))
                     .collect();
                 let bytes = parts.iter().flat_map(|part| part.bytes).copied().collect();
-                (json!({ "parts": told }), bytes)
+                (json!({ "parts": listed }), bytes)
             }
             Err(refusal) => (json!({ "why": refusal.to_string() }), Vec::new()),
         }

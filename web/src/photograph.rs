@@ -46,7 +46,7 @@ fn try_to(levels: &[u8], width: u16, height: u16) -> Result<Vec<u8>, String> {
         contacts: measurement.contacts,
         markers: measurement.markers.unwrap_or_default(),
     };
-    let told = json!({
+    let answer = json!({
         "sample": rows::row(&sample),
         "lights": lights::of(sample.status),
     });
@@ -72,6 +72,6 @@ fn try_to(levels: &[u8], width: u16, height: u16) -> Result<Vec<u8>, String> {
         frame,
         sample: Some(sample),
     };
-    let line = told.to_string() + "\n";
+    let line = answer.to_string() + "\n";
     Ok([line.into_bytes(), picture::bytes(&taken, &hello)].concat())
 }

@@ -3,7 +3,7 @@
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
-use hivtac_host::live::hand::{Fingers, Hand, Touch};
+use hivtac_host::live::hand::{Fingers, Hand, Press};
 use hivtac_host::live::run::{Due, FrameTruth, Frames, device_id};
 use hivtac_twin::{Layout, units};
 use hivtac_wire::frame::{MAX_DEVICE_FRAME, encode};
@@ -45,7 +45,7 @@ impl Simulated {
     /// Presses the film in this way from now on.
     pub fn press(&self, fingers: Fingers) {
         self.hand
-            .set(fingers.map(|touch| touch.and_then(Touch::in_range)));
+            .set(fingers.map(|touch| touch.and_then(Press::in_range)));
     }
 
     /// Takes the frames that are due; returns the truth in each, and the time to the next one, µs.
@@ -59,8 +59,8 @@ impl Simulated {
                     if late > 0 {
                         self.device.missed(late);
                     }
-                    let (captured, told, missed) = self.frames.take(camera);
-                    truths.push(told);
+                    let (captured, truth, missed) = self.frames.take(camera);
+                    truths.push(truth);
                     self.device.frame(&captured, missed, now);
                 }
             }

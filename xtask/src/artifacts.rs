@@ -11,7 +11,7 @@ use hivtac_wire::image::Image;
 use serde_json::Value;
 
 use crate::process;
-use crate::toolchain::{self, build_for_target, cargo, work_folder};
+use crate::toolchain::{self, M55_TARGET, TARGET, WEB_TARGET, build_for, cargo, work_folder};
 
 /// The cargo profile of programs that run on this computer, which builds quickly.
 pub const TOOLS: &str = "tools";
@@ -33,46 +33,24 @@ pub enum Board {
     OpenmvH7,
 }
 
-/// Feature of the firmware with all seeded bugs. The rig chooses one and must detect it.
-const SEEDED_BUGS: &str = "seeded-bugs";
-
-/// The programs that the tests of the rig and across rooms run.
-pub struct Programs {
-    firmware: PathBuf,
-    /// The folder with the other ELFs, by their names: with seeded bugs, with the model for YUV422,
-    /// for the second board.
-    others: PathBuf,
-}
-
-impl Programs {
-    /// Builds the programs.
-    pub fn build() -> Result<Programs> {
-        let others = work_folder("bugs")?;
-        let keep = |mut command: Command, name: &str| {
-            let elf = build(&mut command, "hivtac-firmware")?;
-            copy(&elf, &others.join(name).with_extension("elf"))
-        };
-        keep(with_bugs(Board::Weact)?, SEEDED_BUGS)?;
-        keep(with_bugs(Board::OpenmvH7)?, "openmv-h7-seeded-bugs")?;
-        let mut yuv422 = firmware_command(Board::Weact, "");
-        yuv422.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
-        keep(yuv422, "yuv422")?;
-        keep(firmware_command(Board::OpenmvH7, ""), "openmv-h7")?;
-        // Last, because cargo's own file must be the firmware without bugs.
-        let firmware = firmware(Board::Weact)?;
-        Ok(Programs { firmware, others })
+/// Builds the firmware for all tests; returns it as it is flashed. The others are in the folder
+/// `bugs`: with seeded bugs, of which the rig chooses one and must detect it, with the model for
+/// YUV422, for the second board.
+pub fn test_firmware() -> Result<PathBuf> {
+    let [mut yuv422, openmv] = [Board::Weact, Board::OpenmvH7].map(|it| firmware_command(it, ""));
+    yuv422.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
+    let [bugs, openmv_bugs, _] = for_target();
+    for (mut command, name) in [
+        (bugs, "seeded-bugs.elf"),
+        (openmv_bugs, "openmv-h7-seeded-bugs.elf"),
+        (yuv422, "yuv422.elf"),
+        (openmv, "openmv-h7.elf"),
+    ] {
+        let elf = build(&mut command, "hivtac-firmware")?;
+        copy(&elf, &work_folder("bugs")?.join(name))?;
     }
-
-    /// The firmware as it is flashed.
-    pub fn firmware(&self) -> &Path {
-        &self.firmware
-    }
-
-    /// Sets the environment variables by which a test runner finds the programs.
-    pub fn name_to(&self, command: &mut Command) {
-        command.env("HIVTAC_ELF", &self.firmware);
-        command.env("HIVTAC_BUG_ELFS", &self.others);
-    }
+    // Last, because cargo's own file must be the firmware without bugs.
+    firmware(Board::Weact)
 }
 
 /// Builds the firmware as it is flashed.
@@ -93,7 +71,7 @@ pub fn images() -> Result<[Image; 2]> {
 
 /// The cargo command that builds the firmware for a board, with `feature` unless it is empty.
 pub fn firmware_command(board: Board, feature: &str) -> Command {
-    let mut command = build_for_target("");
+    let mut command = build_for(TARGET, "");
     command.args(["--package", "hivtac-firmware", "--features", feature]);
     if board == Board::OpenmvH7 {
         command.args(["--no-default-features", "--features", "board-openmv-h7"]);
@@ -101,22 +79,14 @@ pub fn firmware_command(board: Board, feature: &str) -> Command {
     command
 }
 
-/// The cargo command that builds the firmware with seeded bugs, which is never flashed. It lints
-/// as builds for this computer do.
-fn with_bugs(board: Board) -> Result<Command> {
-    let mut command = firmware_command(board, SEEDED_BUGS);
-    if LINTING.load(Ordering::Relaxed) {
-        toolchain::lint_for_target(&mut command)?;
-    }
-    Ok(command)
-}
-
-/// The cargo commands that build what lints of the microcontroller's programs check: a firmware of
-/// the tests for each board, and the image for QEMU.
+/// The cargo commands that build what lints of the microcontroller's programs check: for each board
+/// the firmware with all seeded bugs, which is never flashed, and the image for QEMU.
 pub fn for_target() -> [Command; 3] {
-    let [weact, openmv] =
-        [Board::Weact, Board::OpenmvH7].map(|board| firmware_command(board, SEEDED_BUGS));
-    [weact, openmv, qemu_image_command()]
+    let [mut weact, mut openmv] =
+        [Board::Weact, Board::OpenmvH7].map(|board| firmware_command(board, "seeded-bugs"));
+    lint_if_linting(&mut weact);
+    lint_if_linting(&mut openmv);
+    [weact, openmv, build_for(TARGET, QEMU_IMAGE)]
 }
 
 /// Builds the host tool as it is installed.
@@ -204,10 +174,14 @@ fn host_cargo(verb: &str) -> Command {
     let mut command = cargo(verb, "");
     command.args(["--profile", TOOLS, "--ignore-rust-version", "--workspace"]);
     command.args(["--exclude", "hivtac-firmware"]);
-    if LINTING.load(Ordering::Relaxed) {
-        toolchain::lint(&mut command);
-    }
+    lint_if_linting(&mut command);
     command
+}
+
+fn lint_if_linting(command: &mut Command) {
+    if LINTING.load(Ordering::Relaxed) {
+        toolchain::lint(command);
+    }
 }
 
 /// Runs `cargo build`; an error if it gives warnings.
@@ -215,7 +189,7 @@ pub fn without_warnings(mut command: Command) -> Result<()> {
     let mut warnings = 0;
     for_each_message(command.arg("--message-format=json"), |message| {
         let said = &message["message"];
-        if let ("compiler-message", Some(text)) = (reason(message), said["rendered"].as_str()) {
+        if let Some(text) = said["rendered"].as_str() {
             process::say(text);
             warnings += usize::from(said["level"] == "warning");
         }
@@ -224,42 +198,32 @@ pub fn without_warnings(mut command: Command) -> Result<()> {
     Ok(())
 }
 
-/// Builds the sensing as a Cortex-M7 program for QEMU.
-pub fn qemu_image() -> Result<PathBuf> {
-    build(&mut qemu_image_command(), "hivtac-qemu-image")
-}
-
-/// The cargo command that builds it.
-fn qemu_image_command() -> Command {
-    build_for_target(QEMU_IMAGE)
-}
-
-/// Builds the same as a Cortex-M55 program.
-pub fn m55_image() -> Result<PathBuf> {
-    build(
-        &mut toolchain::build_for_m55(QEMU_IMAGE)?,
-        "hivtac-qemu-image",
-    )
-}
-
 /// The folder of the program for QEMU.
 const QEMU_IMAGE: &str = "tests/qemu";
 
+/// Builds the sensing as a Cortex-M7 program for QEMU.
+pub fn qemu_image() -> Result<PathBuf> {
+    build(&mut build_for(TARGET, QEMU_IMAGE), "hivtac-qemu-image")
+}
+
+/// Builds the same as a Cortex-M55 program, whose target is added if it is missing.
+pub fn m55_image() -> Result<PathBuf> {
+    toolchain::ensure_target(M55_TARGET)?;
+    build(&mut build_for(M55_TARGET, QEMU_IMAGE), "hivtac-qemu-image")
+}
+
 /// Builds the WebAssembly module of the page that needs no server.
 pub fn web_module() -> Result<PathBuf> {
-    toolchain::ensure_web_target()?;
-    let mut command = cargo(
-        "rustc --profile web --lib --crate-type cdylib --package",
-        "",
-    );
-    command.args(["hivtac-web", "--target", toolchain::WEB_TARGET]);
-    build(&mut command, "hivtac_web")
+    toolchain::ensure_target(WEB_TARGET)?;
+    let words = "rustc --profile web --package hivtac-web --lib --crate-type cdylib --target";
+    build(cargo(words, "").arg(WEB_TARGET), "hivtac_web")
 }
 
 /// Builds the plugin that counts instructions, for a version of QEMU's plugin interface.
 pub fn instruction_counter(version: u32) -> Result<PathBuf> {
-    let mut command = cargo("build --package xtask --example instruction-counter", "");
-    command.args(["--profile", TOOLS]);
+    let words = "build --package xtask --example instruction-counter --profile";
+    let mut command = cargo(words, "");
+    command.arg(TOOLS);
     if version >= 2 {
         command.args(["--features", "plugin-api-2"]);
     }
@@ -269,31 +233,18 @@ pub fn instruction_counter(version: u32) -> Result<PathBuf> {
 /// Runs `cargo build`; returns the file that it made for the target of this name.
 pub fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
     let mut found = None;
-    for_each_message(
-        command.arg("--message-format=json-render-diagnostics"),
-        |message| {
-            if let Some(file) = artifact(message, target) {
-                found = Some(file);
-            }
-        },
-    )?;
+    command.arg("--message-format=json-render-diagnostics");
+    for_each_message(command, |message| {
+        if message["reason"] == "compiler-artifact" && message["target"]["name"] == target {
+            let file = message["executable"].as_str();
+            found = file.or(message["filenames"][0].as_str()).map(PathBuf::from);
+        }
+    })?;
     found.with_context(|| format!("`{command:?}` made no {target}"))
 }
 
-/// The file of a cargo message; `None` if it is not the artifact of `target`.
-fn artifact(message: &Value, target: &str) -> Option<PathBuf> {
-    let is_it = reason(message) == "compiler-artifact" && message["target"]["name"] == target;
-    let file = message["executable"]
-        .as_str()
-        .or_else(|| message["filenames"][0].as_str());
-    file.filter(|_| is_it).map(PathBuf::from)
-}
-
-fn reason(message: &Value) -> &str {
-    message["reason"].as_str().unwrap_or("")
-}
-
-fn for_each_message(command: &mut Command, mut each: impl FnMut(&Value)) -> Result<()> {
+/// Runs a cargo command that sends messages in JSON; passes each of them to `each`.
+pub fn for_each_message(command: &mut Command, mut each: impl FnMut(&Value)) -> Result<()> {
     process::for_each_line(command, |line| {
         if let Ok(message) = serde_json::from_str(line) {
             each(&message);

@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::{Args, ValueEnum};
+use serde::Deserialize;
 
 use crate::artifacts::{self, Board};
 use crate::rig::Rig;
@@ -22,59 +23,43 @@ pub struct Demo {
     /// The board: the first has an OV7725 unless --camera says otherwise, the second an MT9V034.
     #[arg(long, value_enum, default_value_t)]
     board: Board,
-    /// The camera in the first board's socket: the firmware takes either.
-    #[arg(long, value_enum)]
-    camera: Option<Camera>,
+    /// The camera in the first board's socket, of 156 or 119 frames a second: the firmware takes
+    /// either.
+    #[arg(long, value_parser = ["ov7725", "ov5640"])]
+    camera: Option<String>,
     /// Dots on the film: four, which the built-in model is for, or eight, whose model is sent
     /// first.
-    #[arg(long, default_value_t = FOUR, value_parser = dots)]
-    dots: u8,
+    #[arg(long, default_value = "4", value_parser = ["4", EIGHT])]
+    dots: String,
 }
 
-/// The cameras for the first board's socket.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Camera {
-    /// 156 frames a second.
-    Ov7725,
-    /// 119 frames a second.
-    Ov5640,
-}
+/// The other number of dots, and its model.
+const EIGHT: &str = "8";
+const MODEL_OF_EIGHT: &str = "calibration/models/8v/default.hvtm";
 
-/// The built-in model's number of dots.
-const FOUR: u8 = 4;
-/// The model of eight dots.
-const EIGHT_DOTS: &str = "calibration/models/8v/default.hvtm";
-
-/// Reads a number of dots.
-fn dots(text: &str) -> Result<u8, String> {
-    match text {
-        "4" => Ok(FOUR),
-        "8" => Ok(8),
-        _ => Err("4 or 8".to_owned()),
-    }
+/// What the demo runs, and the folder of its logs.
+struct Programs {
+    firmware: PathBuf,
+    rig: PathBuf,
+    tool: PathBuf,
+    folder: PathBuf,
 }
 
 impl Demo {
     /// Builds the programs, runs the rig, and shows the host tool's output; names the rig's log
     /// after a failure.
     pub fn run(&self) -> Result<()> {
+        let is_usual = self.dots != EIGHT && self.camera.is_none();
         ensure!(
-            self.dots == FOUR || self.board == Board::default(),
-            "eight dots are for the first board: leave --board out"
-        );
-        ensure!(
-            self.camera.is_none() || self.board == Board::default(),
-            "an OV7725 or OV5640 is for the first board: leave --board out"
+            is_usual || self.board == Board::default(),
+            "--dots and --camera are for the first board: leave --board out"
         );
         let start = Instant::now();
         let programs = self.build()?;
         let built = start.elapsed().as_secs_f64();
-        let folder = toolchain::work_folder("demo")?;
-        let files = ["truth.jsonl", "arrivals.jsonl", "rig.log", "flash"];
-        let logs = files.map(|name| folder.join(name));
-        let [truth, _, log, _] = &logs;
-        if let Err(error) = self.show(&programs, &logs) {
-            let text = std::fs::read_to_string(log).unwrap_or_default();
+        let log = programs.folder.join("rig.log");
+        if let Err(error) = self.show(&programs, &log) {
+            let text = std::fs::read_to_string(&log).unwrap_or_default();
             let lines: Vec<&str> = text.lines().collect();
             let last = lines[lines.len().saturating_sub(20)..].join("\n");
             eprintln!("\nThe last lines of the rig's log:\n{last}");
@@ -82,7 +67,7 @@ impl Demo {
         }
         let shown = start.elapsed().as_secs_f64() - built;
         eprintln!("\nbuilt in {built:.1} s, shown in {shown:.1} s");
-        eprintln!("truth: {}\nlog:   {}", truth.display(), log.display());
+        eprintln!("truth and logs: {}", programs.folder.display());
         eprintln!(
             "\nGo on in real time, without the emulator: press a simulated film in a browser with\n\
              \n  cargo install --path host-tool && hivtac view --twin\n\nor run `hivtac twin`, \
@@ -92,53 +77,51 @@ impl Demo {
     }
 
     /// Builds the firmware while the rig is built, whose emulator takes longest, and the host tool.
-    fn build(&self) -> Result<[PathBuf; 3]> {
+    fn build(&self) -> Result<Programs> {
         eprintln!(
             "Building the firmware, the emulated board and the host tool: some four minutes the \
              first time on two cores, a second from then on."
         );
         std::thread::scope(|scope| {
             let firmware = scope.spawn(|| artifacts::firmware(self.board));
-            let (rig, tool) = (
-                artifacts::host_program("hivtac-rig"),
-                artifacts::host_tool(),
-            );
+            let rig = artifacts::host_program("hivtac-rig");
+            let tool = artifacts::host_tool();
             let firmware = firmware.join();
-            let firmware = firmware.map_err(|_| anyhow!("building the firmware panicked"))?;
-            Ok([firmware?, rig?, tool?])
+            Ok(Programs {
+                firmware: firmware.map_err(|_| anyhow!("building the firmware panicked"))??,
+                rig: rig?,
+                tool: tool?,
+                folder: toolchain::work_folder("demo")?,
+            })
         })
     }
 
-    fn show(&self, programs: &[PathBuf; 3], logs: &[PathBuf; 4]) -> Result<()> {
-        let [truth, arrivals, log, flash] = logs;
-        let [firmware, rig, tool] = programs;
-        let (frames, board) = (self.frames.to_string(), self.board.to_possible_value());
+    fn show(&self, programs: &Programs, log: &Path) -> Result<()> {
+        let [truth, arrivals, flash] =
+            ["truth.jsonl", "arrivals.jsonl", "flash"].map(|name| programs.folder.join(name));
+        let board = self.board.to_possible_value();
         let board = board.context("a board without a name")?;
-        let has_own_model = self.dots != FOUR;
-        if has_own_model {
-            send_model(programs, flash, log)?;
-        }
-        eprintln!("The board boots, and {frames} frames pass: some half a minute.");
-        let mut command = Command::new(rig);
-        if has_own_model {
+        let mut command = Command::new(&programs.rig);
+        if self.dots == EIGHT {
+            send_model(programs, &flash, log)?;
             command.args(["--layout", "8v", "--flash"]).arg(flash);
         }
+        let frames = self.frames.to_string();
+        eprintln!("The board boots, and {frames} frames pass: some half a minute.");
         command.args("--scene demo --pty --board".split(' '));
-        command.arg(board.get_name()).arg("--truth").arg(truth);
-        if let Some(camera) = self.camera.and_then(|camera| camera.to_possible_value()) {
-            command.arg("--camera").arg(camera.get_name());
+        command.arg(board.get_name()).arg("--truth").arg(&truth);
+        if let Some(camera) = &self.camera {
+            command.args(["--camera", camera]);
         }
-        let rig = Rig::start(command.arg("--arrivals").arg(arrivals).arg(firmware), log)?;
-        // The emulated board boots slower than a real one.
-        let at = ["--port", &rig.port, "--timeout", "120"];
+        command.arg("--arrivals").arg(&arrivals);
+        let rig = Rig::start(command.arg(&programs.firmware), log)?;
         // The demo's tip is a needle; on a new device it could be anything.
         let needle = ["settings", "set", "contact", "needle"];
-        process::run(Command::new(tool).args(needle).args(at))?;
-        let mut monitor = Command::new(tool);
-        monitor.arg("monitor").args(at).args(["--frames", &frames]);
-        process::run(monitor.arg("--truth").arg(truth))?;
+        process::run(&mut rig.ask(&programs.tool, &needle))?;
+        let mut monitor = rig.ask(&programs.tool, &["monitor", "--frames", &frames]);
+        process::run(monitor.arg("--truth").arg(&truth))?;
         rig.finish()?;
-        let (rate_hz, latency_ms) = rate_and_latency(&times(truth)?, &times(arrivals)?)?;
+        let (rate_hz, latency_ms) = rate_and_latency(&times(&truth)?, &times(&arrivals)?)?;
         println!(
             "rate: {rate_hz:.1} forces a second; latency: {latency_ms:.2} ms from the middle of \
              the exposure to the last byte on USB"
@@ -149,32 +132,36 @@ impl Demo {
 
 /// Sends the model of eight dots to a new device, which keeps it in its flash. The camera is left
 /// out, as it takes most of the emulator's time.
-fn send_model([firmware, rig, tool]: &[PathBuf; 3], flash: &Path, log: &Path) -> Result<()> {
+fn send_model(programs: &Programs, flash: &Path, log: &Path) -> Result<()> {
     eprintln!("A device gets the model of eight dots: some half a minute.");
     if flash.exists() {
         std::fs::remove_file(flash).with_context(|| format!("removing {}", flash.display()))?;
     }
-    let mut command = Command::new(rig);
+    let mut command = Command::new(&programs.rig);
     command.args("--pty --exit-on-hangup --fault camera-absent --flash".split(' '));
-    let rig = Rig::start(command.arg(flash).arg(firmware), log)?;
-    let update = ["update", "model", EIGHT_DOTS, "--timeout", "120"];
-    process::run(Command::new(tool).args(update).args(["--port", &rig.port]))?;
+    let rig = Rig::start(command.arg(flash).arg(&programs.firmware), log)?;
+    let update = ["update", "model", MODEL_OF_EIGHT];
+    process::run(&mut rig.ask(&programs.tool, &update))?;
     rig.ended()
 }
 
-/// A time for each frame.
+/// A time for each frame, s.
 type Times = BTreeMap<u64, f64>;
+
+/// A line of the rig's logs.
+#[derive(Deserialize)]
+struct Line {
+    frame: u64,
+    time_s: f64,
+}
 
 /// Reads the times from a log of the rig.
 fn times(log: &Path) -> Result<Times> {
-    let mut times = Times::new();
-    for line in process::read(log)?.lines() {
-        let line: serde_json::Value = serde_json::from_str(line)?;
-        let time = line["frame"].as_u64().zip(line["time_s"].as_f64());
-        let (frame, time_s) = time.with_context(|| format!("reading {line}"))?;
-        times.insert(frame, time_s);
-    }
-    Ok(times)
+    let text = process::read(log)?;
+    let lines = text.lines().map(serde_json::from_str);
+    let times = lines.map(|line| line.map(|line: Line| (line.frame, line.time_s)));
+    let times: Result<Times, _> = times.collect();
+    times.with_context(|| format!("reading {}", log.display()))
 }
 
 /// The rate of the frames whose samples arrived, by the middles of their exposures, Hz. And the

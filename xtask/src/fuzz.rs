@@ -35,14 +35,13 @@ pub fn obstacle() -> Option<String> {
 /// input is saved and the fault is shown.
 pub fn run() -> Result<()> {
     let program = build()?;
-    let attacks = names()?.into_par_iter();
-    let ended: Vec<_> = attacks.map(|name| attack(&program, &name)).collect();
-    let mut failed = 0;
+    let corpora = toolchain::at("tests/fuzz/corpus").read_dir()?;
+    let corpora: Vec<PathBuf> = corpora.flatten().map(|entry| entry.path()).collect();
+    let attacks = corpora.par_iter().map(|corpus| attack(&program, corpus));
+    let ended: Vec<Result<String>> = attacks.collect();
+    let failed = ended.iter().filter(|end| end.is_err()).count();
     for end in ended {
-        process::say(&end.unwrap_or_else(|error| {
-            failed += 1;
-            format!("{error:#}")
-        }));
+        process::say(&end.unwrap_or_else(|error| format!("{error:#}")));
     }
     ensure!(failed == 0, "{failed} attacks found something: see above");
     Ok(())
@@ -52,49 +51,31 @@ pub fn run() -> Result<()> {
 /// are shared with other tests.
 fn build() -> Result<PathBuf> {
     let mut command = cargo("build --package hivtac-fuzz --profile", "");
-    command.args([
-        artifacts::TOOLS,
-        "--target",
-        &toolchain::rustc("--print host-tuple")?,
-    ]);
-    command.args(LINKED);
-    artifacts::build(command.env("RUSTFLAGS", COVERAGE), "hivtac-fuzz")
+    command.args([artifacts::TOOLS, "--target"]);
+    command.arg(toolchain::rustc("--print host-tuple")?);
+    command.args(LINKED).env("RUSTFLAGS", COVERAGE);
+    artifacts::build(&mut command, "hivtac-fuzz")
 }
 
-/// The names of the attacks, those of their corpora.
-fn names() -> Result<Vec<String>> {
-    let folder = toolchain::at("tests/fuzz/corpus").read_dir();
-    let entries = folder.context("reading tests/fuzz/corpus")?.flatten();
-    let mut names: Vec<_> = entries
-        .map(|entry| entry.file_name().display().to_string())
-        .collect();
-    names.sort();
-    Ok(names)
-}
-
-/// Runs one attack; returns the number of inputs that the attack withstood. New inputs that reach
-/// further, and inputs that fail, go to `found`, not into the corpus.
-fn attack(program: &Path, name: &str) -> Result<String> {
+/// Runs the attack of a corpus; returns the number of inputs that the attack withstood. New inputs
+/// that reach further, and inputs that fail, go to `found`, not into the corpus.
+fn attack(program: &Path, corpus: &Path) -> Result<String> {
+    let name = corpus.file_name().unwrap_or_default().display().to_string();
     let found = toolchain::work_folder(&format!("fuzz/found/{name}"))?;
     let mut command = Command::new(program);
-    command
-        .env("HIVTAC_ATTACK", name)
-        .arg(&found)
-        .arg(toolchain::at("tests/fuzz/corpus").join(name));
+    command.env("HIVTAC_ATTACK", &name).arg(&found).arg(corpus);
     command.arg("-print_final_stats=1").args(LIMITS);
-    command.arg(format!("-artifact_prefix={}/", found.display()));
+    let found = found.display();
+    command.arg(format!("-artifact_prefix={found}/"));
     let output = command
         .output()
         .with_context(|| format!("attacking {name}"))?;
-    let (said, found) = (String::from_utf8_lossy(&output.stderr), found.display());
-    let is_well = output.status.success();
+    let said = String::from_utf8_lossy(&output.stderr);
     ensure!(
-        is_well,
+        output.status.success(),
         "{said}\n{name} found something: see above, and {found}"
     );
     let tried = said.lines().find_map(|line| line.strip_prefix(TRIED));
-    Ok(format!(
-        "{name}: {} inputs withstood",
-        tried.unwrap_or("?").trim()
-    ))
+    let tried = tried.unwrap_or("?").trim();
+    Ok(format!("{name}: {tried} inputs withstood"))
 }

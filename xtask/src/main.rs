@@ -2,10 +2,8 @@
 
 mod artifacts;
 mod bench;
-mod debian;
 mod demo;
 mod fuzz;
-mod kit;
 mod linux_host;
 mod mutants;
 mod packages;
@@ -43,7 +41,7 @@ enum Task {
     /// Make the files of a release: programs, Python wheels and firmware, and install them.
     Release(release::Release),
     /// Write the sensor's printed parts: STL, STEP, drawings and pictures (docs/kit.md).
-    Kit(kit::Kit),
+    Kit(python::Kit),
     /// Build the page that needs no server: a simulated sensor and a real one in a browser.
     Web,
 }
@@ -62,7 +60,7 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> Result<()> {
     if !matches!(task, Task::Kit(_) | Task::Web) {
-        toolchain::ensure_target()?;
+        toolchain::ensure_target(toolchain::TARGET)?;
     }
     match task {
         Task::Demo(demo) => demo.run(),
@@ -70,7 +68,7 @@ fn run(task: Task) -> Result<()> {
         Task::Bench(bench) => bench.run(),
         Task::Release(release) => release.run(),
         Task::Mutants(mutants) => mutants.run(),
-        Task::Size => size::memories().map(|table| println!("{table}")),
+        Task::Size => size::run(),
         Task::Kit(kit) => kit.run(),
         Task::Web => web::run(),
     }

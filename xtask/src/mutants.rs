@@ -48,11 +48,8 @@ struct Mutant {
 impl Mutants {
     /// Makes the mistakes; an error if one is not noticed for which no reason is known.
     pub fn run(&self) -> Result<()> {
-        let portable = match self.files {
-            None => portable(),
-            Some(_) => Ok(()),
-        };
-        self.firmware().and(portable)
+        let portable = self.files.is_none().then(portable);
+        self.firmware().and(portable.unwrap_or(Ok(())))
     }
 
     fn firmware(&self) -> Result<()> {
@@ -64,20 +61,18 @@ impl Mutants {
             "no mistake in {LIST} is in a file whose path contains {files:?}"
         );
         let bench = Bench::new()?;
-        let tests = mutants.iter().flat_map(|mutant| &mutant.tests);
-        let passes = bench.passes(tests)?;
+        let passes = bench.passes(mutants.iter().flat_map(|mutant| &mutant.tests))?;
         ensure!(passes, "a test fails without a mistake: see above");
         let (mut noticed, mut unexplained) = (0, 0);
         for mutant in &mutants {
-            let result = match bench.survives(mutant) {
-                Ok(false) => "noticed",
-                Ok(true) if !mutant.survives.is_empty() => &mutant.survives,
-                Ok(true) => "NOT NOTICED",
-                Err(_) => "DOES NOT COMPILE",
+            let (result, count) = match bench.survives(mutant) {
+                Ok(false) => ("noticed", Some(&mut noticed)),
+                Ok(true) if !mutant.survives.is_empty() => (mutant.survives.as_str(), None),
+                Ok(true) => ("NOT NOTICED", Some(&mut unexplained)),
+                Err(_) => ("DOES NOT COMPILE", Some(&mut unexplained)),
             };
-            noticed += u32::from(result == "noticed");
-            unexplained += u32::from(result.starts_with("NOT ") || result.starts_with("DOES "));
             println!("{}: {:?}: {result}", mutant.file, mutant.to);
+            count.into_iter().for_each(|count| *count += 1);
         }
         println!("{noticed} of {} mistakes noticed", mutants.len());
         ensure!(unexplained == 0, "{unexplained} are not noticed: see above");

@@ -4,11 +4,19 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail};
 
-use crate::process::{self, command};
+use crate::process::{self, command, find_program};
+
+/// Installs a Debian package if this program of it is missing.
+pub fn ensure(program: &str, package: &str) -> Result<()> {
+    match find_program(program) {
+        Some(_) => Ok(()),
+        None => install(package, &format!("{program} is missing")),
+    }
+}
 
 /// Installs Debian packages as root or through sudo. Called only if something is missing: a
 /// complete machine needs no network.
-pub fn install(packages: &str, why: &str) -> Result<()> {
+fn install(packages: &str, why: &str) -> Result<()> {
     process::say(&format!("{why}: installing the Debian packages {packages}"));
     let sudo = match process::output(&mut command("id -u"))?.trim() {
         "0" => "",
@@ -17,7 +25,7 @@ pub fn install(packages: &str, why: &str) -> Result<()> {
         }
         _ => bail!("{why}; as root, install the packages: {packages}"),
     };
-    if process::find_program("apt-get").is_none() {
+    if find_program("apt-get").is_none() {
         bail!("{why}; this system has no apt-get: install what your system calls {packages}");
     }
     let apt_get = |words: &str| {
@@ -40,26 +48,10 @@ pub fn are_known(package: &str) -> bool {
     knows() || process::succeeds(&mut command("apt-get update")) && knows()
 }
 
-/// Installs QEMU's PC, if missing.
-pub fn ensure_qemu_pc() -> Result<()> {
-    if process::find_program("qemu-system-x86_64").is_none() {
-        install("qemu-system-x86", "the emulator of a PC is missing")?;
-    }
-    Ok(())
-}
-
-/// Installs QEMU's Cortex-M machines for tests and benchmark, if missing.
-pub fn ensure_qemu() -> Result<()> {
-    if process::find_program("qemu-system-arm").is_none() {
-        install("qemu-system-arm", "the Cortex-M emulator is missing")?;
-    }
-    Ok(())
-}
-
-/// The path of a browser for the test of `hivtac view`'s page.
+/// The path of a browser for the tests of pages.
 pub fn chromium() -> Result<PathBuf> {
     let names = "chromium chromium-browser google-chrome google-chrome-stable";
-    let find = || names.split(' ').find_map(process::find_program);
+    let find = || names.split(' ').find_map(find_program);
     if find().is_none() {
         install("chromium fonts-dejavu-core", "a browser is missing")?;
     }

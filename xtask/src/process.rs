@@ -103,6 +103,14 @@ pub fn find_program(name: &str) -> Option<PathBuf> {
     files.find(|file| file.is_file())
 }
 
+/// Makes a command look for programs in this folder first.
+pub fn before_path(command: &mut Command, folder: &Path) -> Result<()> {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let folders = std::iter::once(folder.to_owned()).chain(std::env::split_paths(&path));
+    command.env("PATH", std::env::join_paths(folders)?);
+    Ok(())
+}
+
 /// A file's text; an error names the file.
 pub fn read(file: &Path) -> Result<String> {
     std::fs::read_to_string(file).with_context(|| format!("reading {}", file.display()))

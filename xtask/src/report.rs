@@ -172,6 +172,8 @@ fn summary(steps: &[Done]) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use anyhow::bail;
 
     use super::*;
@@ -191,26 +193,14 @@ mod tests {
     #[test]
     fn a_failing_step_keeps_no_other_from_running_and_one_left_out_fails_nothing() {
         let report = Report::new(3, std::env::temp_dir());
-        report.step(
-            "xtask one",
-            || None,
-            |tally| run_tests(&mut Command::new("true"), tally),
-        );
-        let mut ran = false;
-        report.step(
-            "xtask two",
-            || None,
-            |_| {
-                ran = true;
-                Ok(())
-            },
-        );
-        report.step(
-            "xtask three",
-            || Some("it is night".to_owned()),
-            |_| bail!("it ran"),
-        );
+        let none = || None;
+        let no_test = |tally: &mut Tally| run_tests(&mut Command::new("true"), tally);
+        report.step("xtask one", none, no_test);
+        let ran = Cell::new(false);
+        report.step("xtask two", none, |_| Ok(ran.set(true)));
+        let night = || Some("it is night".to_owned());
+        report.step("xtask three", night, |_| bail!("it ran"));
         let error = report.finish().unwrap_err().to_string();
-        assert!(ran && error == "failed: xtask one", "{error}");
+        assert!(ran.get() && error == "failed: xtask one", "{error}");
     }
 }

@@ -30,12 +30,19 @@ impl Rig {
         BufReader::new(stdout).read_line(&mut line)?;
         // `ready pty=PATH`, `ready usbip=ADDRESS`
         let ready = line.trim_end().strip_prefix("ready ");
-        let path = ready
-            .and_then(|ready| ready.split_once('='))
-            .map(|(_, path)| path);
-        let path = path.with_context(|| format!("the rig did not get ready: `{line}`"))?;
-        rig.port = path.to_owned();
+        let port = ready.and_then(|ready| ready.split_once('='));
+        let (_, port) = port.with_context(|| format!("the rig did not get ready: `{line}`"))?;
+        rig.port = port.to_owned();
         Ok(rig)
+    }
+
+    /// A command of the host tool at the rig's port. The emulated board boots slower than a real
+    /// one.
+    pub fn ask(&self, tool: &Path, arguments: &[&str]) -> Command {
+        let mut command = Command::new(tool);
+        command.args(arguments);
+        command.args(["--port", &self.port, "--timeout", "120"]);
+        command
     }
 
     /// Makes the rig end, and waits for that.

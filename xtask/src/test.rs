@@ -1,19 +1,19 @@
 //! `cargo xtask test`: runs every check and every test of the project.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, OnceLock};
 use std::thread;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Result, anyhow, ensure};
 use clap::Args;
 
-use crate::artifacts::{self, Programs};
-use crate::python::{KIT, LEROBOT, MUJOCO, PACKAGE, RERUN, SERVE, ZENOH};
+use crate::artifacts;
+use crate::python::{self, KIT, LEROBOT, MUJOCO, PACKAGE, RERUN, SERVE, ZENOH};
 use crate::report::{Report, Tally, run_tests};
 use crate::toolchain::{self, cargo};
-use crate::{bench, fuzz, linux_host, packages, process, python, web};
+use crate::{bench, fuzz, linux_host, packages, process, web};
 
 /// Options of `cargo xtask test`.
 #[derive(Args)]
@@ -26,9 +26,9 @@ pub struct Test {
 }
 
 /// A step: its name, its work, and for a step of `--all` a function that finds an obstacle to it
-/// here.
+/// here. The work is told whether slow tests are run, too.
 type Step = (&'static str, Work, Option<Obstacle>);
-type Work = fn(&Shared, &mut Tally) -> Result<()>;
+type Work = fn(bool, &mut Tally) -> Result<()>;
 type Obstacle = fn() -> Option<String>;
 
 const fn always(name: &'static str, work: Work) -> Step {
@@ -44,31 +44,33 @@ const fn slow(name: &'static str, obstacle: Obstacle, work: Work) -> Step {
 /// steps follow; those after them fill the time until both threads end.
 static STEPS: [Step; 21] = [
     always("format", |_, _| format()),
-    always("lints: microcontroller", |shared, _| shared.target_lints()),
-    always("lints: host", |shared, _| host_lints(shared.all)),
-    always(BUILD, |shared, _| shared.build()),
+    always("lints: microcontroller", |_, _| target_lints()),
+    always("lints: host", |all, _| host_lints(all)),
+    always("build: firmware", |_, _| firmware().map(drop)),
     always("tests: rig", rig_tests),
     always("tests: host", host_tests),
     always("tests: across rooms", cross_room_tests),
     slow("attacks", fuzz::obstacle, |_, _| fuzz::run()),
-    slow(
-        "tests: linux host",
-        linux_host::obstacle,
-        |shared, tally| shared.linux_host(tally),
-    ),
+    slow("tests: linux host", linux_host::obstacle, |_, tally| {
+        linux_host::test(firmware()?, tally)
+    }),
     slow("tests: rig at half speed", || None, rig_tests_at_half_speed),
-    slow("tests: python", || PACKAGE.obstacle(), python::test_package),
-    slow("tests: serve", || SERVE.obstacle(), python::test_serve),
-    slow("tests: zenoh", || ZENOH.obstacle(), python::test_zenoh),
+    slow("tests: python", || PACKAGE.obstacle(), python_tests),
+    slow("tests: serve", || SERVE.obstacle(), |_, it| SERVE.run(it)),
+    slow("tests: zenoh", || ZENOH.obstacle(), |_, it| ZENOH.run(it)),
     slow(
         "tests: lerobot",
         || LEROBOT.obstacle(),
-        python::test_lerobot,
+        |_, it| LEROBOT.run(it),
     ),
-    slow("tests: rerun", || RERUN.obstacle(), python::test_rerun),
-    slow("tests: mujoco", || MUJOCO.obstacle(), python::test_mujoco),
-    slow("tests: kit", || KIT.obstacle(), python::test_kit),
-    always("benchmark", |shared, _| shared.benchmark()),
+    slow("tests: rerun", || RERUN.obstacle(), |_, it| RERUN.run(it)),
+    slow(
+        "tests: mujoco",
+        || MUJOCO.obstacle(),
+        |_, it| MUJOCO.run(it),
+    ),
+    slow("tests: kit", || KIT.obstacle(), |_, it| KIT.run(it)),
+    always("benchmark", |_, _| benchmark()),
     always("build: board benchmark", |_, _| bench::board::lint()),
     slow("build: other systems", no_other_systems, |_, _| {
         other_systems()
@@ -76,25 +78,11 @@ static STEPS: [Step; 21] = [
     slow("licences", no_cargo_deny, |_, _| licences()),
 ];
 
-/// The build, which also runs if a chosen step needs it.
-const BUILD: &str = "build: firmware";
-const NEED_BUILD: [&str; 3] = [
-    "tests: rig at half speed",
-    "tests: across rooms",
-    "tests: linux host",
-];
-
 /// The project's workspaces, as folders.
 const WORKSPACES: [&str; 2] = ["", "tests/qemu"];
 
-/// The state that the steps share.
-pub struct Shared {
-    all: bool,
-    /// Set by the step that builds them; `None` after a failure.
-    programs: OnceLock<Option<Programs>>,
-    /// Held by steps that write the microcontroller's files: lints leave others than builds.
-    target: Mutex<()>,
-}
+/// Held by steps that write the microcontroller's files: lints leave others than builds.
+static TARGET_FILES: Mutex<()> = Mutex::new(());
 
 impl Test {
     /// Runs every step, including those after a failure, and prints the table. It uses two threads,
@@ -108,91 +96,63 @@ impl Test {
         if toolchain::has("clippy") {
             artifacts::lint_as_built();
         }
-        let shared = Shared {
-            all: self.all,
-            programs: OnceLock::new(),
-            target: Mutex::default(),
-        };
         let report = Report::new(wanted.len(), toolchain::work_folder("test")?);
         let next = AtomicUsize::new(0);
         let take = || wanted.get(next.fetch_add(1, Ordering::Relaxed));
         let work = || {
             while let Some(&&(name, work, slow)) = take() {
                 let obstacle = || slow.and_then(|obstacle| obstacle());
-                report.step(name, obstacle, |tally| work(&shared, tally));
+                report.step(name, obstacle, |tally| work(self.all, tally));
             }
         };
-        let caught = || {
-            let ended = catch_unwind(AssertUnwindSafe(work));
-            if ended.is_err() {
-                // Ends the wait of any step for the programs.
-                shared.programs.get_or_init(|| None);
-            }
-            ended
-        };
-        let [one, other] = thread::scope(|scope| {
-            let beside = scope.spawn(caught);
-            [caught(), beside.join().flatten()]
+        thread::scope(|scope| {
+            scope.spawn(work);
+            work();
         });
-        one.and(other)
-            .map_err(|_| anyhow!("a thread of steps panicked"))?;
         report.finish()
     }
 
     fn wants(&self, (name, _, slow): &Step) -> bool {
-        let named = |name: &str| self.steps.iter().any(|word| name.contains(word.as_str()));
-        let is_named = match *name {
-            BUILD => NEED_BUILD.iter().any(|name| named(name)),
-            name => named(name),
-        };
+        let is_named = self.steps.iter().any(|word| name.contains(word.as_str()));
         (self.all || slow.is_none()) && (self.steps.is_empty() || is_named)
     }
 }
 
-impl Shared {
-    fn target_lints(&self) -> Result<()> {
-        let _no_build = self.target.lock();
-        target_lints()
-    }
+/// The firmware as it is flashed. Whoever needs it first builds it, and that of all tests; others
+/// wait.
+fn firmware() -> Result<&'static Path> {
+    static FIRMWARE: OnceLock<Result<std::path::PathBuf, String>> = OnceLock::new();
+    let built = FIRMWARE.get_or_init(|| {
+        let _no_lints = TARGET_FILES.lock();
+        artifacts::test_firmware().map_err(|error| format!("{error:#}"))
+    });
+    let built = built.as_ref();
+    Ok(built.map_err(|why| anyhow!("the firmware could not be built: {why}"))?)
+}
 
-    fn benchmark(&self) -> Result<()> {
-        let _no_lints = self.target.lock();
-        bench::Bench::default().run()
-    }
+/// The cargo command of tests that run the firmware.
+fn firmware_tests(which: [&str; 2]) -> Result<Command> {
+    let mut command = artifacts::test(&which);
+    command.env("HIVTAC_ELF", firmware()?);
+    command.env("HIVTAC_BUG_ELFS", toolchain::work_folder("bugs")?);
+    Ok(command)
+}
 
-    fn build(&self) -> Result<()> {
-        let _no_lints = self.target.lock();
-        let built = Programs::build();
-        let problem = built.as_ref().err().map(|error| anyhow!("{error:#}"));
-        self.programs.get_or_init(|| built.ok());
-        problem.map_or(Ok(()), Err)
+/// Runs tests, with the slow ones if `all` is set.
+fn run(mut command: Command, all: bool, tally: &mut Tally) -> Result<()> {
+    if all {
+        command.args(["--", "--include-ignored"]);
     }
+    run_tests(&mut command, tally)
+}
 
-    /// The programs, once they are built.
-    fn built(&self) -> Result<&Programs> {
-        let programs = self.programs.wait().as_ref();
-        programs.context("not run: the firmware could not be built")
-    }
+fn benchmark() -> Result<()> {
+    let _no_lints = TARGET_FILES.lock();
+    bench::Bench::default().run()
+}
 
-    fn linux_host(&self, tally: &mut Tally) -> Result<()> {
-        linux_host::test(self.built()?.firmware(), tally)
-    }
-
-    /// The cargo command of tests with these programs, once they are built.
-    fn tests(&self, which: [&str; 2]) -> Result<Command> {
-        let programs = self.built()?;
-        let mut command = artifacts::test(&which);
-        programs.name_to(&mut command);
-        Ok(command)
-    }
-
-    /// Runs a test runner, with the slow tests if `all` is set.
-    fn run(&self, mut command: Command, tally: &mut Tally) -> Result<()> {
-        if self.all {
-            command.args(["--", "--include-ignored"]);
-        }
-        run_tests(&mut command, tally)
-    }
+fn python_tests(_: bool, tally: &mut Tally) -> Result<()> {
+    PACKAGE.run(tally).and(python::check_types())
 }
 
 fn format() -> Result<()> {
@@ -217,53 +177,52 @@ fn host_lints(all: bool) -> Result<()> {
 /// what its tests run: a linter must not change what is flashed.
 fn target_lints() -> Result<()> {
     toolchain::ensure_component("clippy", "clippy")?;
+    let _no_build = TARGET_FILES.lock();
     for mut command in artifacts::for_target() {
-        toolchain::lint_for_target(&mut command)?;
+        toolchain::lint(&mut command);
         artifacts::without_warnings(command)?;
     }
     Ok(())
 }
 
-fn host_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
-    let tests = shared.run(artifacts::test(&["--tests"]), tally);
-    let of_studies = match shared.all {
-        true => shared.run(artifacts::test(&artifacts::STUDIES_TESTS), tally),
+fn host_tests(all: bool, tally: &mut Tally) -> Result<()> {
+    let tests = run(artifacts::test(&["--tests"]), all, tally);
+    let of_studies = match all {
+        true => run(artifacts::test(&artifacts::STUDIES_TESTS), all, tally),
         false => Ok(()),
     };
     let of_docs = run_tests(&mut artifacts::test(&["--doc"]), tally);
     tests.and(of_studies).and(of_docs)
 }
 
-fn cross_room_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
-    let mut command = shared.tests(artifacts::ROOMS_TESTS)?;
-    packages::ensure_qemu()?;
+fn cross_room_tests(all: bool, tally: &mut Tally) -> Result<()> {
+    let mut command = firmware_tests(artifacts::ROOMS_TESTS)?;
+    packages::ensure("qemu-system-arm", "qemu-system-arm")?;
     command.env("HIVTAC_TOOL", artifacts::host_tool()?);
     command.env("HIVTAC_QEMU_IMAGE", artifacts::qemu_image()?);
-    if shared.all {
+    if all {
         // Only slow tests run these programs.
+        let calibrate = artifacts::host_program("hivtac-calibrate")?;
         command.env("HIVTAC_M55_IMAGE", artifacts::m55_image()?);
-        command.env(
-            "HIVTAC_CALIBRATE",
-            artifacts::host_program("hivtac-calibrate")?,
-        );
+        command.env("HIVTAC_CALIBRATE", calibrate);
         command.env("HIVTAC_CHROMIUM", packages::chromium()?);
         command.env("HIVTAC_WEB", web::page(&[])?);
     }
-    shared.run(command, tally)
+    run(command, all, tally)
 }
 
-fn rig_tests(shared: &Shared, tally: &mut Tally) -> Result<()> {
-    let mut command = shared.tests(artifacts::RIG_TESTS)?;
-    if shared.all {
+fn rig_tests(all: bool, tally: &mut Tally) -> Result<()> {
+    let mut command = firmware_tests(artifacts::RIG_TESTS)?;
+    if all {
         command.env("HIVTAC_ATTACKS", "3");
     }
-    shared.run(command, tally)
+    run(command, all, tally)
 }
 
 /// The tests that depend on the core's speed, at half of the speed that the rig assumes, and on a
 /// busy bus.
-fn rig_tests_at_half_speed(shared: &Shared, tally: &mut Tally) -> Result<()> {
-    let mut command = shared.tests(artifacts::RIG_TESTS)?;
+fn rig_tests_at_half_speed(_: bool, tally: &mut Tally) -> Result<()> {
+    let mut command = firmware_tests(artifacts::RIG_TESTS)?;
     command.env("HIVTAC_INSTRUCTIONS_PER_SECOND", "200000000");
     command.env("HIVTAC_BUSY_BUS", "1");
     command.args(["--", "camera::", "faults::", "firmware::", "threshold::"]);
@@ -309,7 +268,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_choose_steps_and_the_builds_that_they_need() {
+    fn words_choose_steps() {
         let wanted = |words: &[&str], all| -> Vec<&str> {
             let steps = words.iter().map(|&word| word.to_owned()).collect();
             let test = Test { steps, all };
@@ -318,8 +277,8 @@ mod tests {
         };
         assert_eq!(wanted(&[], true).len(), STEPS.len());
         assert!(!wanted(&[], false).contains(&"attacks"));
-        assert_eq!(wanted(&["format"], false), ["format"]);
-        assert_eq!(wanted(&["rooms"], false), [BUILD, "tests: across rooms"]);
-        assert!(wanted(&["firmware"], false).is_empty());
+        let both = ["format", "tests: across rooms"];
+        assert_eq!(wanted(&["rooms", "format"], false), both);
+        assert!(wanted(&["attacks"], false).is_empty());
     }
 }

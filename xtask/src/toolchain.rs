@@ -6,13 +6,12 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::debian;
 use crate::process::{self, command};
 
 /// The microcontroller's target: Cortex-M7 with a double-precision FPU.
-const TARGET: &str = "thumbv7em-none-eabihf";
+pub const TARGET: &str = "thumbv7em-none-eabihf";
 /// The target of a Cortex-M55, which only QEMU runs.
-const M55_TARGET: &str = "thumbv8m.main-none-eabihf";
+pub const M55_TARGET: &str = "thumbv8m.main-none-eabihf";
 /// The target of browsers.
 pub const WEB_TARGET: &str = "wasm32-unknown-unknown";
 
@@ -44,52 +43,19 @@ pub fn cargo(words: &str, folder: &str) -> Command {
     command
 }
 
-/// `cargo build` for the microcontroller, as for flashing.
-pub fn build_for_target(folder: &str) -> Command {
+/// `cargo build` for a microcontroller's target, as for flashing.
+pub fn build_for(target: &str, folder: &str) -> Command {
     let mut command = cargo("build --release --target", folder);
-    command.arg(TARGET);
-    debian::instead(command)
+    command.arg(target);
+    command
 }
 
-/// `cargo build` for a Cortex-M55, whose target is added if it is missing.
-pub fn build_for_m55(folder: &str) -> Result<Command> {
-    ensure!(
-        add_target(M55_TARGET)?,
-        "rustup cannot add {M55_TARGET}: run `rustup target add {M55_TARGET}`"
-    );
-    let mut command = cargo("build --release --target", folder);
-    command.arg(M55_TARGET);
-    Ok(command)
-}
-
-/// The variable with the program that replaces the compiler for the project's own packages.
-const WRAPPER: &str = "RUSTC_WORKSPACE_WRAPPER";
-
-/// Makes a cargo command for this computer lint this project's packages that it builds.
+/// Makes a cargo command lint this project's packages that it builds.
 pub fn lint(command: &mut Command) {
-    command.env(WRAPPER, "clippy-driver");
+    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
 }
 
-/// Makes a cargo command for the microcontroller lint.
-pub fn lint_for_target(command: &mut Command) -> Result<()> {
-    match debian::is_chosen() {
-        true => drop(command.env(WRAPPER, debian::linter()?)),
-        false => lint(command),
-    }
-    Ok(())
-}
-
-/// The version of the compiler for the microcontroller: `rustc 1.95.0 (59807616e 2026-04-14)`.
-pub fn target_compiler() -> Result<String> {
-    match debian::is_chosen() {
-        true => Ok(process::output(debian::rustc().arg("-V"))?
-            .trim()
-            .to_owned()),
-        false => rustc("-V"),
-    }
-}
-
-/// The output of the compiler for this computer.
+/// The output of the compiler.
 pub fn rustc(words: &str) -> Result<String> {
     let program = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let said = process::output(Command::new(program).args(words.split(' ')))?;
@@ -103,39 +69,17 @@ fn has_target(target: &str) -> Result<bool> {
     Ok(files.is_ok_and(|files| files.flatten().any(is_core)))
 }
 
-/// Adds a target to the current toolchain if missing, without a change of version; returns whether
-/// it is there then.
-fn add_target(target: &str) -> Result<bool> {
+/// Adds a target to the current toolchain if missing, without a change of version.
+pub fn ensure_target(target: &str) -> Result<()> {
     if has_target(target)? {
-        return Ok(true);
+        return Ok(());
     }
     let mut add = command("rustup target add");
     let added = process::run(add.arg(target).env("RUSTUP_AUTO_INSTALL", "0"));
-    Ok(added.is_ok() && has_target(target)?)
-}
-
-/// Ensures that the microcontroller's target is there. If rustup cannot add it, Debian's own
-/// compiler is chosen for the microcontroller.
-pub fn ensure_target() -> Result<()> {
-    if add_target(TARGET)? {
-        return Ok(());
-    }
-    process::say(&format!(
-        "rustup cannot add {TARGET}: trying Debian's own packages"
-    ));
-    debian::choose().with_context(|| {
-        format!("no Rust for {TARGET}: run `rustup target add {TARGET}`, or install the packages")
-    })
-}
-
-/// Ensures that the target of browsers is there.
-pub fn ensure_web_target() -> Result<()> {
-    let is_there = add_target(WEB_TARGET)?;
     ensure!(
-        is_there,
-        "rustup cannot add {WEB_TARGET}, which the page needs: run `rustup target add \
-         {WEB_TARGET}`, or, without rustup, install your system's package of that target \
-         (Debian and Ubuntu: libstd-rust-dev-wasm32)"
+        added.is_ok() && has_target(target)?,
+        "rustup cannot add {target}: run `rustup target add {target}`; without rustup, install your \
+         system's package of it (Debian and Ubuntu for the page: libstd-rust-dev-wasm32)"
     );
     Ok(())
 }

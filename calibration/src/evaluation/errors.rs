@@ -12,7 +12,6 @@ pub struct Errors {
     strong_directions_deg: Vec<f64>,
     magnitude: MeanSquare,
     lateral: MeanSquare,
-    normal: MeanSquare,
     place: MeanSquare,
 }
 
@@ -44,7 +43,6 @@ impl Errors {
         self.magnitude.add(norm(found) - norm(truth));
         self.lateral.add(found[0] - truth[0]);
         self.lateral.add(found[1] - truth[1]);
-        self.normal.add(found[2] - truth[2]);
         if let Some(angle) = angle_deg(found, truth) {
             self.directions_deg.push(angle);
             if norm(truth) >= WEAK_N {
@@ -67,7 +65,7 @@ impl Errors {
 
     /// Number of forces.
     pub fn count(&self) -> usize {
-        self.normal.count
+        self.magnitude.count
     }
 
     /// Mean angle between found and true force, degrees; NaN without one.
@@ -93,11 +91,6 @@ impl Errors {
     /// Root mean square error of F_x and F_y, N.
     pub fn lateral_rmse_n(&self) -> f64 {
         self.lateral.root()
-    }
-
-    /// Root mean square error of F_z, N.
-    pub fn normal_rmse_n(&self) -> f64 {
-        self.normal.root()
     }
 }
 
@@ -145,6 +138,5 @@ mod tests {
         assert!((errors.mean_direction_deg() - 22.5).abs() < 1e-12);
         assert_eq!(errors.mean_strong_direction_deg(), 0.0);
         assert!((errors.lateral_rmse_n() - 0.02 / 6_f64.sqrt()).abs() < 1e-12);
-        assert!((errors.normal_rmse_n() - 0.003 / 3_f64.sqrt()).abs() < 1e-12);
     }
 }

@@ -302,11 +302,11 @@ impl fmt::Display for Evaluation {
         )?;
         for part in coverage(&self.judged) {
             let [low, high] = part.force_n.map(|n| n * 1e3);
-            let told = |covered: Covered| {
+            let cell = |covered: Covered| {
                 let ratio = covered.bound / covered.error;
                 format!("{:.1} % ({ratio:.2})", 100.0 * covered.within)
             };
-            let (direction, magnitude) = (told(part.direction), told(part.magnitude));
+            let (direction, magnitude) = (cell(part.direction), cell(part.magnitude));
             writeln!(
                 f,
                 "  {low:.1} to {high:.1} mN: direction {direction}, |F| {magnitude}"

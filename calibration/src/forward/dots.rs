@@ -148,12 +148,14 @@ fn left(
         ..ChipPose::default()
     };
     let nowhere = Markers::defaults(chip.tables.dots());
-    let told = chip.tables.predict(&at, &chip.limits, &nowhere);
+    let predicted = chip.tables.predict(&at, &chip.limits, &nowhere);
     let mut all = Vec::new();
     for dot in 0..chip.tables.dots() {
         let moved = setup.moved_by(film, &load, dot)?;
         let is_seen = setup.sees(film, &load, dot);
-        all.extend([0, 1].map(|i| is_seen.then(|| moved[i] - f64::from(told.moved[2 * dot + i]))));
+        all.extend(
+            [0, 1].map(|i| is_seen.then(|| moved[i] - f64::from(predicted.moved[2 * dot + i]))),
+        );
     }
     Ok(all)
 }

@@ -269,12 +269,12 @@ impl<'a> Other<'a> {
                 place_mm: pose.place_mm.map(|part| part as f32),
                 ..ChipPose::default()
             };
-            let told = self
-                .chip
-                .tables
-                .predict(&at, &self.chip.limits, &self.mounting.beside_mm);
-            left = Moved::from_fn(OF_FOUR, |k| moved[k] - f64::from(told.moved[k]));
-            let slopes = told.slopes[0].map(f64::from);
+            let predicted =
+                self.chip
+                    .tables
+                    .predict(&at, &self.chip.limits, &self.mounting.beside_mm);
+            left = Moved::from_fn(OF_FOUR, |k| moved[k] - f64::from(predicted.moved[k]));
+            let slopes = predicted.slopes[0].map(f64::from);
             let [along, square] = slopes
                 .iter()
                 .zip(left.iter())

@@ -98,15 +98,9 @@ fn a_hand_that_covers_the_film_is_let_go_and_its_presses_are_a_data_set() {
         "{said}"
     );
     gauge_file(here, 66.0);
-    let align = [
-        "collect",
-        "align",
-        "--recording",
-        "unit",
-        "--gauge",
-        "gauge.csv",
-        "--holds",
-    ];
+    let align: Vec<_> = "collect align --recording unit --gauge gauge.csv --holds"
+        .split(' ')
+        .collect();
     let more = ["--direction-deg", "4", "--out", "data.csv"];
     let report = stdout(run(here, &[&align[..], &more].concat(), ""));
     assert!(report.contains("of them anywhere)"), "{report}");

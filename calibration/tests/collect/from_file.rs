@@ -80,16 +80,9 @@ fn from_a_recording_to_a_model_for_the_unit() {
         assert!(said.contains("samples ("), "{said}");
     }
     gauge_file(here, 12.0);
-    let align = [
-        "collect",
-        "align",
-        "--recording",
-        "unit",
-        "--gauge",
-        "gauge.csv",
-        "--out",
-        "data.csv",
-    ];
+    let align: Vec<_> = "collect align --recording unit --gauge gauge.csv --out data.csv"
+        .split(' ')
+        .collect();
     let report = stdout(run(here, &align, ""));
     for words in [
         "ahead",
@@ -126,15 +119,9 @@ fn from_a_recording_to_a_model_for_the_unit() {
         &["export", "--weights", "unit.weights", "--out", "unit.hvtm"],
         "",
     ));
-    let evaluate = [
-        "evaluate",
-        "--model",
-        "unit.hvtm",
-        "--data",
-        "data.csv",
-        "--out",
-        "report.html",
-    ];
+    let evaluate: Vec<_> = "evaluate --model unit.hvtm --data data.csv --out report.html"
+        .split(' ')
+        .collect();
     let judged = stdout(run(here, &evaluate, ""));
     assert!(judged.contains("Frames of a real unit"), "{judged}");
     let check = run(here, &["check", "--model", "unit.hvtm"], "").1;
@@ -195,14 +182,9 @@ fn a_stranger_is_refused() {
         !output.status.success() && said.contains("another unit"),
         "{said}"
     );
-    let align = [
-        "collect",
-        "align",
-        "--recording",
-        "unit",
-        "--out",
-        "data.csv",
-    ];
+    let align: Vec<_> = "collect align --recording unit --out data.csv"
+        .split(' ')
+        .collect();
     let said = run(here, &align, "").1;
     assert!(said.contains("no frame in a pose"), "{said}");
 }

@@ -105,14 +105,9 @@ fn a_gauge_at_a_port_is_heard_and_ctrl_c_loses_nothing() {
         "{said}"
     );
 
-    let align = [
-        "collect",
-        "align",
-        "--recording",
-        "unit",
-        "--out",
-        "data.csv",
-    ];
+    let align: Vec<_> = "collect align --recording unit --out data.csv"
+        .split(' ')
+        .collect();
     let report = stdout(run(here, &align, ""));
     let lag: f64 = report
         .split("clock is ")

@@ -14,14 +14,14 @@ pub struct Identity {
     /// Its identification number.
     pub number: u16,
     /// The registers of that number.
-    pub told: Told,
+    pub number_at: NumberAt,
     /// The cargo feature of the firmware that supports it.
     pub feature: &'static str,
 }
 
 /// The registers of a camera's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Told {
+pub enum NumberAt {
     /// Two registers of a byte, the high one first.
     InBytes([u16; 2]),
     /// One register of two bytes.
@@ -36,7 +36,7 @@ pub const OV7725: Identity = Identity {
         is_wide: false,
     },
     number: hivtac_portable::device::camera::ov7725::ID,
-    told: Told::InBytes([0x0A, 0x0B]),
+    number_at: NumberAt::InBytes([0x0A, 0x0B]),
     feature: "board-weact",
 };
 
@@ -48,7 +48,7 @@ pub const OV5640: Identity = Identity {
         is_wide: true,
     },
     number: hivtac_portable::device::camera::ov5640::ID,
-    told: Told::InBytes([0x300A, 0x300B]),
+    number_at: NumberAt::InBytes([0x300A, 0x300B]),
     feature: "board-weact",
 };
 
@@ -61,7 +61,7 @@ pub const MT9V034: Identity = Identity {
         is_wide: false,
     },
     number: hivtac_portable::device::camera::mt9v034::ID,
-    told: Told::InWord(0x00),
+    number_at: NumberAt::InWord(0x00),
     feature: "board-openmv-h7",
 };
 
@@ -174,12 +174,12 @@ impl Identity {
     /// # Errors
     /// Nothing has that address, or the bus does not work.
     pub fn ask(&self, bus: &mut Bus) -> Result<u16, i2c::Error> {
-        match self.told {
-            Told::InBytes([high, low]) => Ok(u16::from_be_bytes([
+        match self.number_at {
+            NumberAt::InBytes([high, low]) => Ok(u16::from_be_bytes([
                 bus.read_byte(self.device, high)?,
                 bus.read_byte(self.device, low)?,
             ])),
-            Told::InWord(register) => bus.read_word(self.device, register),
+            NumberAt::InWord(register) => bus.read_word(self.device, register),
         }
     }
 }

@@ -48,7 +48,7 @@ impl From<&Arrived> for CSample {
     fn from(arrived: &Arrived) -> CSample {
         let sample = &arrived.sample;
         let status = sample.status;
-        let mut told = CSample {
+        let mut numbers = CSample {
             time_us: sample.time_us,
             arrived_ns: arrived.came_ns,
             exposed_ns: arrived.exposed_ns,
@@ -61,14 +61,14 @@ impl From<&Arrived> for CSample {
         };
         let contacts = sample.each_contact();
         if let Some(force) = &sample.force {
-            told.set(force);
-            told.torque_nm = torque_nm(force, contacts);
+            numbers.set(force);
+            numbers.torque_nm = torque_nm(force, contacts);
         }
-        told.contact_count = contacts.len() as u64;
-        for (place, contact) in told.contacts.iter_mut().zip(contacts) {
+        numbers.contact_count = contacts.len() as u64;
+        for (place, contact) in numbers.contacts.iter_mut().zip(contacts) {
             *place = CContact::from(contact);
         }
-        told
+        numbers
     }
 }
 

@@ -1,8 +1,8 @@
 //! A conversation with a device. While anything waits, the interpreter's lock is free, and so is
 //! the connection's own: one thread may take samples while another waits for a picture.
 
+use crate::convert::{self, MarkerNumbers, RestNumbers, SampleNumbers, TareNumbers};
 use crate::error::{Error, raised};
-use crate::told::{self, MarkerNumbers, RestNumbers, SampleNumbers, TareNumbers};
 use hivtac_host::contact_shape;
 use hivtac_host::down::direction;
 use hivtac_host::failure::{Failure, Kind};
@@ -94,7 +94,7 @@ fn tare(
     let mut tared = None;
     let patience = PATIENCE + SLOWEST_FRAME * frames.into();
     link.request(request, patience, |message| match message {
-        DeviceMessage::Tared(report) => tared = Some(told::tare(&report)),
+        DeviceMessage::Tared(report) => tared = Some(convert::tare(&report)),
         message => others(message),
     })?;
     if keep {
@@ -129,7 +129,7 @@ fn set_contact(
 fn rest(link: &mut Link, others: Others<'_>, patience: Duration) -> Result<RestNumbers, Failure> {
     let mut rest = None;
     link.request(Request::GetSettings, patience, |message| match message {
-        DeviceMessage::Settings(report) => rest = Some(told::rest(&report)),
+        DeviceMessage::Settings(report) => rest = Some(convert::rest(&report)),
         message => others(message),
     })?;
     rest.ok_or_else(|| link.lost("the settings did not come"))
@@ -175,7 +175,7 @@ impl Connection {
 
     /// The device's identity.
     fn hello<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        told::hello(py, &self.hello)
+        convert::hello(py, &self.hello)
     }
 
     /// The next sample; `None` once the connection is closed.
@@ -261,7 +261,7 @@ impl Connection {
         let [levels, mask] = [levels, mask].map(|bytes| PyBytes::new(py, &bytes));
         let time_s = frame.time_us as f64 / 1e6;
         let (size, markers) = ((frame.width, frame.height), taken.sample);
-        let markers = markers.and_then(|sample| told::markers(&sample));
+        let markers = markers.and_then(|sample| convert::markers(&sample));
         Ok((frame.number, time_s, size.0, size.1, levels, mask, markers))
     }
 
@@ -324,7 +324,7 @@ impl Connection {
         // The last call under way closes the connection, which may wait, too.
         let arrived = py.detach(move || talk.arrived(self.patience, wait));
         let arrived = arrived.map_err(raised)?;
-        Ok(arrived.map(|it| told::sample(&it.sample, it.came_ns, it.exposed_ns)))
+        Ok(arrived.map(|it| convert::sample(&it.sample, it.came_ns, it.exposed_ns)))
     }
 
     /// Works with an open connection, without the interpreter's lock.

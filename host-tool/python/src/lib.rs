@@ -2,11 +2,11 @@
 //! numbers are in SI units. Users see `hivtac/__init__.py`, which makes arrays of them.
 
 mod connection;
+mod convert;
 mod error;
 mod grip;
 mod interrupt;
 mod reader;
-mod told;
 mod twin;
 
 use pyo3::prelude::*;

@@ -1,7 +1,7 @@
 //! Reads a recording sample by sample.
 
+use crate::convert::{self, SampleNumbers};
 use crate::error::raised;
-use crate::told::{self, SampleNumbers};
 use hivtac_host::clock::Clock;
 use hivtac_host::recording::Recording;
 use hivtac_wire::message::{DeviceHello, DeviceMessage};
@@ -29,7 +29,7 @@ impl Reader {
 
     /// The device's identity.
     fn hello<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        told::hello(py, &self.hello)
+        convert::hello(py, &self.hello)
     }
 
     /// The next sample; `None` at the end.
@@ -41,7 +41,7 @@ impl Reader {
                     DeviceMessage::Stats(stats) => clock.latency(stats.latency_us),
                     DeviceMessage::Sample(sample) => {
                         let exposed_ns = clock.stamp_ns(sample.time_us, came_ns);
-                        return Ok(Some(told::sample(&sample, came_ns, exposed_ns)));
+                        return Ok(Some(convert::sample(&sample, came_ns, exposed_ns)));
                     }
                     _ => (),
                 }

@@ -1,14 +1,14 @@
 //! The simulated sensor in a program's own time: it is pressed as the program says, and gives the
 //! samples of the frames that are whole by then.
 
+use crate::convert::{self, SampleNumbers};
 use crate::error::{Error, raised};
-use crate::told::{self, SampleNumbers};
 use hivtac_host::contact_shape;
 use hivtac_host::live::calibrated::{Calibrated, CalibratedFilm};
 use hivtac_host::live::camera::Kind;
 use hivtac_host::live::device::Device;
 use hivtac_host::live::eye::{Disturbances, Eye, Presses};
-use hivtac_host::live::hand::{Hand, Touch};
+use hivtac_host::live::hand::{Hand, Press};
 use hivtac_host::live::run::{Due, Frames, device_id};
 use hivtac_host::shown::shown;
 use hivtac_host::{model_file, reply};
@@ -91,12 +91,12 @@ impl Twin {
 
     /// Presses the film from now on: place, mm, |F|, N, α and β, degrees. `None` releases it.
     fn press(&self, touch: Option<([f64; 2], f64, [f64; 2])>) -> PyResult<()> {
-        let touch = touch.map(|(place_mm, force_n, angles_deg)| Touch {
+        let touch = touch.map(|(place_mm, force_n, angles_deg)| Press {
             place_mm,
             force_n,
             angles_deg,
         });
-        if touch.is_some() && touch.and_then(Touch::in_range) != touch {
+        if touch.is_some() && touch.and_then(Press::in_range) != touch {
             return Err(Error::new_err(
                 "a press out of the sensor's range: up to 0.25 N, within ±4 mm, α and β within ±12°",
             ));
@@ -245,7 +245,7 @@ impl Simulated {
                 sample.time_us = sample.time_us.saturating_sub(self.begun_us);
                 let whole_us = now_us - self.begun_us.min(now_us);
                 let exposed_ns = 1000 * sample.time_us;
-                samples.push(told::sample(&sample, 1000 * whole_us, exposed_ns));
+                samples.push(convert::sample(&sample, 1000 * whole_us, exposed_ns));
             }
         }
     }

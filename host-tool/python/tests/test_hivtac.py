@@ -5,6 +5,11 @@
 `cargo xtask test --all python` builds these programs and installs the package first.
 """
 
+# /// script
+# requires-python = ">=3.9"
+# dependencies = ["maturin>=1.9,<2", "mypy", "numpy"]
+# ///
+
 import json
 import os
 import shutil

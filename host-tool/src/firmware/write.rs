@@ -62,16 +62,18 @@ fn fill<Io: Usb>(loader: &Loader<Io>, part: &Part<'_>) -> Result<(), Failure> {
     stop::check().map_err(interrupted)?;
     let erased = loader.erase(sector);
     erased.map_err(|why| broken(format!("erasing at {sector:#010x}"), why))?;
-    let written = loader.write(sector, part.bytes, || stop::check().map_err(Stopped::Asked));
+    let written = loader.write(sector, part.bytes, || {
+        stop::check().map_err(Stopped::Interrupted)
+    });
     written.map_err(|stopped| match stopped {
-        Stopped::Asked(failure) => interrupted(failure),
+        Stopped::Interrupted(failure) => interrupted(failure),
         Stopped::Broken(why) => broken(format!("writing at {sector:#010x}"), why),
     })
 }
 
 /// Why writing stopped.
 enum Stopped {
-    Asked(Failure),
+    Interrupted(Failure),
     Broken(Trouble),
 }
 

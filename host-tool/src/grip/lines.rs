@@ -67,10 +67,10 @@ pub fn line(grip: &Grip, names: &[String; 2]) -> String {
         Some(true) => "yes",
         Some(false) => "no",
     };
-    let told = cause(grip, names).unwrap_or_else(|| status(grip, names));
-    let told = if told.is_empty() { "ok" } else { &told };
+    let text = cause(grip, names).unwrap_or_else(|| status(grip, names));
+    let text = if text.is_empty() { "ok" } else { &text };
     format!(
-        "{:>17}{numbers}{contact:>9}  {told}",
+        "{:>17}{numbers}{contact:>9}  {text}",
         seconds(grip.stamp_ns).to_string()
     )
 }

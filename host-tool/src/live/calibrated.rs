@@ -66,11 +66,11 @@ impl Calibrated {
         };
         let nominal = Model::parse(kind.model(layout)).ok();
         let nominal = nominal.and_then(|model| model.forward).unwrap_or(forward);
-        let told = forward.rest_image.mounting(&model.rest);
+        let of_rest = forward.rest_image.mounting(&model.rest);
         let mounting = Mounting {
-            per_px: forward.per_px.unwrap_or(told.per_px),
+            per_px: forward.per_px.unwrap_or(of_rest.per_px),
             // The tables of a unit have its dots where they are glued.
-            beside_mm: told.beside_mm.map(|_| [0.0; 2]),
+            beside_mm: of_rest.beside_mm.map(|_| [0.0; 2]),
         };
         let centroids = model.rest.features.centroids.iter();
         let rest_px = Dots::of(centroids.map(|(x, y)| [x.to_f64(), y.to_f64()]));
@@ -198,13 +198,13 @@ mod tests {
     use super::*;
     use crate::live::device::Device;
     use crate::live::eye::{Disturbances, Eye, Presses};
-    use crate::live::hand::{Hand, Touch};
+    use crate::live::hand::{Hand, Press};
     use crate::live::tested::Tested;
     use hivtac_terms::contact_shape::ContactShape;
     use hivtac_wire::message::{Request, Sample};
 
     const KIND: Kind = Kind::Ov7725;
-    const PRESS: Touch = Touch {
+    const PRESS: Press = Press {
         place_mm: [1.5, -1.0],
         force_n: 0.12,
         angles_deg: [4.0, -3.0],
@@ -231,7 +231,7 @@ mod tests {
     }
 
     /// The device of a unit, untouched for ten frames, then pressed: the last sample of either.
-    fn samples(file: &'static [u8], touch: Touch) -> [Sample; 2] {
+    fn samples(file: &'static [u8], touch: Press) -> [Sample; 2] {
         let unit = Calibrated::of(KIND, file).unwrap();
         let scene = KIND.scene("rest", unit.layout, 1).unwrap();
         let (scene, film) = unit.seen(scene).unwrap();
@@ -276,7 +276,7 @@ mod tests {
             "{}",
             apart(&pressed, &softer)
         );
-        let lighter = Touch {
+        let lighter = Press {
             force_n: PRESS.force_n / 1.5,
             ..PRESS
         };

@@ -1,6 +1,6 @@
 //! A recorded course: forces in time from a CSV file, such as `hivtac monitor --csv` writes.
 
-use super::hand::Touch;
+use super::hand::Press;
 use hivtac_twin::Load;
 use std::fmt;
 
@@ -45,9 +45,9 @@ impl Force {
             .ok()
     }
 
-    fn touch(self) -> Option<Touch> {
+    fn touch(self) -> Option<Press> {
         let load = self.load()?;
-        let touch = Touch {
+        let touch = Press {
             place_mm: load.offset_mm(),
             force_n: load.magnitude_n(),
             angles_deg: [load.alpha_deg(), load.beta_deg()],
@@ -206,7 +206,7 @@ impl Course {
     }
 
     /// Returns each of two touches at a time, s; `None` unless there are two.
-    pub fn touches(&self, time_s: f64) -> Option<[Touch; 2]> {
+    pub fn touches(&self, time_s: f64) -> Option<[Press; 2]> {
         let contact = |nth: usize| {
             self.between(time_s, |row| Some(row.contacts?[nth]))?
                 .touch()

@@ -82,7 +82,7 @@ pub struct Device {
     next_threshold: Option<(u16, Threshold)>,
     stats: Stats,
     /// When the counters were last sent, µs.
-    told_us: u64,
+    stats_sent_us: u64,
     now_us: u64,
     sequence: u32,
 }
@@ -134,7 +134,7 @@ impl Device {
             upload: None,
             next_threshold: None,
             stats: Stats::default(),
-            told_us: 0,
+            stats_sent_us: 0,
             now_us: 0,
             sequence: 0,
         }
@@ -333,8 +333,8 @@ impl Device {
         if !self.out.sample(sample) {
             self.stats.usb_dropped += 1;
         }
-        if self.now_us - self.told_us >= STATS_PERIOD_US {
-            self.told_us = self.now_us;
+        if self.now_us - self.stats_sent_us >= STATS_PERIOD_US {
+            self.stats_sent_us = self.now_us;
             self.out.answer(DeviceMessage::Stats(self.stats));
         }
     }

@@ -3,7 +3,7 @@
 use super::calibrated::CalibratedFilm;
 use super::camera::{Camera, Kind};
 use super::course::Course;
-use super::hand::{Following, Hand, Touch};
+use super::hand::{Following, Hand, Press};
 use super::pair::{self, PairFilm};
 use hivtac_terms::threshold::PixelFormat;
 use hivtac_twin::{Format, Frame, Load, Paint, Patch, Scene, SceneError, Shutter, Truth};
@@ -217,7 +217,7 @@ impl Eye {
     }
 
     /// Both touches of two fingers, or of the course when no finger presses.
-    fn touches(&self, time_s: f64) -> Option<[Touch; 2]> {
+    fn touches(&self, time_s: f64) -> Option<[Press; 2]> {
         let [first, second] = &self.following;
         match (first.touch(), second.touch(), &self.presses) {
             (Some(first), Some(second), _) => Some([first, second]),

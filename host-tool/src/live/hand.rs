@@ -1,6 +1,7 @@
 //! A press of a person: where, how hard and in which direction, changed at any time from another
 //! thread.
 
+pub use crate::page::{Fingers, Press};
 use hivtac_twin::Load;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -17,33 +18,19 @@ const FOLLOWS_S: f64 = 0.02;
 /// Force below which a released film is untouched, N.
 const UNTOUCHED_N: f64 = 1e-4;
 
-/// What a hand does.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
-    /// The place, mm along x and y from the film's middle.
-    pub place_mm: [f64; 2],
-    /// |F|, N.
-    pub force_n: f64,
-    /// α and β, degrees.
-    pub angles_deg: [f64; 2],
-}
-
-impl Touch {
-    /// Returns the nearest touch that is in range; `None` if a value is not a number.
-    pub fn in_range(self) -> Option<Touch> {
+impl Press {
+    /// Returns the nearest press that is in range; `None` if a value is not a number.
+    pub fn in_range(self) -> Option<Press> {
         let [x, y] = self.place_mm;
         let [alpha, beta] = self.angles_deg;
         let values = [x, y, self.force_n, alpha, beta];
-        values.iter().all(|value| value.is_finite()).then(|| Touch {
+        values.iter().all(|value| value.is_finite()).then(|| Press {
             place_mm: self.place_mm.map(|at| at.clamp(-FARTHEST_MM, FARTHEST_MM)),
             force_n: self.force_n.clamp(0.0, MOST_N),
             angles_deg: (self.angles_deg).map(|angle| angle.clamp(-STEEPEST_DEG, STEEPEST_DEG)),
         })
     }
 }
-
-/// What each of two fingers does; `None` releases the film.
-pub type Fingers = [Option<Touch>; 2];
 
 /// A hand that another thread moves.
 #[derive(Clone, Debug, Default)]
@@ -66,7 +53,7 @@ impl Hand {
         *self.wanted.lock().unwrap_or_else(PoisonError::into_inner) = fingers;
     }
 
-    fn wants(&self, finger: usize) -> Option<Touch> {
+    fn wants(&self, finger: usize) -> Option<Press> {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner)[finger]
     }
 
@@ -86,8 +73,8 @@ pub struct Following {
     finger: usize,
     at_s: f64,
     /// The press at that time and at the time before it.
-    now: Option<Touch>,
-    before: Option<Touch>,
+    now: Option<Press>,
+    before: Option<Press>,
     step_s: f64,
 }
 
@@ -113,16 +100,16 @@ impl Following {
         let toward = |from: f64, to: f64| from + (to - from) * part;
         self.now = match (self.now, self.hand.wants(self.finger)) {
             // A new touch begins where the hand is, from no force.
-            (None, Some(wanted)) => Some(Touch {
+            (None, Some(wanted)) => Some(Press {
                 force_n: toward(0.0, wanted.force_n),
                 ..wanted
             }),
-            (Some(now), Some(wanted)) => Some(Touch {
+            (Some(now), Some(wanted)) => Some(Press {
                 place_mm: [0, 1].map(|i| toward(now.place_mm[i], wanted.place_mm[i])),
                 force_n: toward(now.force_n, wanted.force_n),
                 angles_deg: [0, 1].map(|i| toward(now.angles_deg[i], wanted.angles_deg[i])),
             }),
-            (Some(now), None) => Some(Touch {
+            (Some(now), None) => Some(Press {
                 force_n: toward(now.force_n, 0.0),
                 ..now
             })
@@ -133,7 +120,7 @@ impl Following {
     }
 
     /// What the finger does now; `None` if it presses nothing.
-    pub fn touch(&self) -> Option<Touch> {
+    pub fn touch(&self) -> Option<Press> {
         self.now
     }
 
@@ -142,7 +129,7 @@ impl Following {
         let Some(now) = self.now else {
             return Load::REST;
         };
-        let before = self.before.unwrap_or(Touch {
+        let before = self.before.unwrap_or(Press {
             force_n: 0.0,
             ..now
         });
@@ -164,7 +151,7 @@ impl Following {
 mod tests {
     use super::*;
 
-    const TOUCH: Touch = Touch {
+    const TOUCH: Press = Press {
         place_mm: [1.0, -2.0],
         force_n: 0.1,
         angles_deg: [4.0, 0.0],
@@ -207,7 +194,7 @@ mod tests {
 
     #[test]
     fn what_is_out_of_range_is_brought_into_it() {
-        let far = Touch {
+        let far = Press {
             place_mm: [9.0, -9.0],
             force_n: 3.0,
             angles_deg: [80.0, -80.0],
@@ -215,7 +202,7 @@ mod tests {
         let near = far.in_range().unwrap();
         assert_eq!(near.place_mm, [FARTHEST_MM, -FARTHEST_MM]);
         assert_eq!((near.force_n, near.angles_deg), (MOST_N, [12.0, -12.0]));
-        let none = Touch {
+        let none = Press {
             force_n: f64::NAN,
             ..TOUCH
         };

@@ -5,7 +5,7 @@
 //! shows what the sensing knows of two contacts, and not how well it knows that: for its errors
 //! `docs/results/touches.md` has finite elements.
 
-use super::hand::{MOST_N, Touch};
+use super::hand::{MOST_N, Press};
 use hivtac_sensor::force::forward::pair::{Both, Interaction};
 use hivtac_sensor::force::forward::{Column, Forward, Pose};
 use hivtac_sensor::force::model::Model;
@@ -43,7 +43,7 @@ impl PairFilm {
     pub fn displacement(
         &self,
         scene: &Scene,
-        touches: [Touch; 2],
+        touches: [Press; 2],
     ) -> Option<impl Fn([f64; 2]) -> [f64; 3]> {
         let together_n = touches[0].force_n + touches[1].force_n;
         if together_n <= 0.0 {
@@ -51,7 +51,7 @@ impl PairFilm {
         }
         let part = touches[0].force_n / together_n;
         let [first, second] = touches.map(|touch| {
-            let whole = Touch {
+            let whole = Press {
                 force_n: together_n,
                 ..touch
             };
@@ -81,7 +81,7 @@ impl PairFilm {
     fn shifts(
         &self,
         scene: &Scene,
-        touches: [Touch; 2],
+        touches: [Press; 2],
         (alone, mean): (
             &impl Fn([f64; 2]) -> [[f64; 3]; 2],
             &impl Fn([[f64; 3]; 2]) -> [f64; 3],
@@ -114,7 +114,7 @@ impl PairFilm {
     }
 
     /// The motion of the images that the network adds, focal lengths.
-    fn moved(&self, touches: [Touch; 2]) -> Option<Column> {
+    fn moved(&self, touches: [Press; 2]) -> Option<Column> {
         let [first, second] = touches.map(|touch| {
             let force_n = load(touch)?.vector_n().map(|part| part as f32);
             let place_mm = touch.place_mm.map(|part| part as f32);
@@ -142,14 +142,14 @@ pub(super) fn step(here: [f64; 2], at: impl Fn([f64; 2]) -> [f64; 2], px: [f64; 
 }
 
 /// The load of a touch.
-fn load(touch: Touch) -> Option<Load> {
+fn load(touch: Press) -> Option<Load> {
     let [alpha, beta] = touch.angles_deg;
     let load = Load::from_angles(touch.force_n, alpha, beta).ok()?;
     load.with_offset_mm(touch.place_mm).ok()
 }
 
 /// The sum of two touches as one load in their middle, for the truth; no load if there is none.
-pub fn sum(touches: [Touch; 2]) -> Load {
+pub fn sum(touches: [Press; 2]) -> Load {
     let sum = || {
         let [first, second] = touches.map(|touch| load(touch).map(|load| load.vector_n()));
         let (first, second) = (first?, second?);
@@ -164,10 +164,10 @@ pub fn sum(touches: [Touch; 2]) -> Load {
 }
 
 /// Two touches whose forces are together in range.
-pub fn in_range(touches: [Touch; 2]) -> [Touch; 2] {
+pub fn in_range(touches: [Press; 2]) -> [Press; 2] {
     let together_n = touches[0].force_n + touches[1].force_n;
     let part = (MOST_N / together_n.max(MOST_N)).min(1.0);
-    touches.map(|touch| Touch {
+    touches.map(|touch| Press {
         force_n: part * touch.force_n,
         ..touch
     })
@@ -185,12 +185,12 @@ mod tests {
     use hivtac_terms::status::Status;
     use hivtac_wire::message::{Request, Sample};
 
-    const LEFT: Touch = Touch {
+    const LEFT: Press = Press {
         place_mm: [-2.5, 1.0],
         force_n: 0.05,
         angles_deg: [2.0, -1.0],
     };
-    const RIGHT: Touch = Touch {
+    const RIGHT: Press = Press {
         place_mm: [1.5, -0.5],
         force_n: 0.06,
         angles_deg: [0.0, 3.0],

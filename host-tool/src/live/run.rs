@@ -3,6 +3,7 @@
 use super::camera::{Camera, Kind};
 use super::device::{Captured, Device};
 use super::eye::Eye;
+use crate::page;
 use hivtac_twin::Truth;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -24,16 +25,15 @@ pub struct FrameTruth {
 }
 
 impl FrameTruth {
-    /// The press in the integers of the wire format: Fx, Fy, Fz and |F|, µN; α and β, thousandths
-    /// of a degree; and the place, µm along x and y, or `None` without a press.
-    pub fn integers(&self) -> ([i64; 4], [i64; 2], Option<[i64; 2]>) {
+    /// The press as the page shows it, in the integers of the wire format.
+    pub fn of_page(&self) -> page::Truth {
         let thousandths = |value: f64| (1e3 * value).round() as i64;
         let force = self.truth.force;
         let [x, y, z] = force.vector_n();
         let newtons = [x, y, z, force.magnitude_n()].map(|part| thousandths(1e3 * part));
         let angles = [force.alpha_deg(), force.beta_deg()].map(thousandths);
         let place = self.truth.touches_mm.map(|place| place.map(thousandths));
-        (newtons, angles, place)
+        page::Truth(self.frame, newtons, angles, place)
     }
 }
 
@@ -145,7 +145,7 @@ impl Frames {
         let begun_us = self.begins_us;
         let time_us = begun_us.saturating_add_signed(camera.middle_us().into());
         let shot = (self.eye).shot(&camera, self.number, 1e-6 * time_us as f64);
-        let told = FrameTruth {
+        let truth = FrameTruth {
             frame: self.number,
             time_us,
             truth: shot.truth,
@@ -158,7 +158,7 @@ impl Frames {
         };
         self.begins_us += u64::from(camera.frame_us());
         self.number = self.number.wrapping_add(1);
-        (captured, told, std::mem::take(&mut self.missed))
+        (captured, truth, std::mem::take(&mut self.missed))
     }
 }
 
@@ -194,8 +194,8 @@ impl Clock {
                     if late > 0 {
                         self.shared.act(|device| device.missed(late));
                     }
-                    let (captured, told, missed) = self.frames.take(camera);
-                    tell(told);
+                    let (captured, truth, missed) = self.frames.take(camera);
+                    tell(truth);
                     let now = || self.shared.now_us();
                     self.shared
                         .act(|device| device.frame(&captured, missed, now));

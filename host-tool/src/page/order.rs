@@ -54,7 +54,7 @@ impl Order {
     ///
     /// # Errors
     /// When the device has no model whose threshold it could use.
-    pub fn asked(
+    pub fn command(
         &self,
         hello: &DeviceHello,
         patience: Duration,

@@ -104,11 +104,12 @@ impl Records {
             return Ok(Vec::new());
         }
         let summary = self.bytes(from, footer_at - from)?;
-        let told = u32::from_le_bytes(footer[footer.len() - 4..].try_into().unwrap_or_default());
+        let expected =
+            u32::from_le_bytes(footer[footer.len() - 4..].try_into().unwrap_or_default());
         let mut sum = crc32fast::Hasher::new();
         sum.update(&summary);
         sum.update(&footer[..footer.len() - 4]);
-        if told != 0 && told != sum.finalize() {
+        if expected != 0 && expected != sum.finalize() {
             return Ok(Vec::new());
         }
         let records = records_of(&summary).0.into_iter();
@@ -262,8 +263,8 @@ fn unpacked(body: &[u8]) -> Result<Vec<Record<'static>>, String> {
         return Err("it is no chunk".to_owned());
     };
     let bytes = decompressed(&header, &data).map_err(|error| error.to_string())?;
-    let told = header.uncompressed_crc;
-    if told != 0 && told != crc32fast::hash(&bytes) {
+    let expected = header.uncompressed_crc;
+    if expected != 0 && expected != crc32fast::hash(&bytes) {
         return Err("the chunk's checksum is wrong".to_owned());
     }
     match records_of(&bytes) {

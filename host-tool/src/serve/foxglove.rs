@@ -84,7 +84,7 @@ fn create(
 }
 
 impl Outlet for Server {
-    fn told(&self) -> Vec<(&'static str, String)> {
+    fn addresses(&self) -> Vec<(&'static str, String)> {
         vec![("foxglove", format!("ws://{}", self.address))]
     }
 

@@ -24,7 +24,7 @@ use hivtac_host::shown::shown;
 use hivtac_host::stop;
 use hivtac_wire::message::DeviceHello;
 use outlet::{Outlet, Served};
-use sensor::{Event, Sensor, TareOrder, Told, What};
+use sensor::{Event, NextDown, Sensor, TareOrder, What};
 use serde_json::{Map, Value};
 use std::collections::BTreeSet;
 use std::net::SocketAddr;
@@ -135,7 +135,7 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
     if tell(arguments.json, &outlets)? == Reader::Gone {
         return Ok(());
     }
-    let (events, told) = sync_channel(EVENTS);
+    let (events, received) = sync_channel(EVENTS);
     std::thread::scope(|scope| {
         let each = links.into_iter().zip(orders).zip(&served).enumerate();
         for (number, ((link, orders), served)) in each {
@@ -155,7 +155,7 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
         drop(events);
         let frame = format!("{}_grip", arguments.name);
         let mut grips = paired.map(|paired| Grips { paired, frame });
-        publish(&told, &served, &mut grips, &mut outlets);
+        publish(&received, &served, &mut grips, &mut outlets);
     });
     stop::check()
 }
@@ -223,7 +223,7 @@ fn served(node: &str, hellos: Vec<DeviceHello>) -> Vec<(Served, Receiver<TareOrd
             name,
             frames: Frames::of(&frames),
             orders,
-            down: Told::default(),
+            down: NextDown::default(),
             not_published: Arc::default(),
         };
         (served, arriving)
@@ -264,16 +264,16 @@ fn outlets(
 
 /// Prints the address of each outlet.
 fn tell(json: bool, outlets: &[Box<dyn Outlet>]) -> Result<Reader, Failure> {
-    let told = outlets.iter().flat_map(|outlet| outlet.told());
+    let addresses = outlets.iter().flat_map(|outlet| outlet.addresses());
     print(&match json {
         true => {
-            let object: Map<String, Value> = told
+            let object: Map<String, Value> = addresses
                 .map(|(word, value)| (word.to_owned(), value.into()))
                 .collect();
             Value::Object(object).to_string()
         }
         false => {
-            let words = told.map(|(word, value)| format!(" {word}={value}"));
+            let words = addresses.map(|(word, value)| format!(" {word}={value}"));
             format!("ready{}", words.collect::<String>())
         }
     })
@@ -281,14 +281,14 @@ fn tell(json: bool, outlets: &[Box<dyn Outlet>]) -> Result<Reader, Failure> {
 
 /// Publishes the devices' events until all their threads have ended.
 fn publish(
-    told: &Receiver<Event>,
+    received: &Receiver<Event>,
     served: &[Served],
     grips: &mut Option<Grips>,
     outlets: &mut [Box<dyn Outlet>],
 ) {
     let mut turned = Instant::now();
     loop {
-        match told.recv_timeout(TURN_EVERY) {
+        match received.recv_timeout(TURN_EVERY) {
             Ok(event) => {
                 publish_one(&event, &served[event.sensor], outlets);
                 if let Some(grips) = grips {

@@ -1,6 +1,6 @@
 //! The interface to a program's outlet, which ROS 2 and Foxglove share.
 
-use super::sensor::{TareOrder, Told};
+use super::sensor::{NextDown, TareOrder};
 use hivtac_host::ros::channel::{Channel, Frames, GripChannel};
 use hivtac_wire::message::DeviceHello;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::mpsc::SyncSender;
 /// An outlet for messages.
 pub trait Outlet {
     /// Its addresses: a word and its value each, for the line that begins with `ready`.
-    fn told(&self) -> Vec<(&'static str, String)>;
+    fn addresses(&self) -> Vec<(&'static str, String)>;
 
     /// Publishes a device's message, as CDR, that was received at `came_ns`, ns since 1970. False
     /// if it could not be published.
@@ -38,7 +38,7 @@ pub struct Served {
     /// The queue of its orders.
     pub orders: SyncSender<TareOrder>,
     /// The last direction of gravity that was not passed on yet.
-    pub down: Told,
+    pub down: NextDown,
     /// Number of samples that an outlet did not take.
     pub not_published: Arc<AtomicU64>,
 }

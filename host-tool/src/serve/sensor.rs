@@ -47,7 +47,7 @@ pub type Answer = Result<String, String>;
 pub struct TareOrder(pub SyncSender<Answer>);
 
 /// The last direction of gravity set for a device; `None` once it was passed on.
-pub type Told = Arc<Mutex<Option<Down>>>;
+pub type NextDown = Arc<Mutex<Option<Down>>>;
 
 /// A device that is served.
 pub struct Sensor {
@@ -61,7 +61,7 @@ pub struct Sensor {
     lost: Option<Instant>,
     events: SyncSender<Event>,
     orders: Receiver<TareOrder>,
-    down: Told,
+    down: NextDown,
     not_published: Arc<AtomicU64>,
 }
 
@@ -73,7 +73,7 @@ impl Sensor {
         patience: Duration,
         (port, hello): (String, DeviceHello),
         events: SyncSender<Event>,
-        (orders, down): (Receiver<TareOrder>, Told),
+        (orders, down): (Receiver<TareOrder>, NextDown),
         not_published: Arc<AtomicU64>,
     ) -> Sensor {
         Sensor {
@@ -182,12 +182,12 @@ impl Follower for Sensor {
         if self.diagnosed.elapsed() >= DIAGNOSE_EVERY {
             self.diagnose();
         }
-        let told = self
+        let next = self
             .down
             .lock()
             .unwrap_or_else(PoisonError::into_inner)
             .take();
-        if let Some((link, down)) = link.as_mut().zip(told) {
+        if let Some((link, down)) = link.as_mut().zip(next) {
             link.set_down(down)?;
         }
         let mut is_asked = false;

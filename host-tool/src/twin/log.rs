@@ -31,20 +31,20 @@ impl TruthLog {
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn write(&mut self, told: &FrameTruth) -> Result<(), Failure> {
-        let line = to_json(&line(told)) + "\n";
+    pub fn write(&mut self, frame: &FrameTruth) -> Result<(), Failure> {
+        let line = to_json(&line(frame)) + "\n";
         let written = self.file.write_all(line.as_bytes());
         written.map_err(|error| Failure::of_file(&self.name, error))
     }
 }
 
-fn line(told: &FrameTruth) -> Value {
-    let force = told.truth.force;
+fn line(frame: &FrameTruth) -> Value {
+    let force = frame.truth.force;
     let [x, y, z] = force.vector_n();
-    let place = told.truth.touches_mm;
+    let place = frame.truth.touches_mm;
     json!({
-        "frame": told.frame,
-        "time_us": told.time_us,
+        "frame": frame.frame,
+        "time_us": frame.time_us,
         "alpha_deg": force.alpha_deg(),
         "beta_deg": force.beta_deg(),
         "magnitude_n": force.magnitude_n(),

@@ -65,8 +65,8 @@ pub fn run(arguments: &TwinArguments) -> Result<(), Failure> {
         return Ok(());
     }
     let mut failed = None;
-    clock.run(stop::requested, |told| {
-        if let Some(Err(failure)) = log.as_mut().map(|log| log.write(&told)) {
+    clock.run(stop::requested, |frame| {
+        if let Some(Err(failure)) = log.as_mut().map(|log| log.write(&frame)) {
             failed = Some(failure);
             log = None;
         }

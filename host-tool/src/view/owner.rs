@@ -34,7 +34,7 @@ struct Watched {
     recorder: Recorder,
     /// Which finger of a grip it is, 0 or 1, and the grip.
     grip: Option<(usize, Gripping)>,
-    told: Instant,
+    delivered: Instant,
     /// Whether a message has come since the last update.
     is_new: bool,
 }
@@ -54,13 +54,13 @@ impl Watched {
     }
 
     fn tell_now_and_then(&mut self) {
-        if (self.is_new || self.grip.is_some()) && self.told.elapsed() >= TELL_EVERY {
+        if (self.is_new || self.grip.is_some()) && self.delivered.elapsed() >= TELL_EVERY {
             self.tell();
         }
     }
 
     fn tell(&mut self) {
-        self.told = Instant::now();
+        self.delivered = Instant::now();
         self.is_new = false;
         // The first finger's page has it.
         if let Some((0, grip)) = &self.grip {
@@ -90,7 +90,7 @@ impl Owner {
             state: State::new(link.name.clone(), hello),
             recorder,
             grip: None,
-            told: Instant::now(),
+            delivered: Instant::now(),
             is_new: false,
         };
         watched.tell();
@@ -149,15 +149,15 @@ impl Owner {
             }
             _ => {}
         }
-        let Some(asked) = order.asked(&self.watched.state.hello, self.patience)? else {
+        let Some(command) = order.command(&self.watched.state.hello, self.patience)? else {
             // The server presses by itself.
             return Ok(Answer::Done(String::new()));
         };
-        self.request(link, asked.request, asked.patience)?;
+        self.request(link, command.request, command.patience)?;
         // The values now in use, from the device.
         self.request(link, Request::GetInfo, self.patience)?;
         self.ask_settings(link)?;
-        Ok(Answer::Done(asked.done))
+        Ok(Answer::Done(command.done))
     }
 
     /// Asks which settings are in use. A device that does not tell them is shown without.

@@ -4,9 +4,8 @@ use super::{Opened, ViewArguments, open};
 use crate::twin::Inside;
 use hivtac_host::failure::{Failure, Kind};
 use hivtac_host::link::Link;
-use hivtac_host::live::hand::{Hand, Touch};
-use hivtac_host::live::run::FrameTruth;
-use hivtac_host::page::{Feed, Fingers, Press, Sensor, Truth};
+use hivtac_host::live::hand::Hand;
+use hivtac_host::page::{Feed, Fingers, Press, Sensor};
 use hivtac_host::port::Address;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_wire::message::Request;
@@ -25,8 +24,8 @@ pub fn open_twin(arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure>
     let inside = Inside::start(&arguments.simulated, hand.clone())?;
     let address = Address::parse(&inside.port);
     let feed = Arc::new(Feed::default());
-    let told = feed.clone();
-    std::thread::spawn(move || inside.run(|frame| told.truth(truth(&frame))));
+    let of_twin = feed.clone();
+    std::thread::spawn(move || inside.run(|frame| of_twin.truth(frame.of_page())));
     let (mut link, hello) = Link::connect(&address, arguments.timeout)?;
     let mut ask = |request| link.request(request, arguments.timeout, |_| {});
     ask(Request::SetContactShape(ContactShape::Needle))?;
@@ -38,20 +37,7 @@ pub fn open_twin(arguments: &ViewArguments) -> Result<(Sensor, Opened), Failure>
     }
     let (mut sensor, opened) = open(&address, (link, hello), feed, arguments);
     sensor.hand = Some(Box::new(move |fingers: Fingers| {
-        hand.set(fingers.map(|press| press.and_then(|press| touch(press).in_range())));
+        hand.set(fingers.map(|press| press.and_then(Press::in_range)));
     }));
     Ok((sensor, opened))
-}
-
-fn touch(press: Press) -> Touch {
-    Touch {
-        place_mm: press.place_mm,
-        force_n: press.force_n,
-        angles_deg: press.angles_deg,
-    }
-}
-
-fn truth(told: &FrameTruth) -> Truth {
-    let (newtons, angles, place) = told.integers();
-    Truth(told.frame, newtons, angles, place)
 }

@@ -120,15 +120,9 @@ fn a_device_that_forgot_the_conversation_is_lost() {
             while device.next().is_some() {}
         })
     };
-    let arguments = [
-        "monitor",
-        "--json",
-        "--timeout",
-        "0.5",
-        "--frames",
-        "2",
-        "--port",
-    ];
+    let arguments: Vec<_> = "monitor --json --timeout 0.5 --frames 2 --port"
+        .split(' ')
+        .collect();
     let device = FakeDevice::on_tcp([forgetful()]);
     let alone = start(&[&arguments[..], &[&device.port]].concat());
     let device = FakeDevice::on_tcp([forgetful(), streaming(samples(0..1))]);

@@ -285,13 +285,11 @@ fn the_truth_stands_beside_and_is_compared() {
 
 #[test]
 fn a_missing_truth_file_is_named() {
-    let run = run(&[
-        "monitor",
-        "--port",
-        "tcp:127.0.0.1:9",
-        "--truth",
-        "/nowhere/truth.jsonl",
-    ]);
+    let run = run(
+        &"monitor --port tcp:127.0.0.1:9 --truth /nowhere/truth.jsonl"
+            .split(' ')
+            .collect::<Vec<_>>(),
+    );
     assert_eq!(run.code, Some(1));
     assert!(
         run.stderr

@@ -262,15 +262,11 @@ fn limits_are_changed_one_by_one_and_kept() {
     let mut expected = usual;
     expected.contact.begins.0 = 3_500;
     assert_eq!(touch, expected);
-    let (slip, _) = changed(&[
-        "settings",
-        "set",
-        "slip",
-        "--distance",
-        "90",
-        "--ratio",
-        "0.2",
-    ]);
+    let (slip, _) = changed(
+        &"settings set slip --distance 90 --ratio 0.2"
+            .split(' ')
+            .collect::<Vec<_>>(),
+    );
     let mut expected = usual;
     (expected.slip.distance.0, expected.slip.ratio.0) = (90, 200);
     assert_eq!(slip, expected);

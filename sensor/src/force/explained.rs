@@ -104,19 +104,19 @@ impl Resting {
         own: &Rest,
         is_calibrated: bool,
     ) -> Resting {
-        let told = forward.rest_image.mounting(flat);
+        let of_rest = forward.rest_image.mounting(flat);
         let near = own.is_near(&flat.features);
         // The tables already include how this unit's markers are glued.
         let known = Mounting {
-            per_px: forward.per_px.unwrap_or(told.per_px),
-            beside_mm: Markers::defaults(told.beside_mm.len()),
+            per_px: forward.per_px.unwrap_or(of_rest.per_px),
+            beside_mm: Markers::defaults(of_rest.beside_mm.len()),
         };
         let own = match near {
             true => Some(known),
             false => known.remounted(flat, own).filter(|_| is_calibrated),
         };
         let is_own = own.is_some();
-        let mounting = own.unwrap_or(told);
+        let mounting = own.unwrap_or(of_rest);
         let centroids = &rest.features.centroids;
         let off = match near {
             true => forward.noise.rest_px,

@@ -156,7 +156,7 @@ impl Resting {
             let searched = self.search(problem, markers, noise, (pairs, &mut means));
             followed.or(searched)
         });
-        self.told(forward, range, &found??)
+        self.forces(forward, range, &found??)
     }
 
     /// Goes on with a search, or begins one. Returns the contacts if it ends with this frame's.
@@ -195,7 +195,7 @@ impl Resting {
     }
 
     /// The forces of two contacts; `None` beyond the tables.
-    fn told(
+    fn forces(
         &self,
         forward: &Forward<'_>,
         range: &CalibratedRange,

@@ -28,9 +28,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let features = measurement.features.as_ref().filter(|_| may_rest);
         followed.status |= tare.status();
         let rezero = self.temporal.settings().rezero.as_ref();
-        let told = tare.follow(rezero, at.time_us, features);
-        followed.tells_rest = told != RestChange::Nothing;
-        match told {
+        let change = tare.follow(rezero, at.time_us, features);
+        followed.tells_rest = change != RestChange::Nothing;
+        match change {
             RestChange::Nothing => {}
             RestChange::Drift => self.apply_drift(),
             RestChange::Moved => self.prepare(),

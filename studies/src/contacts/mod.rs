@@ -76,7 +76,7 @@ impl Contacts {
         if self.near_dots || layout != Layout::default() {
             return Ok(());
         }
-        page::write("contacts.md", include_str!("page.md"), &table)
+        page::write("contacts.md", &table)
     }
 
     /// The rows of all settings.

@@ -112,16 +112,16 @@ impl Row {
 
     fn line(&self) -> String {
         let Row { kind, setting, .. } = self;
-        let told = self.errors[0].len() as f64;
+        let forces = self.errors[0].len() as f64;
         let part = |count: f64| 100.0 * count / f64::from(self.frames);
         let [loosely, of_three] = [self.loosely, self.of_three].map(|count| part(count.into()));
         let before = format!(
             "| {kind} | {setting} | {} | {:.0} % | {loosely:.0} % | {of_three:.0} % | {} |",
             self.presses,
-            part(told),
+            part(forces),
             self.reasons()
         );
-        if told == 0.0 {
+        if forces == 0.0 {
             return format!("{before} – | – | – | – |\n");
         }
         let parts = self.errors.each_ref().map(|errors| {
@@ -130,13 +130,13 @@ impl Row {
             [50, 95].map(|part| sorted[(sorted.len() * part / 100).min(sorted.len() - 1)])
         });
         let [[angle, most_angle], [size, most_size], [place, most_place]] = parts;
-        let [a, b, c] = self.within.map(|within| 100.0 * f64::from(within) / told);
+        let [a, b, c] = self.within.map(|within| 100.0 * f64::from(within) / forces);
         format!(
             "{before} {angle:.2}° [{most_angle:.1}] | {:.1} % [{:.1}], {:+.1} % | {place:.3} mm \
              [{most_place:.2}] | {a:.0}, {b:.0}, {c:.0} % |\n",
             100.0 * size,
             100.0 * most_size,
-            100.0 * self.stronger / told
+            100.0 * self.stronger / forces
         )
     }
 }

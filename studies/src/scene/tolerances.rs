@@ -181,13 +181,13 @@ impl Tolerances {
         change(&mut built);
         let errors = self.measure(built, solved, weights, model);
         eprintln!("{name}: {:?}", errors.as_ref().map(Errors::rms));
-        let told = errors.as_ref().ok();
+        let seen = errors.as_ref().ok();
         Row {
             dimension: name,
             solved,
             off,
-            within: told.map_or([f64::NAN; 3], Errors::covered),
-            frames: told.map_or(0, |errors| errors.count),
+            within: seen.map_or([f64::NAN; 3], Errors::covered),
+            frames: seen.map_or(0, |errors| errors.count),
             rms: errors
                 .map(|errors| errors.rms())
                 .map_err(|error| format!("{error:#}")),

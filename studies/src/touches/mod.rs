@@ -86,7 +86,7 @@ impl Touches {
         text += OtherRow::HEAD;
         text.extend(others.iter().map(OtherRow::line));
         print!("{text}");
-        page::write("touches.md", include_str!("page.md"), &text)
+        page::write("touches.md", &text)
     }
 
     fn rows(&self) -> Result<(Vec<PairRow>, Vec<OtherRow>)> {

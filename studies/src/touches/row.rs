@@ -66,7 +66,7 @@ pub struct OtherRow {
     one: f64,
     without_a_dot: f64,
     two: f64,
-    told_two: f64,
+    found_two: f64,
     refused: f64,
 }
 
@@ -291,7 +291,7 @@ impl OtherRow {
             one: percent(outcomes, |own| own.is_one[0]),
             without_a_dot: percent(outcomes, |own| own.is_one[1]),
             two: percent(outcomes, |own| own.is_two),
-            told_two: percent(outcomes, |own| own.is_two && !own.is_one[1]),
+            found_two: percent(outcomes, |own| own.is_two && !own.is_one[1]),
             refused: percent(outcomes, Outcome::is_refused),
         }
     }
@@ -303,13 +303,13 @@ impl OtherRow {
             one,
             without_a_dot,
             two,
-            told_two,
+            found_two,
             refused,
             frames,
         } = self;
         format!(
             "| {name} | {frames} | {one:.1} % | {without_a_dot:.1} % | {two:.1} % | \
-             {told_two:.1} % | {refused:.1} % |\n"
+             {found_two:.1} % | {refused:.1} % |\n"
         )
     }
 }

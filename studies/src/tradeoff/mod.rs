@@ -159,9 +159,12 @@ mod tests {
         let name = format!("11-{}-5 ov7725", picked.network);
         assert_eq!(model.name().as_str(), name);
         assert_eq!(model.forward.map_or(0, |film| film.steps), picked.steps);
+        let weights = include_str!("../../../calibration/models/default.weights");
+        assert!(weights.contains(r#""arithmetic":"int8-per-channel""#));
         assert_eq!(
             picked.command(),
-            "hivtac-calibrate default-model --hidden 64,64 --arithmetic int16 --steps 1 --out-dir ."
+            "hivtac-calibrate default-model --hidden 64,64 --arithmetic int8-per-channel --steps 1 \
+             --out-dir ."
         );
     }
 }

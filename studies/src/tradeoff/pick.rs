@@ -26,23 +26,22 @@ pub struct Limits {
 /// The best configuration within the limits.
 ///
 /// With a limit on the error, the fastest. Otherwise the most accurate: the error of the direction
-/// from 50 mN up, of |F| and of the place must be within a twentieth of the least of each. Among
-/// those within a twentieth of the fastest's time, the one that refuses least.
+/// from 50 mN up, of |F| and of the place must be within a twentieth of the least of each. So must
+/// then be the time, and of those that are left the part of frames without a force. Of the rest,
+/// the fastest.
 pub(super) fn best<'c>(all: &'c [Configuration], limits: &Limits) -> Result<&'c Configuration> {
     let fitting: Vec<_> = all.iter().filter(|c| limits.hold(c)).collect();
-    let best = match limits.max_error_deg {
-        Some(_) => fitting.into_iter().min_by_key(|c| c.modelled_cycles),
+    let left = match limits.max_error_deg {
+        Some(_) => fitting,
         None => {
             let left = equals(&fitting, |c| c.strong_direction_deg);
             let left = equals(&left, |c| c.force_rmse_mn);
             let left = equals(&left, |c| c.place_rmse_um);
             let left = equals(&left, |c| c.modelled_cycles as f64);
-            left.into_iter().min_by(|a, b| {
-                let by_cycles = a.modelled_cycles.cmp(&b.modelled_cycles);
-                (a.unexplained.total_cmp(&b.unexplained)).then(by_cycles)
-            })
+            equals(&left, |c| c.unexplained)
         }
     };
+    let best = left.into_iter().min_by_key(|c| c.modelled_cycles);
     best.with_context(|| {
         let nearest = nearest(all).unwrap_or_default();
         format!("nothing that the firmware does is within these limits; {nearest}")

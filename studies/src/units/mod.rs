@@ -124,8 +124,8 @@ impl Units {
             return Ok(());
         }
         match self.films {
-            Films::Nominal => page::write("units.md", include_str!("units.md"), &text),
-            Films::Real => page::write("real-films.md", include_str!("real.md"), &text),
+            Films::Nominal => page::write("units.md", &text),
+            Films::Real => page::write("real-films.md", &text),
         }
     }
 

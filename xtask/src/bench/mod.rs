@@ -11,12 +11,9 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 
-use crate::size::grouped;
 use crate::{artifacts, packages, process, toolchain};
 
 const BASELINE: &str = "xtask/baseline.json";
-/// The emulator's command line, up to the machine.
-const QEMU: &str = "qemu-system-arm -display none -monitor none -serial none -d plugin -M";
 
 /// Options of `cargo xtask bench`.
 #[derive(Args, Default)]
@@ -32,40 +29,39 @@ pub struct Bench {
     board: bool,
 }
 
-/// A core that QEMU emulates.
-struct Core {
-    /// QEMU's name of a machine with it.
-    machine: &'static str,
-    /// Its clock on the sensor's board, in MHz.
-    clock_mhz: u32,
-    image: PathBuf,
-}
-
 impl Bench {
     /// Counts and prints every case, and compares the counts with the baseline.
     pub fn run(&self) -> Result<()> {
         if self.board {
             return board::run();
         }
-        packages::ensure_qemu()?;
+        packages::ensure("qemu-system-arm", "qemu-system-arm")?;
         let folder = toolchain::work_folder("bench")?;
         let plugin = artifacts::instruction_counter(plugin_version()?)?;
-        let core = Core::new(self.m55)?;
+        // QEMU's name of a machine, the clock of its core on the sensor's board, and the image.
+        let (machine, clock_mhz, image) = match self.m55 {
+            false => ("mps2-an500", 480, artifacts::qemu_image()?),
+            true => ("mps3-an547", 800, artifacts::m55_image()?),
+        };
         let mut instructions = BTreeMap::new();
         for case in cases(&folder)? {
-            let [before, last_band] = counts(&core, &plugin, &folder, &case)?;
+            let log = folder.join("counts");
+            let mut qemu = qemu(machine, &image, &case.file, &folder.join("results"));
+            process::output(qemu.arg("-plugin").arg(&plugin).arg("-D").arg(&log))?;
+            // Before the last band of rows is there, and from then on.
+            let [before, last_band]: [u64; 2] = serde_json::from_str(&process::read(&log)?)?;
             if let Some(name) = case.name.strip_prefix("frame full") {
                 instructions.insert(format!("latency{name}"), last_band);
             }
             instructions.insert(case.name, before + last_band);
         }
-        process::print(&table(&instructions, core.clock_mhz));
+        process::print(&table(&instructions, clock_mhz));
         if self.m55 {
             return Ok(());
         }
         let baseline = toolchain::at(BASELINE);
         let now = Baseline {
-            compiler: toolchain::target_compiler()?,
+            compiler: toolchain::rustc("-V")?,
             instructions,
         };
         if self.write_baseline {
@@ -74,24 +70,6 @@ impl Bench {
         }
         let committed: Baseline = serde_json::from_str(&process::read(&baseline)?)?;
         committed.check(&now)
-    }
-}
-
-impl Core {
-    /// Builds the image for the sensor's Cortex-M7, or for a Cortex-M55.
-    fn new(m55: bool) -> Result<Core> {
-        Ok(match m55 {
-            false => Core {
-                machine: "mps2-an500",
-                clock_mhz: 480,
-                image: artifacts::qemu_image()?,
-            },
-            true => Core {
-                machine: "mps3-an547",
-                clock_mhz: 800,
-                image: artifacts::m55_image()?,
-            },
-        })
     }
 }
 
@@ -111,19 +89,16 @@ fn cases(folder: &Path) -> Result<Vec<Case>> {
     cases.context("what benchmark-cases says")
 }
 
-/// Runs a case; returns its instructions before the last band of rows is there, and from then on.
-fn counts(core: &Core, plugin: &Path, folder: &Path, case: &Case) -> Result<[u64; 2]> {
-    let (log, results) = (folder.join("counts"), folder.join("results"));
-    let (script, results) = (case.file.display(), results.display());
+/// The emulator's command for a script, whose results go to another file.
+fn qemu(machine: &str, image: &Path, script: &Path, results: &Path) -> Command {
+    let words = "qemu-system-arm -display none -monitor none -serial none -d plugin -M";
+    let mut qemu = process::command(words);
+    let (script, results) = (script.display(), results.display());
     let arguments = format!("arg=hivtac-qemu-image,arg={script},arg={results}");
-    let mut qemu = process::command(QEMU);
-    qemu.arg(core.machine).arg("-semihosting-config");
+    qemu.args([machine, "-semihosting-config"]);
     qemu.arg(format!("enable=on,target=native,{arguments}"));
-    qemu.arg("-kernel").arg(&core.image);
-    qemu.arg("-plugin").arg(plugin).arg("-D").arg(&log);
-    process::output(&mut qemu)?;
-    let counts = serde_json::from_str(&process::read(&log)?);
-    counts.with_context(|| format!("what the plugin wrote: {}", log.display()))
+    qemu.arg("-kernel").arg(image);
+    qemu
 }
 
 /// The plugin interface's version that this QEMU accepts: 1 before QEMU 9, 2 from then on.
@@ -148,6 +123,14 @@ fn table(instructions: &BTreeMap<String, u64>, clock_mhz: u32) -> String {
     head + &rows.collect::<String>()
 }
 
+/// A number with a comma after each three digits.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let parts = digits.as_bytes().rchunks(3).rev();
+    let parts: Vec<_> = parts.map(String::from_utf8_lossy).collect();
+    parts.join(",")
+}
+
 /// Measured counts, with the compiler that built the image.
 #[derive(Debug, Serialize, Deserialize)]
 struct Baseline {
@@ -163,29 +146,24 @@ impl Baseline {
         let labels = self.instructions.keys().chain(now.instructions.keys());
         let mut changes = 0;
         for label in labels.collect::<BTreeSet<_>>() {
-            let counts = [self, now].map(|it| it.instructions.get(label));
-            if counts[0] != counts[1] {
+            let [was, is] = [self, now].map(|it| it.instructions.get(label));
+            if was != is {
                 changes += 1;
-                process::say(&format!(
-                    "{label}: {:?} → {:?} instructions",
-                    counts[0], counts[1]
-                ));
+                process::say(&format!("{label}: {was:?} → {is:?} instructions"));
             }
         }
+        let all = now.instructions.len();
+        let what = format!("{changes} of {all} instruction counts differ from the baseline's");
         if self.compiler != now.compiler {
-            process::say(&format!(
-                "instruction counts are not gated: the baseline is for {}, this is {}",
-                self.compiler, now.compiler
-            ));
+            let (this, that) = (&now.compiler, &self.compiler);
+            process::say(&format!("{what}: that is for {that}, this is {this}"));
             return Ok(());
         }
         ensure!(
             changes == 0,
-            "{changes} instruction counts differ from the baseline's; when they are meant to, \
-             `cargo xtask bench --write-baseline` and commit it"
+            "{what}; when they are meant to, `cargo xtask bench --write-baseline` and commit it"
         );
-        let all = now.instructions.len();
-        process::say(&format!("all {all} instruction counts are the baseline's"));
+        process::say(&what);
         Ok(())
     }
 }

@@ -1,6 +1,7 @@
 #!/bin/sh
 # Makes the guest in this folder: `kernel` and `initramfs` of Debian's packages, unpacked and not
-# installed, and the host tool. guest.sh TOOL INIT, with PORT, FORCES and TIMES for INIT.
+# installed, and the host tool. Then runs it in QEMU, and fails if it printed a failure.
+# guest.sh TOOL INIT, with PORT, FORCES and TIMES for INIT.
 set -eu
 tool=$1 init=$2
 
@@ -47,3 +48,11 @@ done
 echo "PORT=$PORT FORCES=$FORCES TIMES=$TIMES MODULES='$modules'" > root/parameters
 install -m 755 "$init" root/init
 (cd root && find . | "../$busybox" cpio -o -H newc > ../initramfs)
+
+# Usual are nine to sixteen minutes. The kernel's log is judged at the end, whole.
+timeout 2700 qemu-system-x86_64 -accel tcg -m 512 -display none -monitor none -no-reboot \
+    -nodefaults -nic user,model=e1000 -serial stdio -kernel kernel -initrd initramfs \
+    -append "console=ttyS0 loglevel=1 panic=-1 log_buf_len=4M" < /dev/null |
+    tr -d '\r' | tee console.txt
+grep -qx "Linux has ended" console.txt || { echo "Linux did not come to its end" >&2; exit 1; }
+if grep -q " \.\.\. FAIL$" console.txt; then exit 1; fi

@@ -36,7 +36,7 @@ pub struct Identity<'a> {
 pub fn hello(identity: &Identity<'_>, pipeline: Option<OfPipeline>, name: Name) -> DeviceHello {
     let geometry = identity.geometry;
     let (settings, model, filter) = match pipeline {
-        Some(told) => (told.settings, told.model, told.temporal.filter),
+        Some(in_use) => (in_use.settings, in_use.model, in_use.temporal.filter),
         None => {
             let settings = Settings::usual(geometry, ByteOrder::Swapped);
             (settings, None, Filter::None)

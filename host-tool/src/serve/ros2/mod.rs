@@ -9,7 +9,7 @@ mod zenoh;
 #[cfg(feature = "zenoh")]
 use super::is_on_zenoh;
 use super::outlet::{Outlet, Served};
-use super::sensor::{Answer, TareOrder, Told};
+use super::sensor::{Answer, NextDown, TareOrder};
 use crate::output::note;
 use hivtac_host::down::direction;
 use hivtac_host::failure::Failure;
@@ -90,9 +90,9 @@ struct Sensor<M: Middleware> {
     gravity: M::Subscription,
     /// The frame of vectors of gravity.
     frame: String,
-    down: Told,
+    down: NextDown,
     /// Whether an unusable vector was reported.
-    is_told: bool,
+    is_reported: bool,
 }
 
 /// The node.
@@ -105,7 +105,7 @@ struct Node<M: Middleware> {
     /// Since when no other program was seen; `None` once one was, or that was reported.
     alone: Option<Instant>,
     /// Whether another node of this name was reported.
-    is_told: bool,
+    is_reported: bool,
     middleware: M,
     name: String,
     domain: u16,
@@ -165,7 +165,7 @@ impl<M: Middleware> Node<M> {
             diagnostics: middleware.publisher("/diagnostics", DIAGNOSTICS.name)?,
             looked: Instant::now(),
             alone: Some(Instant::now()),
-            is_told: false,
+            is_reported: false,
             middleware,
             name: format!("/{name}"),
             domain,
@@ -193,14 +193,14 @@ impl<M: Middleware> Node<M> {
     /// Reports once when another node has this name, because their messages would mix.
     fn look_for_namesake(&mut self) {
         let is_anothers = self.middleware.has_namesake();
-        if is_anothers && !self.is_told {
+        if is_anothers && !self.is_reported {
             note(&format!(
                 "hivtac: another node in domain {} is called {}, too, and their messages are \
                  mixed; end one, or start it with another --name",
                 self.domain, self.name
             ));
         }
-        self.is_told = is_anothers;
+        self.is_reported = is_anothers;
     }
 }
 
@@ -226,7 +226,7 @@ impl<M: Middleware> Sensor<M> {
             gravity: middleware.subscription(&format!("{folder}/gravity"), VECTOR)?,
             frame: served.frames.film().to_owned(),
             down: served.down.clone(),
-            is_told: false,
+            is_reported: false,
         })
     }
 
@@ -237,9 +237,9 @@ impl<M: Middleware> Sensor<M> {
                 Ok(down) => {
                     *self.down.lock().unwrap_or_else(PoisonError::into_inner) = Some(down);
                 }
-                Err(why) if !self.is_told => {
+                Err(why) if !self.is_reported => {
                     note(&format!("hivtac: a vector of gravity is left out: {why}"));
-                    self.is_told = true;
+                    self.is_reported = true;
                 }
                 Err(_) => {}
             }
@@ -289,7 +289,7 @@ impl<M: Middleware> Sensor<M> {
 }
 
 impl<M: Middleware> Outlet for Node<M> {
-    fn told(&self) -> Vec<(&'static str, String)> {
+    fn addresses(&self) -> Vec<(&'static str, String)> {
         vec![
             ("ros2", self.name.clone()),
             ("domain", self.domain.to_string()),

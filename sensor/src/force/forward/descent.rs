@@ -331,8 +331,8 @@ impl Point {
         }
         left.reset(observed.moved.len(), 0.0);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());
-        for (left, (seen, told)) in left.iter_mut().zip(pairs) {
-            *left = seen - told;
+        for (left, (seen, predicted)) in left.iter_mut().zip(pairs) {
+            *left = seen - predicted;
         }
         self.pose = pose;
     }

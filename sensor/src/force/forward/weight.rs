@@ -104,7 +104,7 @@ pub enum Turned {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hanging {
     /// True if the prediction includes the effect; otherwise only the covariance does.
-    is_told: bool,
+    is_predicted: bool,
     /// The functions of gravity at each size, relative to those of the tables' film.
     functions: [[f32; AT_REST]; SIZES + 1],
     /// The part of the effect that the rest position includes.
@@ -162,7 +162,7 @@ impl<'a> Weight<'a> {
         }
         let at_rest = self.at_rest_of(&functions[0]);
         let mut hanging = Hanging {
-            is_told: true,
+            is_predicted: true,
             functions,
             at_rest,
             moved: Column::defaults(at_rest.len()),
@@ -175,7 +175,7 @@ impl<'a> Weight<'a> {
                     let column = self.columns().nth(k).unwrap_or_default();
                     column.map(|part| ANY_WAY * part)
                 };
-                hanging.is_told = false;
+                hanging.is_predicted = false;
                 hanging.moved = at_rest;
                 hanging.unsure = ANY_WAY;
                 hanging.along = Some([along(3), along(4)]);
@@ -345,7 +345,7 @@ impl Hanging {
     /// Adds the effect of weight under a load to a prediction.
     #[inline(never)]
     pub fn add_to(&self, pose: &Pose, forward: &Forward<'_>, prediction: &mut Prediction) {
-        if self.is_told {
+        if self.is_predicted {
             let (more, by_size) = self.more(pose, forward);
             add(&mut prediction.moved, 1.0, &more);
             add(&mut prediction.slopes[0], 1.0, &by_size);

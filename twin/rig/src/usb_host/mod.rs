@@ -104,7 +104,7 @@ pub struct Host {
     /// Whether a program has the serial port open.
     open: bool,
     /// Whether the device knows that it is open.
-    told_open: bool,
+    announced_open: bool,
     /// Whether the program reads.
     reading: bool,
     bulk_turn_in: bool,
@@ -153,7 +153,7 @@ impl Host {
             function: None,
             remote: None,
             open: false,
-            told_open: false,
+            announced_open: false,
             reading: true,
             bulk_turn_in: true,
             data1: [false; 2],
@@ -285,7 +285,7 @@ impl Host {
         self.transfer = None;
         self.queue.clear();
         self.function = None;
-        self.told_open = false;
+        self.announced_open = false;
         self.to_device.clear();
         if let Some(remote) = &mut self.remote {
             remote.forget();
@@ -401,7 +401,7 @@ impl Host {
         if self.remote.is_some() {
             return self.serve_client(now, device);
         }
-        if self.transfer.is_none() && self.open != self.told_open {
+        if self.transfer.is_none() && self.open != self.announced_open {
             self.tell_open(now);
         }
         if self.transfer.is_none() {
@@ -429,7 +429,7 @@ impl Host {
         let interface = self
             .function
             .map_or(0, |function| function.control_interface);
-        self.told_open = self.open;
+        self.announced_open = self.open;
         self.queue.extend(control::line(interface, self.open));
         self.next_transfer(now);
     }

@@ -9,7 +9,7 @@ use crate::ShellError;
 const SLOPES_COUNT: f64 = 0.05;
 
 /// Smallest ratio of the least determined term to the best determined one.
-const LEAST_TOLD: f64 = 1e-7;
+const LEAST_RATIO: f64 = 1e-7;
 
 /// The known outputs at a load: their values, and their derivatives by size and tilt if they are
 /// known.
@@ -51,8 +51,8 @@ pub fn nearest(terms: &Terms, known: &[Known]) -> Result<Vec<f64>, ShellError> {
     let matrix = Mat::from_fn(rows.len(), count, |i, j| rows[i][j]);
     let sides = Mat::from_fn(sides.len(), outputs, |i, j| sides[i][j]);
     let factors = matrix.col_piv_qr();
-    let told = factors.thin_R();
-    if told[(count - 1, count - 1)].abs() < LEAST_TOLD * told[(0, 0)].abs() {
+    let triangle = factors.thin_R();
+    if triangle[(count - 1, count - 1)].abs() < LEAST_RATIO * triangle[(0, 0)].abs() {
         return Err(ShellError::Solver(
             "the loads do not tell the terms apart: solve for more tilts".into(),
         ));
@@ -117,11 +117,11 @@ mod tests {
                 tilt: [0.3 * (k as f64).sin(), 0.4 * (1.7 * k as f64).cos()],
                 place_mm: [0.0; 2],
             };
-            let told = terms.rows(&pose).map(|row| {
+            let known = terms.rows(&pose).map(|row| {
                 let products = row.iter().zip(&own).map(|(a, b)| a * b);
                 vec![products.sum::<f64>()]
             });
-            let [values, slopes @ ..] = told;
+            let [values, slopes @ ..] = known;
             Known {
                 pose,
                 values,

@@ -157,7 +157,7 @@ fn compared(
     let pose = &Pose::of_force(case.force_n, *place_mm, unit.bending_and_stretching());
     let mut check = WholeCheck::default();
     let full = |disc: &Disc| disc.centroid_px(|rest| film.displacement(state, rest), camera);
-    let told = |disc: &Disc| {
+    let predicted = |disc: &Disc| {
         let motion = whole.disc(pose, *radius_mm, unit, disc);
         let [x, y] = disc.centre_mm;
         disc.centroid_px(|rest| motion.at([rest[0] - x, rest[1] - y]), camera)
@@ -168,7 +168,7 @@ fn compared(
         for disc in &discs {
             let seen = full(disc);
             if is_seen(seen) {
-                errors.add(error(seen, told(disc)));
+                errors.add(error(seen, predicted(disc)));
             }
         }
     }
@@ -179,7 +179,7 @@ fn compared(
         for disc in &MARKERS {
             let seen = full(disc);
             if is_seen(seen) {
-                check.four.add(error(seen, told(disc)));
+                check.four.add(error(seen, predicted(disc)));
                 let by_own = disc.centroid_px(|rest| pressed.displacement(rest), camera);
                 check.four_by_own.add(error(seen, by_own));
             }

@@ -75,7 +75,7 @@ impl Problem<'_> {
         };
         here.prediction.moved = self.moved(&known.pair);
         let pairs = self.observed.moved.iter().zip(here.prediction.moved.iter());
-        here.left = Column::of(pairs.map(|(seen, told)| seen - told));
+        here.left = Column::of(pairs.map(|(seen, predicted)| seen - predicted));
         let mut whitening = Whitening::EMPTY;
         let whole = whitening.set(|sum| here.put_covariance(self, sum));
         whitening.whiten(&mut here.left);
@@ -133,7 +133,9 @@ impl Problem<'_> {
     pub(super) fn left(&self, pair: &Pair) -> f32 {
         let moved = self.moved(pair);
         let pairs = moved.iter().zip(self.observed.moved.iter());
-        pairs.fold(0.0, |sum, (told, seen)| sum + (seen - told) * (seen - told))
+        pairs.fold(0.0, |sum, (predicted, seen)| {
+            sum + (seen - predicted) * (seen - predicted)
+        })
     }
 
     /// The motion of the images under two contacts, focal lengths.
@@ -225,8 +227,8 @@ impl Point {
         } = &mut point;
         prediction.put(both, forward, interaction, &mounting.beside_mm);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());
-        for (left, (seen, told)) in left.iter_mut().zip(pairs) {
-            *left = seen - told;
+        for (left, (seen, predicted)) in left.iter_mut().zip(pairs) {
+            *left = seen - predicted;
         }
         point
     }

@@ -1,6 +1,6 @@
 //! The global registers, by offset from the core's base.
 
-use super::{Core, interrupt, packet_status};
+use super::{Core, packet_status};
 
 /// OTG_CID as silicon answers it. (ST's register description file has 0x1200, the value of an older
 /// core.)
@@ -96,13 +96,6 @@ impl Core {
         let depth = self.transmit_fifo[endpoint] >> 16;
         if !self.ins[endpoint].push(word, depth) {
             self.lost_words += 1;
-        }
-    }
-
-    /// Clears the latched start-of-frame flag if the firmware does not use its interrupt.
-    pub fn forget_start_of_frame(&mut self) {
-        if self.gintmsk & interrupt::SOF == 0 {
-            self.latched &= !interrupt::SOF;
         }
     }
 }

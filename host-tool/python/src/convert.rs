@@ -67,16 +67,16 @@ fn force(force: &Force) -> ForceNumbers {
 
 /// The device's identity.
 pub fn hello<'py>(py: Python<'py>, hello: &DeviceHello) -> PyResult<Bound<'py, PyDict>> {
-    let told = PyDict::new(py);
-    told.set_item("serial", unit_number(&hello.device_id))?;
-    told.set_item("name", shown(&hello.name))?;
-    told.set_item("board", shown(&hello.board))?;
-    told.set_item("firmware", shown(&hello.firmware))?;
+    let fields = PyDict::new(py);
+    fields.set_item("serial", unit_number(&hello.device_id))?;
+    fields.set_item("name", shown(&hello.name))?;
+    fields.set_item("board", shown(&hello.board))?;
+    fields.set_item("firmware", shown(&hello.firmware))?;
     let model = hello.model.as_ref();
-    told.set_item("model", model.map(|model| shown(&model.name)))?;
-    told.set_item("width", hello.width)?;
-    told.set_item("height", hello.height)?;
-    Ok(told)
+    fields.set_item("model", model.map(|model| shown(&model.name)))?;
+    fields.set_item("width", hello.width)?;
+    fields.set_item("height", hello.height)?;
+    Ok(fields)
 }
 
 /// Largest motion of a marker, px; motion of the markers' middle, px; turn, rad; relative growth of
