@@ -197,7 +197,10 @@ mod tests {
         let no_test = |tally: &mut Tally| run_tests(&mut Command::new("true"), tally);
         report.step("xtask one", none, no_test);
         let ran = Cell::new(false);
-        report.step("xtask two", none, |_| Ok(ran.set(true)));
+        report.step("xtask two", none, |_| {
+            ran.set(true);
+            Ok(())
+        });
         let night = || Some("it is night".to_owned());
         report.step("xtask three", night, |_| bail!("it ran"));
         let error = report.finish().unwrap_err().to_string();

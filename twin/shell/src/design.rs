@@ -282,9 +282,9 @@ impl Design {
         tip_points(self.tip_offset_mm, self.tip_radius_mm)
     }
 
-    /// Returns the points of the film on one post, or on all if `None`, mm at rest, with their areas
-    /// in mm². They are Gauss's points over the angle whose sine is x, and along the chord there.
-    /// They follow a shifted post, and the film's edge cuts them, without a jump.
+    /// Returns the points of the film on one post, or on all if `None`, mm at rest, with their
+    /// areas in mm². They are Gauss's points over the angle whose sine is x, and along the chord
+    /// there. They follow a shifted post, and the film's edge cuts them, without a jump.
     fn points_of_posts(&self, only: Option<usize>) -> Vec<([f64; 2], f64)> {
         let (half, edge) = (self.span_mm / 2.0, self.half_edge_mm());
         let centres = [[-half, -half], [half, -half], [half, half], [-half, half]];

@@ -53,6 +53,6 @@ install -m 755 "$init" root/init
 timeout 2700 qemu-system-x86_64 -accel tcg -m 512 -display none -monitor none -no-reboot \
     -nodefaults -nic user,model=e1000 -serial stdio -kernel kernel -initrd initramfs \
     -append "console=ttyS0 loglevel=1 panic=-1 log_buf_len=4M" < /dev/null |
-    tr -d '\r' | tee console.txt
+    sed -u 's|\r||g' | tee console.txt
 grep -qx "Linux has ended" console.txt || { echo "Linux did not come to its end" >&2; exit 1; }
 if grep -q " \.\.\. FAIL$" console.txt; then exit 1; fi
