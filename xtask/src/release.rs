@@ -52,8 +52,9 @@ const BUILDERS: Environment = Environment {
     packages: "maturin>=1.9,<2 cargo-zigbuild>=0.20,<1 ziglang",
     needs: "Python 3.9",
 };
-/// Programs without symbols are a third as large.
-const STRIP: [&str; 2] = ["CARGO_PROFILE_RELEASE_STRIP", "symbols"];
+/// Programs without symbols are a third as large. The profile's own `strip` does not reach packages
+/// that have settings of their own there.
+const STRIP: [&str; 2] = ["RUSTFLAGS", "-C strip=symbols"];
 /// Files beside the program in each archive.
 const BESIDE: [&str; 4] = ["README.md", "CHANGELOG.md", "LICENSE-APACHE", "LICENSE-MIT"];
 
