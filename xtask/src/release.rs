@@ -84,7 +84,7 @@ impl Release {
         let built = artifacts::images()?;
         let images = write_images(&folder, &built)?;
         web_page(&folder, &built)?;
-        for name in names {
+        for &name in &names {
             let target = Target {
                 name,
                 python: &python,
@@ -95,7 +95,7 @@ impl Release {
             target.wheel(&program, &images)?;
         }
         bill_of_materials(&folder)?;
-        install(&folder)?;
+        install(&folder, &names)?;
         let sums = process::output(
             Command::new("sh")
                 .arg("-c")
@@ -351,30 +351,53 @@ for archive in "$files/hivtac-$version-$(uname -m)"-*-linux-*.tar.gz; do
 done
 "#;
 
-/// Installs what runs here, on this computer and in a new Debian.
-fn install(folder: &Path) -> Result<()> {
+/// Processors by Rust's names, and Debian's.
+const PROCESSORS: [(&str, &str); 2] = [("x86_64", "amd64"), ("aarch64", "arm64")];
+
+/// Installs what was made for `targets`: on this computer what runs here, then in a new Debian of
+/// each processor, emulated if it is another.
+fn install(folder: &Path, targets: &[&str]) -> Result<()> {
     let work = toolchain::work_folder("release")?;
-    let shell = ["sh", "-c", INSTALL, "install"];
-    let mut here = process::command("env");
-    here.args(shell).arg(folder).arg(&work).args([VERSION, ASK]);
-    process::run(&mut here)?;
+    let is_made = |processor: &str| targets.iter().any(|name| name.starts_with(processor));
+    if is_made(std::env::consts::ARCH) {
+        let mut here = process::command("env");
+        here.args(INSTALL_BY).arg(folder).arg(&work);
+        process::run(here.args([VERSION, ASK]))?;
+    }
     let is_root = process::output(&mut process::command("id -u"))?.trim() == "0";
     if !is_root || process::find_program("debootstrap").is_none() {
         process::say("not installed in a new Debian: that needs root and the program debootstrap");
         return Ok(());
     }
-    let debian = work.join("debian");
-    if debian.exists() {
-        std::fs::remove_dir_all(&debian)?;
+    for (processor, debian) in PROCESSORS.iter().filter(|(name, _)| is_made(name)) {
+        let emulator = format!("/proc/sys/fs/binfmt_misc/qemu-{processor}");
+        if *processor == std::env::consts::ARCH || Path::new(&emulator).exists() {
+            in_debian(folder, &work.join("debian"), debian)?;
+        } else {
+            process::say(&format!(
+                "not installed on {processor}: that needs Debian's qemu-user-static"
+            ));
+        }
     }
-    let packages = "--include=python3-venv,python3-numpy";
-    let mut make = process::command("debootstrap --variant=minbase");
-    process::run(make.args([packages, "stable"]).arg(&debian))?;
+    Ok(())
+}
+
+/// What runs [`INSTALL`] with the arguments that follow.
+const INSTALL_BY: [&str; 4] = ["sh", "-c", INSTALL, "install"];
+
+fn in_debian(folder: &Path, debian: &Path, architecture: &str) -> Result<()> {
+    if debian.exists() {
+        std::fs::remove_dir_all(debian)?;
+    }
+    let mut make = process::command(
+        "debootstrap --variant=minbase --include=python3-venv,python3-numpy --arch",
+    );
+    process::run(make.args([architecture, "stable"]).arg(debian))?;
     for file in folder.read_dir()? {
         copy_into(&debian.join("files"), &[file?.path()])?;
     }
     let mut there = process::command("env PIP_NO_INDEX=1 chroot");
-    there.arg(&debian).args(shell);
+    there.arg(debian).args(INSTALL_BY);
     process::run(there.args(["/files", "/tmp", VERSION, ASK]))?;
     Ok(std::fs::remove_dir_all(debian)?)
 }
