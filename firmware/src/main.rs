@@ -131,9 +131,10 @@ fn start() -> Foreground {
     faults::note_reset();
     bands::clear();
     priorities::set();
-    let board = board::start();
+    let mut board = board::start();
     faults::log_reset();
     seeded_bugs::fail_at_start();
+    supply::raise_brown_out(&mut board.flash);
     vsync::start(camera::VSYNC_BLANKING_IS_HIGH);
     let sensor = SENSOR.take();
     let mut memory = Memory::open(board.flash, board.thermometer);

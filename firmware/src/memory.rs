@@ -14,7 +14,7 @@ use crate::orders::{ORDERS, Order};
 use crate::self_test::{self, OfFlash};
 use crate::session::Origin;
 use crate::thermometer::Thermometer;
-use crate::{camera, capture_task, log, model_slots, outbox, settings};
+use crate::{camera, capture_task, log, model_slots, outbox, settings, supply};
 use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
@@ -169,7 +169,7 @@ impl Memory {
     pub fn of_flash(&self) -> OfFlash {
         OfFlash {
             found: self.found,
-            failures: self.log.failures(),
+            failures: self.log.failures() + u32::from(supply::has_failed()),
         }
     }
 

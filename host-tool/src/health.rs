@@ -77,8 +77,7 @@ impl HealthJson {
         };
         let supply = match self.brown_out_v {
             Some(volts) => format!("a reset below {volts:.1} V"),
-            None => "no reset when it is low; docs/firmware.md, \"Supply\", says how to set one"
-                .to_owned(),
+            None => "no reset when it is low; docs/firmware.md, \"Supply\", says why".to_owned(),
         };
         let mut lines = vec![
             format!(

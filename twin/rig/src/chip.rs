@@ -225,6 +225,7 @@ impl Chip {
             wiring: Wiring::default(),
         };
         chip.identify();
+        chip.load_options();
         Ok(chip)
     }
 
@@ -233,6 +234,12 @@ impl Chip {
         let slot = self.slots.dbgmcu;
         let registers = self.part.bus_mut().slot_mut(slot).registers_mut();
         registers.set(dbgmcu::Register::Idc, self.revision.identity());
+    }
+
+    /// Loads the option bytes, as every reset does.
+    fn load_options(&mut self) {
+        let registers = self.part.bus_mut().slot_mut(self.flash_slot);
+        self.flash.load_options(registers.registers_mut());
     }
 
     /// Makes the flags of the reset that has just happened those of a power-on (RM0433, table of
@@ -380,6 +387,7 @@ impl Mcu for Chip {
         Device::reset(&mut self.crs);
         Device::reset(&mut self.iwdg);
         Device::reset(&mut self.flash);
+        self.load_options();
         self.dcmi.part_reset();
         let (_, mut context) = self.part.bus_mut().drive(at, self.dcmi_slot);
         self.dcmi.reschedule(&mut context);

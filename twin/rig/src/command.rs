@@ -98,11 +98,11 @@ pub struct Arguments {
     /// dcmi-overrun, bus-busy, host-not-reading, cable-pulled. May be repeated.
     #[arg(long, value_name = "KIND[@MS[-MS]]")]
     fault: Vec<Fault>,
-    /// Keep the flash's second bank in this file, from run to run.
+    /// Keep the flash's second bank and the options in this file, from run to run.
     #[arg(long, value_name = "FILE")]
     flash: Option<PathBuf>,
-    /// Cut the power at the N-th operation of the flash's second bank (the first is 0), which
-    /// leaves its word or sector as before, torn (the default), or as after it, and end.
+    /// Cut the power at the N-th operation of the flash (the first is 0), which leaves its word or
+    /// sector as before, torn (the default), or as after it, and end. Torn options are as before.
     #[arg(long, value_name = "N[:LEAVES]", requires = "flash")]
     cut_power: Option<Cut>,
     /// Instructions per second of virtual time that the core is assumed to execute.

@@ -46,7 +46,7 @@ pub struct Report {
     pub arrivals_failure: Option<String>,
     /// Counters of the camera interface.
     pub dcmi: dcmi::Counters,
-    /// Operations of the flash's second bank.
+    /// Operations of the flash's second bank, and changes of options.
     pub flash_operations: Vec<Operation>,
     /// Addresses of its words that were read or programmed.
     pub flash_words: BTreeSet<u32>,

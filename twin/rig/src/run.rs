@@ -99,8 +99,8 @@ pub struct Options {
     pub arrivals: Arrivals,
     /// The faults.
     pub faults: Faults,
-    /// File of the flash's second bank. Its contents are read from this file, if it exists, and
-    /// written to it at the end.
+    /// File of the flash's second bank and the options. Its contents are read from this file, if it
+    /// exists, and written to it at the end.
     pub flash: Option<PathBuf>,
     /// The cut of the power, which ends the run.
     pub cut: Option<Cut>,

@@ -28,6 +28,7 @@ mod settings;
 mod silicon;
 mod slip;
 mod snapshot;
+mod supply;
 mod tare;
 mod threshold;
 mod uart;

@@ -15,7 +15,7 @@ use hivtac_rig::faults::Faults;
 use hivtac_rig::frame_source::TestPicture;
 use hivtac_rig::machine::Entry;
 use hivtac_rig::mpu::Protection;
-use hivtac_rig::peripherals::flash::{Contents, Cut, Operation};
+use hivtac_rig::peripherals::flash::{Contents, Cut, FACTORY_OPTIONS, LEVEL, Operation};
 use hivtac_rig::run::{INSTRUCTIONS_PER_SECOND, Limits, Options, Outcome, Program, run};
 use hivtac_rig::script::Script;
 use hivtac_rig::truth::TruthLog;
@@ -279,6 +279,48 @@ fn a_cut_erase_leaves_words_of_each_kind() {
     let (_, contents) = with_flash(&unlocked(1, ERASE), &flash, Some(cut));
     assert_eq!(contents.torn(), 1365);
     assert_eq!(contents.array[68], 0x11, "the third word is as it was");
+}
+
+/// FLASH_OPTKEYR, FLASH_OPTCR with OPTSTART, FLASH_OPTSR_PRG.
+const OPTION_KEYS: [(u32, u32); 2] = [(0x5200_2008, 0x0819_2A3B), (0x5200_2008, 0x4C5D_6E7F)];
+const OPTSTART: (u32, u32) = (0x5200_2018, 2);
+
+fn options(value: u32) -> (u32, u32) {
+    (0x5200_2020, value)
+}
+
+#[test]
+fn options_need_both_keys_and_a_wrong_one_locks_them() {
+    let wanted = FACTORY_OPTIONS | LEVEL;
+    let [first, second] = OPTION_KEYS;
+    let wrong = (first.0, 0);
+    let change = [options(wanted), OPTSTART];
+    for (keys, is_open) in [
+        (vec![], false),
+        (vec![first], false),
+        (vec![first, second], true),
+        (vec![wrong, first, second], false),
+        (vec![first, wrong, first, second], false),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let flash = folder.path().join("flash");
+        let new = Contents::with_options(FACTORY_OPTIONS);
+        new.save(&flash).unwrap();
+        let writes = [&keys[..], &change, &pause()].concat();
+        let (outcome, contents) = with_flash(&writes, &flash, None);
+        let made = vec![Operation::Options { options: wanted }];
+        let made = if is_open { made } else { vec![] };
+        assert_eq!(outcome.report.flash_operations, made, "{keys:x?}");
+        assert_eq!(contents.options == wanted, is_open, "{keys:x?}");
+    }
+}
+
+#[test]
+fn options_other_than_the_brown_out_level_end_the_run() {
+    // Readout protection.
+    let wanted = options(FACTORY_OPTIONS ^ 0xFF00 | LEVEL);
+    let error = outcome(&[&OPTION_KEYS[..], &[wanted, OPTSTART]].concat()).unwrap_err();
+    assert!(error.contains("other than BOR_LEV"), "{error}");
 }
 
 #[test]

@@ -6,8 +6,9 @@ set -eu
 files=$1 version=$2
 shift 2
 here=xtask/src/release wheel=host-tool/python/hivtac.data
-# Programs without symbols are a third as large.
-export CARGO_PROFILE_RELEASE_STRIP=symbols
+# Programs without symbols are a third as large. The profile's own `strip` does not reach packages
+# that have settings of their own there.
+export RUSTFLAGS="-C strip=symbols"
 for target in "$@"; do
     rustup target add "$target"
     case $target in

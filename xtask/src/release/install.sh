@@ -3,6 +3,10 @@
 # archives, and asks their programs: install.sh FILES WORK VERSION
 set -eu
 files=$1 work=$2 version=$3 ask=$(dirname "$0")/ask.py
+if ! ls "$files/hivtac-$version-$(uname -m)"-*-linux-*.tar.gz > /dev/null 2>&1; then
+    echo "not installed here: no file is for $(uname -m)"
+    exit
+fi
 python3 -m venv --clear --system-site-packages "$work/installed"
 "$work/installed/bin/pip" install --quiet --find-links "$files" "hivtac==$version"
 "$work/installed/bin/python" "$ask" \

@@ -1,5 +1,5 @@
-//! The bank's contents, in memory and in a file, and the effect of an interrupted operation on
-//! them.
+//! The bank's contents and the option bytes, in memory and in a file, and the effect of an
+//! interrupted operation on them.
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -15,6 +15,10 @@ pub const SECTOR_BYTES: u32 = 128 << 10;
 /// Bytes of a word.
 pub const WORD_BYTES: u32 = 32;
 const BANK_BYTES: usize = (BANK.end - BANK.start) as usize;
+/// FLASH_OPTSR as delivered (RM0433, table of option bytes).
+pub const FACTORY_OPTIONS: u32 = 0x0006_AAF0;
+/// Its bits of the brown-out level, BOR_LEV.
+pub const LEVEL: u32 = 0b11 << 2;
 
 /// The result of an interrupted operation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,13 +74,21 @@ pub enum Operation {
         /// The sector's first address.
         sector: u32,
     },
+    /// The option bytes are changed.
+    Options {
+        /// FLASH_OPTSR afterwards.
+        options: u32,
+    },
 }
 
-/// The bank's bytes, and its unreadable words.
+/// The bank's bytes, and its unreadable words; the option bytes, which are in the other bank.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contents {
     /// The bytes.
     pub array: Vec<u8>,
+    /// The options of FLASH_OPTSR, at first those of a chip that has its brown-out level. All
+    /// others are as delivered.
+    pub options: u32,
     torn: BTreeSet<u32>,
     /// Words that were programmed, by their addresses.
     written: BTreeSet<u32>,
@@ -86,6 +98,7 @@ impl Default for Contents {
     fn default() -> Self {
         Self {
             array: vec![0xFF; BANK_BYTES],
+            options: FACTORY_OPTIONS | LEVEL,
             torn: BTreeSet::new(),
             written: BTreeSet::new(),
         }
@@ -93,32 +106,40 @@ impl Default for Contents {
 }
 
 impl Contents {
-    /// Reads a file: the bank's bytes, then the addresses of torn words, little-endian.
+    /// Returns a blank bank of a chip with these options.
+    pub fn with_options(options: u32) -> Self {
+        Self {
+            options,
+            ..Self::default()
+        }
+    }
+
+    /// Reads a file: the bank's bytes, FLASH_OPTSR, then the addresses of torn words,
+    /// little-endian.
     ///
     /// # Errors
     /// If it cannot be read, or has another format.
     pub fn load(file: &Path) -> anyhow::Result<Self> {
         let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
-        if bytes.len() < BANK_BYTES || !bytes.len().is_multiple_of(4) {
+        let (array, rest) = bytes.split_at_checked(BANK_BYTES).unwrap_or_default();
+        let (words, surplus) = rest.as_chunks();
+        let mut words = words.iter().map(|word| u32::from_le_bytes(*word));
+        let Some(options) = words.next().filter(|_| surplus.is_empty()) else {
             bail!(
-                "{}: no contents of a flash bank, which have {BANK_BYTES} bytes and the addresses \
-                 of torn words",
+                "{}: no contents of a flash bank, which have {BANK_BYTES} bytes, the options and \
+                 the addresses of torn words",
                 file.display()
             );
-        }
-        let (array, torn) = bytes.split_at(BANK_BYTES);
-        let torn = torn
-            .as_chunks()
-            .0
-            .iter()
-            .map(|word| u32::from_le_bytes(*word));
+        };
+        let torn = words.collect();
         let words = array.chunks(WORD_BYTES as usize);
         let addresses = BANK.step_by(WORD_BYTES as usize);
         let is_blank = |word: &[u8]| word.iter().all(|byte| *byte == 0xFF);
         let written = addresses.zip(words).filter(|(_, word)| !is_blank(word));
         Ok(Self {
             array: array.to_vec(),
-            torn: torn.collect(),
+            options,
+            torn,
             written: written.map(|(address, _)| address).collect(),
         })
     }
@@ -129,8 +150,9 @@ impl Contents {
     /// # Errors
     /// If it cannot be written.
     pub fn save(&self, file: &Path) -> anyhow::Result<()> {
-        let torn = self.torn.iter().flat_map(|address| address.to_le_bytes());
-        let bytes: Vec<u8> = self.array.iter().copied().chain(torn).collect();
+        let words = std::iter::once(&self.options).chain(&self.torn);
+        let words = words.flat_map(|word| word.to_le_bytes());
+        let bytes: Vec<u8> = self.array.iter().copied().chain(words).collect();
         let mut new = file.as_os_str().to_owned();
         new.push(format!(".{}.new", std::process::id()));
         std::fs::write(&new, bytes)
@@ -151,10 +173,12 @@ impl Contents {
         (!self.torn.contains(&address)).then_some(bytes)
     }
 
-    /// Carries out an operation, completely or with the result of a power cut.
+    /// Carries out an operation, completely or with the result of a power cut. A change of options
+    /// that was cut keeps the old ones (RM0433, FLASH option bytes).
     pub fn operate(&mut self, operation: &Operation, leaves: Leaves) {
         match (*operation, leaves) {
-            (_, Leaves::Before) => {}
+            (_, Leaves::Before) | (Operation::Options { .. }, Leaves::Torn) => {}
+            (Operation::Options { options }, Leaves::After) => self.options = options,
             (Operation::Program { word, .. }, Leaves::Torn) => self.tear_word(word),
             (Operation::Erase { sector }, Leaves::Torn) => self.tear_sector(sector),
             (Operation::Program { word, bytes }, Leaves::After) => {
@@ -215,11 +239,13 @@ mod tests {
     fn contents_come_back_from_their_file() {
         let mut contents = Contents::default();
         contents.array[64] = 7;
+        contents.options = FACTORY_OPTIONS;
         contents.tear_word(BANK.start + 32);
         let file = tempfile::NamedTempFile::new().unwrap();
         contents.save(file.path()).unwrap();
         let read = Contents::load(file.path()).unwrap();
         assert_eq!((&read.array, &read.torn), (&contents.array, &contents.torn));
+        assert_eq!(read.options, FACTORY_OPTIONS);
         let mut read = read;
         assert!(!read.programmed(BANK.start + 64), "it is not blank");
         assert!(!read.programmed(BANK.start + 32), "it is torn");
@@ -263,6 +289,17 @@ mod tests {
         );
         contents.operate(&erase, Leaves::After);
         assert_eq!(contents, Contents::default());
+    }
+
+    #[test]
+    fn a_cut_change_of_options_keeps_the_old_ones() {
+        let change = Operation::Options { options: 7 };
+        let mut contents = Contents::default();
+        contents.operate(&change, Leaves::Before);
+        contents.operate(&change, Leaves::Torn);
+        assert_eq!(contents, Contents::default());
+        contents.operate(&change, Leaves::After);
+        assert_eq!(contents.options, 7);
     }
 
     #[test]

@@ -1,11 +1,13 @@
-//! The second bank of the flash, in which firmware stores its settings: words of 256 bits with an
-//! error correcting code, contents that outlive a run, and power cuts during an operation.
+//! The second bank of the flash, in which firmware stores its settings, and the option bytes: words
+//! of 256 bits with an error correcting code, contents that outlive a run, and power cuts during an
+//! operation.
 //!
 //! Registers, keys, write buffer, queue and times are rigless' (RM0433 chapter 4, DS12110 table
-//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits). This module has the
-//! operations: blank words, words torn by a cut, and the accesses that firmware must not make to
-//! them. A torn word reads as a bus error, which the MDMA reports. A read by the core is not
-//! checked, because the emulator's core reads flash by itself.
+//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits; a change of options takes 20
+//! µs, for want of a figure, and the core does not wait). This module has the operations: blank
+//! words, words torn by a cut, and the accesses that firmware must not make to them. A torn word
+//! reads as a bus error, which the MDMA reports. A read by the core is not checked, because the
+//! emulator's core reads flash by itself.
 
 mod contents;
 
@@ -18,13 +20,15 @@ use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::emulator::Host;
 use rigless::image::Image;
 use rigless::soc::Width;
-use rigless::soc::stm32h743::generated::flash::Register;
-use rigless::soc::stm32h743::peripherals::flash;
+use rigless::soc::stm32h743::generated::flash::{Register, optsr_cur};
+use rigless::soc::stm32h743::peripherals::flash::{self, OptionBytes};
 use rigless::time::EventId;
 
 use crate::faults::{Faults, Kind};
 use crate::rules::Rules;
-pub use contents::{BANK, Contents, Cut, Leaves, Operation, SECTOR_BYTES, WORD_BYTES};
+pub use contents::{
+    BANK, Contents, Cut, FACTORY_OPTIONS, LEVEL, Leaves, Operation, SECTOR_BYTES, WORD_BYTES,
+};
 
 /// SR bits: an operation runs, or waits.
 const BUSY: u64 = 1 << 0 | 1 << 2;
@@ -177,6 +181,22 @@ impl State {
             }
             Operation::Erase { .. } if fails => {}
             Operation::Erase { sector } => self.contents.erased(sector),
+            Operation::Options { options } => {
+                self.check_options(options, rules);
+                if !fails {
+                    self.contents.operate(&operation, Leaves::After);
+                }
+            }
+        }
+    }
+
+    /// Notes a breach if more changes than the brown-out level: a wrong option may lock the chip.
+    fn check_options(&self, options: u32, rules: &Rules) {
+        let before = self.contents.options;
+        if (options ^ before) & !LEVEL != 0 {
+            rules.broken(|| {
+                format!("flash: options other than BOR_LEV are changed: {before:#x}, {options:#x}")
+            });
         }
     }
 
@@ -215,28 +235,62 @@ impl Flash {
         }
     }
 
+    /// Loads the option bytes into the registers, as a reset does.
+    pub fn load_options(&mut self, registers: &mut RegisterFile) {
+        let options = OptionBytes {
+            optsr: self.bank.lock().contents.options.into(),
+            ..OptionBytes::FACTORY
+        };
+        self.interface.keep_options(options, registers);
+    }
+
     /// Checks whether an operation began or ended.
     fn look(&mut self, registers: &mut RegisterFile, now_ns: u64, operation: Option<Operation>) {
-        if registers.get(Register::Sr1) & BUSY != 0 {
+        let changes_options = optsr_cur::OPT_BUSY.is_set(registers.get(Register::OptsrCur));
+        if registers.get(Register::Sr1) & BUSY != 0 && !changes_options {
             self.rules.broken(|| {
                 "flash: the bank that the program runs from is programmed or erased, for which \
                  the core waits"
                     .into()
             });
         }
-        let busy = registers.get(Register::Sr2) & BUSY != 0;
+        let writes_bank = registers.get(Register::Sr2) & BUSY != 0;
+        if changes_options && writes_bank {
+            let text = "flash: options are changed while the second bank is written";
+            self.rules.broken(|| text.into());
+        }
         let mut state = self.bank.lock();
-        match (operation, busy, state.under_way) {
+        match (operation, writes_bank || changes_options, state.under_way) {
             (Some(operation), true, false) => {
+                let options = registers.get(Register::OptsrPrg) as u32;
+                let operation = match changes_options {
+                    true => Operation::Options { options },
+                    false => operation,
+                };
                 let fails = self.faults.on(Kind::FlashFails, now_ns);
                 state.begin(operation, fails, &self.rules);
             }
             // An operation that ended, and failed.
             (_, false, true) if state.end() => {
-                let status = registers.get(Register::Sr2);
-                registers.set(Register::Sr2, status | OPERATION_ERROR);
+                let last = state.operations.last().copied();
+                drop(state);
+                self.fail(last, registers);
             }
             _ => {}
+        }
+    }
+
+    /// Shows that an operation failed.
+    fn fail(&mut self, operation: Option<Operation>, registers: &mut RegisterFile) {
+        if let Some(Operation::Options { .. }) = operation {
+            self.load_options(registers);
+            for register in [Register::OptsrCur, Register::OptsrCur_] {
+                let status = registers.get(register) | optsr_cur::OPTCHANGEERR.mask();
+                registers.set(register, status);
+            }
+        } else {
+            let status = registers.get(Register::Sr2);
+            registers.set(Register::Sr2, status | OPERATION_ERROR);
         }
     }
 }
