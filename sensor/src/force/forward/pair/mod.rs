@@ -484,7 +484,10 @@ mod tests {
         };
         let two = found(&of_needles, &ball).unwrap();
         assert!(two.is_explained(), "{two:?}");
-        assert!(far_mm(&two.pair[0], &two.pair[1]) < LEAST_APART_MM, "{two:?}");
+        assert!(
+            far_mm(&two.pair[0], &two.pair[1]) < LEAST_APART_MM,
+            "{two:?}"
+        );
     }
 
     #[test]
