@@ -135,6 +135,7 @@ fn is_led_to_its_model(layout: Layout, sensor: Box<Sensor<'static>>) {
     std::fs::write(here.join("poses.csv"), poses.concat()).unwrap();
     let pressed = Pressed::default();
     let sensor = FakeSensor::of_film(film(pressed.clone(), layout, sensor), usize::MAX);
+    *sensor.markers.lock().unwrap() = Some(layout.count() as u8);
     let unit = ["unit", "--into", "unit", "--poses", "poses.csv"];
     let with_sensor = [
         &unit[..],
