@@ -476,7 +476,7 @@ mod tests {
     #[test]
     fn a_ball_is_not_two_needles() {
         let forward = forward();
-        let ball = observed(Column::of(BALL.into_iter()));
+        let ball = observed(Column::of(BALL));
         assert_eq!(found(&forward, &ball), None);
         let of_needles = Forward {
             widths: None,
