@@ -1,10 +1,16 @@
 //! Tests of `hivtac bring-up` with the firmware in the rig: on a good board, and with each fault.
 
 use crate::rig::{Rig, SILENCE_S, TIMEOUT_S, ToolOutput, tool, tool_waiting};
+use hivtac_rig::camera::part::Kind;
+use hivtac_rig::frame_source::{Coding, FrameSource, Picture, SceneSource};
+use hivtac_rig::truth::Exposed;
 use hivtac_tests::artifact;
 use serde_json::Value;
+use std::io::Write as _;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -60,6 +66,124 @@ fn ends_wrong((output, report): (ToolOutput, Value), step: &str, words: &[&str])
     }
 }
 
+/// A film without and with a hand over it.
+#[derive(Debug)]
+struct Film {
+    scene: Box<dyn FrameSource>,
+    below_a_hand: SceneSource,
+    hand: Arc<AtomicBool>,
+}
+
+impl FrameSource for Film {
+    fn picture(&self, exposed: Exposed, wanted: Coding) -> Picture {
+        match self.hand.load(Ordering::Relaxed) {
+            true => self.below_a_hand.picture(exposed, wanted),
+            false => self.scene.picture(exposed, wanted),
+        }
+    }
+
+    fn truth(&self, exposed: Exposed) -> Value {
+        self.scene.truth(exposed)
+    }
+}
+
+/// An untouched film that lets three tenths of the light through, in a room of this brightness.
+fn letting_through(folder: &Path, brightness: f64) -> std::path::PathBuf {
+    let file = folder.join(format!("{brightness}.toml"));
+    let room = format!("[room]\ntransmission = 0.3\nbrightness = {brightness}\n");
+    std::fs::write(&file, format!("[load]\nmotion = \"rest\"\n{room}")).unwrap();
+    file
+}
+
+/// Waits until the tool has asked for this.
+fn wait_for(child: &mut Child, asked: impl Fn() -> String, what: &str) {
+    let begun = Instant::now();
+    while !asked().contains(what) {
+        assert_eq!(child.try_wait().unwrap(), None, "{}", asked());
+        assert!(begun.elapsed() < PATIENCE, "{}", asked());
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Waits until the camera has exposed some frames more.
+fn wait_for_frames(rig: &Rig) {
+    let begun = Instant::now();
+    let before = rig.truth().unwrap().len();
+    while rig.truth().unwrap().len() < before + 4 {
+        assert!(begun.elapsed() < PATIENCE, "the camera is silent");
+        thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// A hand over the film darkens the room behind it. Only the film's step is wrong, and names it.
+#[test]
+fn a_film_that_lets_light_through_is_named_by_a_hand_over_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("report.json");
+    let hand = Arc::new(AtomicBool::new(false));
+    let covered = letting_through(folder.path(), 0.1);
+    let look = |scene| -> Box<dyn FrameSource> {
+        Box::new(Film {
+            scene,
+            below_a_hand: SceneSource::load(&covered, Kind::Ov7725).unwrap(),
+            hand: hand.clone(),
+        })
+    };
+    let scene = letting_through(folder.path(), 1.0);
+    let options = ["--scene", scene.to_str().unwrap()];
+    let rig = Rig::start_before(&artifact::named_by("HIVTAC_ELF"), &options, look).unwrap();
+    let mut child = Command::new(artifact::named_by("HIVTAC_TOOL"))
+        .args(["bring-up", "--timeout", "60", "--port", rig.port()])
+        .arg(&file)
+        .stdin(Stdio::piped())
+        .stderr(std::fs::File::create(folder.path().join("asked")).unwrap())
+        .stdout(std::fs::File::create(folder.path().join("said")).unwrap())
+        .spawn()
+        .unwrap();
+    let asked = || std::fs::read_to_string(folder.path().join("asked")).unwrap();
+    let mut answers = child.stdin.take().unwrap();
+    for (what, is_there) in [
+        ("white card", false),
+        ("card away", false),
+        ("your hand over", true),
+        ("your hand away", false),
+    ] {
+        wait_for(&mut child, asked, what);
+        hand.store(is_there, Ordering::Relaxed);
+        wait_for_frames(&rig);
+        answers.write_all(b"\n").unwrap();
+    }
+    let said = || std::fs::read_to_string(folder.path().join("said")).unwrap();
+    wait_for(&mut child, said, "a hand over");
+    interrupt(child);
+    rig.finish().unwrap();
+    let report = report(&file);
+    let right = ["usb", "camera", "clocks", "white", "markers"].map(|name| (name, true));
+    let found = steps(&report);
+    assert_eq!(
+        found[..6],
+        [&right[..], &[("film", false)]].concat(),
+        "{report}"
+    );
+    let wrong = report["steps"][5]["wrong"].to_string();
+    for words in [
+        "a hand over the film changes it by -",
+        "lets light through",
+        "opaque film",
+    ] {
+        assert!(wrong.contains(words), "{wrong}");
+    }
+}
+
+/// Interrupts the tool, which leaves its report.
+fn interrupt(mut child: Child) {
+    let interrupted = Command::new("kill")
+        .args(["-INT", &child.id().to_string()])
+        .status();
+    assert!(interrupted.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+}
+
 /// All steps without a finger are right. The tool is interrupted while it waits for a finger, and
 /// leaves its report.
 #[test]
@@ -76,16 +200,8 @@ fn a_good_board_is_right_up_to_the_press() {
         .spawn()
         .unwrap();
     let asked = || std::fs::read_to_string(folder.path().join("asked")).unwrap();
-    let begun = Instant::now();
-    while !asked().contains("on the right") && child.try_wait().unwrap().is_none() {
-        assert!(begun.elapsed() < PATIENCE, "{}", asked());
-        thread::sleep(Duration::from_millis(100));
-    }
-    let interrupted = Command::new("kill")
-        .args(["-INT", &child.id().to_string()])
-        .status();
-    assert!(interrupted.unwrap().success());
-    assert_eq!(child.wait().unwrap().code(), Some(130), "{}", asked());
+    wait_for(&mut child, asked, "on the right");
+    interrupt(child);
     rig.finish().unwrap();
     let report = report(&file);
     let names = [

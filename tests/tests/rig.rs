@@ -15,6 +15,7 @@ use std::time::Duration;
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Parser;
 use hivtac_rig::command::Arguments;
+use hivtac_rig::frame_source::FrameSource;
 use hivtac_rig::mpu::Protection;
 use hivtac_rig::run::run;
 use hivtac_tests::artifact;
@@ -76,6 +77,18 @@ impl Rig {
     /// # Errors
     /// If it does not become ready.
     pub fn start_with(elf: &Path, options: &[&str]) -> Result<Rig> {
+        Rig::start_before(elf, options, |source| source)
+    }
+
+    /// As [`Rig::start_with`]; the camera sees what `look` makes of the scene.
+    ///
+    /// # Errors
+    /// If it does not become ready.
+    pub fn start_before(
+        elf: &Path,
+        options: &[&str],
+        look: impl FnOnce(Box<dyn FrameSource>) -> Box<dyn FrameSource>,
+    ) -> Result<Rig> {
         let folder = tempfile::tempdir().context("creating a temporary folder")?;
         let [truth, stats] = ["truth", "stats"].map(|name| folder.path().join(name));
         let mut arguments = Vec::from(["hivtac-rig", "--pty"].map(OsString::from));
@@ -88,6 +101,7 @@ impl Rig {
         let (mut run_options, port) = arguments.prepare(interrupt.clone())?;
         // The rig's own tests enforce the firmware's regions, and show that this changes nothing.
         run_options.protection = Protection::Ignored;
+        run_options.source = look(run_options.source);
         let terminal = port.and_then(|port| port.pty);
         let port = terminal.as_ref().and_then(|path| path.to_str());
         let port = port.context("it has a terminal")?.to_owned();
