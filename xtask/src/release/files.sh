@@ -8,6 +8,8 @@ shift 2
 here=xtask/src/release wheel=host-tool/python/hivtac.data
 # Programs without symbols are a third as large.
 export CARGO_PROFILE_RELEASE_STRIP=symbols
+# The wheel's other files are the project's own.
+trap 'rm -rf $wheel/scripts $wheel/data/share/hivtac/firmware' EXIT
 for target in "$@"; do
     rustup target add "$target"
     case $target in
@@ -19,8 +21,6 @@ for target in "$@"; do
     sh $here/pack.sh "target/$target/release/hivtac" "$files" "$files" "hivtac-$version-$target"
     (cd host-tool/python &&
         maturin build --release --zig --compatibility $system --target "$target" --out "$files")
-    # Its other files are the project's own.
-    rm -r $wheel/scripts $wheel/data/share/hivtac/firmware
 done
 
 cargo cyclonedx --version > /dev/null 2>&1 || cargo install --locked cargo-cyclonedx
