@@ -9,6 +9,8 @@ here=xtask/src/release wheel=host-tool/python/hivtac.data
 # Programs without symbols are a third as large. The profile's own `strip` does not reach packages
 # that have settings of their own there.
 export RUSTFLAGS="-C strip=symbols"
+# The wheel's other files are the project's own.
+trap 'rm -rf $wheel/scripts $wheel/data/share/hivtac/firmware' EXIT
 for target in "$@"; do
     rustup target add "$target"
     case $target in
@@ -20,8 +22,6 @@ for target in "$@"; do
     sh $here/pack.sh "target/$target/release/hivtac" "$files" "$files" "hivtac-$version-$target"
     (cd host-tool/python &&
         maturin build --release --zig --compatibility $system --target "$target" --out "$files")
-    # Its other files are the project's own.
-    rm -r $wheel/scripts $wheel/data/share/hivtac/firmware
 done
 
 cargo cyclonedx --version > /dev/null 2>&1 || cargo install --locked cargo-cyclonedx
