@@ -425,7 +425,8 @@ fn a_start_depends_on_no_word_that_the_rig_does_not_tell() {
     // Only the log's two sectors and the model's words are read.
     let read = 2 * SECTOR_BYTES / WORD_BYTES + BUILT_IN.len() / WORD_BYTES;
     assert!((read..read + 40).contains(&words.len()), "{}", words.len());
-    spoilt.extend(others.iter().flat_map(|word| word.to_le_bytes()));
+    let behind = std::iter::once(&before.options).chain(&others);
+    spoilt.extend(behind.flat_map(|word| word.to_le_bytes()));
     let other = Device::new(Some(&spoilt));
     assert_eq!(other.contents().torn(), others.len());
     let again = started(&other.flash);
