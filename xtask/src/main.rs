@@ -2,6 +2,7 @@
 
 mod artifacts;
 mod bench;
+mod debian;
 mod demo;
 mod fuzz;
 mod linux_host;
@@ -60,7 +61,7 @@ fn main() -> ExitCode {
 
 fn run(task: Task) -> Result<()> {
     if !matches!(task, Task::Kit(_) | Task::Web) {
-        toolchain::ensure_target(toolchain::TARGET)?;
+        toolchain::ensure_microcontroller()?;
     }
     match task {
         Task::Demo(demo) => demo.run(),

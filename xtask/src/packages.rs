@@ -16,7 +16,7 @@ pub fn ensure(program: &str, package: &str) -> Result<()> {
 
 /// Installs Debian packages as root or through sudo. Called only if something is missing: a
 /// complete machine needs no network.
-fn install(packages: &str, why: &str) -> Result<()> {
+pub fn install(packages: &str, why: &str) -> Result<()> {
     process::say(&format!("{why}: installing the Debian packages {packages}"));
     let sudo = match process::output(&mut command("id -u"))?.trim() {
         "0" => "",

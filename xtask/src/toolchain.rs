@@ -6,6 +6,7 @@ use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::debian;
 use crate::process::{self, command};
 
 /// The microcontroller's target: Cortex-M7 with a double-precision FPU.
@@ -47,15 +48,30 @@ pub fn cargo(words: &str, folder: &str) -> Command {
 pub fn build_for(target: &str, folder: &str) -> Command {
     let mut command = cargo("build --release --target", folder);
     command.arg(target);
-    command
+    match target {
+        TARGET => debian::instead(command),
+        _ => command,
+    }
 }
 
 /// Makes a cargo command lint this project's packages that it builds.
 pub fn lint(command: &mut Command) {
-    command.env("RUSTC_WORKSPACE_WRAPPER", "clippy-driver");
+    let linter = match debian::runs(command) {
+        true => debian::CLIPPY,
+        false => "clippy-driver",
+    };
+    command.env("RUSTC_WORKSPACE_WRAPPER", linter);
 }
 
-/// The output of the compiler.
+/// The version of the compiler for the microcontroller: `rustc 1.95.0 (59807616e 2026-04-14)`.
+pub fn target_compiler() -> Result<String> {
+    match debian::chosen() {
+        Some(mut compiler) => Ok(process::output(compiler.arg("-V"))?.trim().to_owned()),
+        None => rustc("-V"),
+    }
+}
+
+/// The output of the compiler for this computer.
 pub fn rustc(words: &str) -> Result<String> {
     let program = std::env::var_os("RUSTC").unwrap_or_else(|| "rustc".into());
     let said = process::output(Command::new(program).args(words.split(' ')))?;
@@ -82,6 +98,15 @@ pub fn ensure_target(target: &str) -> Result<()> {
          system's package of it (Debian and Ubuntu for the page: libstd-rust-dev-wasm32)"
     );
     Ok(())
+}
+
+/// Ensures that the microcontroller's target is there. If rustup cannot add it, Debian's own
+/// compiler is chosen for the microcontroller.
+pub fn ensure_microcontroller() -> Result<()> {
+    ensure_target(TARGET).or_else(|missing| {
+        process::say(&format!("{missing:#}; trying Debian's own packages"));
+        debian::choose().context(missing)
+    })
 }
 
 /// Whether cargo has a command, such as `clippy`.

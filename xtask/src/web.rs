@@ -45,11 +45,16 @@ pub fn page(images: &[Image]) -> Result<PathBuf> {
         import_map()?
     );
     let engine = process::read(&toolchain::at(FOLDERS[1]).join(WORKER))?;
-    let sensing = json!({ "module": packed(&wasm)?, "engine": engine });
-    let firmware: Result<BTreeMap<String, String>> = images
-        .iter()
-        .map(|image| Ok((image.board(), packed(image.bytes())?)))
-        .collect();
+    let sensing = format!(
+        "{{ module: \"{}\", engine: {} }}",
+        packed(&wasm)?,
+        json!(engine)
+    );
+    let firmware = images.iter().map(|image| {
+        let packed = packed(image.bytes())?;
+        Ok(format!("\"{}\": \"{packed}\"", image.board()))
+    });
+    let firmware: Result<Vec<String>> = firmware.collect();
     let folder = toolchain::work_folder("web")?;
     for (name, text) in [
         (
@@ -60,7 +65,7 @@ pub fn page(images: &[Image]) -> Result<PathBuf> {
         ("sensing.js", format!("globalThis.HIVTAC = {sensing};\n")),
         (
             "firmware.js",
-            format!("globalThis.FIRMWARE ??= {};\n", json!(firmware?)),
+            format!("globalThis.FIRMWARE ??= {{ {} }};\n", firmware?.join(", ")),
         ),
     ] {
         process::write(&folder.join(name), &text)?;
@@ -102,5 +107,57 @@ fn import_map() -> Result<String> {
 fn packed(bytes: &[u8]) -> Result<String> {
     let mut packer = GzEncoder::new(Vec::new(), Compression::best());
     packer.write_all(bytes)?;
-    Ok(STANDARD.encode(packer.finish()?))
+    Ok(text_of(&packer.finish()?))
+}
+
+/// Writes bytes as text for `web/page/packed.js`: seven bits a character, the highest first, which
+/// is an eighth less than base64.
+fn text_of(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len() * 6 / 5);
+    let [mut bits, mut count] = [0_u16, 0];
+    for &byte in bytes {
+        bits = bits << 8 | u16::from(byte);
+        count += 8;
+        while count >= 7 {
+            count -= 7;
+            text.push(character((bits >> count & 127) as u8));
+        }
+    }
+    if count > 0 {
+        text.push(character((bits << (7 - count) & 127) as u8));
+    }
+    text
+}
+
+/// The character of seven bits. Those that a string in a script cannot hold are moved up.
+fn character(bits: u8) -> char {
+    match bits {
+        0 | b'\n' | b'\r' | b'"' | b'\\' => char::from(bits | 128),
+        _ => char::from(bits),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_are_read_from_text() {
+        let bytes: Vec<u8> = (0..=255).rev().chain(*b"\0\n\r\"\\").collect();
+        for length in 0..bytes.len() {
+            let text = text_of(&bytes[..length]);
+            assert!(!text.contains(['\0', '\n', '\r', '"', '\\']));
+            // As `packed.js` reads it.
+            let bits = text
+                .chars()
+                .flat_map(|it| (0..7).rev().map(move |k| it as u32 >> k & 1));
+            let bits: Vec<u32> = bits.collect();
+            let read = bits
+                .chunks_exact(8)
+                .map(|byte| byte.iter().fold(0, |all, bit| all << 1 | bit));
+            let read: Vec<u32> = read.take(text.chars().count() * 7 / 8).collect();
+            let want: Vec<u32> = bytes[..length].iter().map(|&byte| byte.into()).collect();
+            assert_eq!(read, want, "{length}");
+        }
+    }
 }

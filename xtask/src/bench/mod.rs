@@ -61,7 +61,7 @@ impl Bench {
         }
         let baseline = toolchain::at(BASELINE);
         let now = Baseline {
-            compiler: toolchain::rustc("-V")?,
+            compiler: toolchain::target_compiler()?,
             instructions,
         };
         if self.write_baseline {
