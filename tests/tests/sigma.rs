@@ -1,13 +1,13 @@
 //! Tests that stated uncertainties hold in pictures that differ from the model's: pixels that see
-//! one colour each, and a film that lets a room through. The table is in
-//! `docs/results/effects.md`.
+//! one colour each, and a film that lets a room, a fingertip or other things through. The table is
+//! in `docs/results/effects.md`.
 
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_tests::judged::{Contacts, errors};
 use hivtac_tests::models;
 use hivtac_tests::pictures::Random;
 use hivtac_tests::tared::TaredSensor;
-use hivtac_twin::{Frame, Load, Options, Preset, Room, Scene, Shutter};
+use hivtac_twin::{Frame, Load, Options, Paint, Patch, Preset, Room, Scene, Shutter};
 
 const PRESSES: Contacts = Contacts {
     force_n: [0.05, 0.2],
@@ -61,8 +61,13 @@ fn is_beyond(seen: &Measurement, frame: &Frame) -> Option<bool> {
 
 /// Nearly all presses have a force, and hardly one is wrong by more than it says.
 fn uncertainties_hold(options: Options) {
+    uncertainties_hold_after(options.clone(), options);
+}
+
+/// The same if the picture changes after the tare.
+fn uncertainties_hold_after(at_rest: Options, options: Options) {
+    let mut sensor = tared(&scene(at_rest));
     let scene = scene(options);
-    let mut sensor = tared(&scene);
     let judged = frames(&scene).filter_map(|frame| is_beyond(&sensor.sense(&frame), &frame));
     let judged: Vec<bool> = judged.collect();
     let beyond = judged.iter().filter(|beyond| **beyond).count() as u32;
@@ -91,6 +96,53 @@ fn behind_a_film_that_lets_a_room_through_uncertainties_hold() {
             },
             ..Options::default()
         });
+    }
+}
+
+/// Options of a film that lets this part of the light through, exposed for a room as bright as the
+/// lamp, or darker.
+fn through(transmission: f64, brightness: f64) -> Options {
+    Options {
+        gain: 1.0 / (1.0 - transmission + transmission * brightness),
+        room: Room {
+            transmission,
+            brightness,
+            ..Room::default()
+        },
+        ..Options::default()
+    }
+}
+
+/// A fingertip that presses shows through, and is redder and darker or brighter than the film.
+#[test]
+fn beside_a_fingertip_behind_the_film_uncertainties_hold() {
+    for (transmission, finger_mm) in [(0.4, 6.0), (0.5, 3.0), (0.5, 5.0), (0.7, 5.0), (0.9, 6.0)] {
+        let at_rest = through(transmission, 0.3);
+        let mut pressed = at_rest.clone();
+        pressed.room.finger_mm = finger_mm;
+        uncertainties_hold_after(at_rest, pressed);
+    }
+}
+
+/// So does what appears in the room after the tare, seen behind some markers in part.
+#[test]
+fn beside_a_thing_behind_the_film_uncertainties_hold() {
+    let things = [
+        (0.25, Paint::Red),
+        (0.4, Paint::Skin),
+        (0.6, Paint::Blue),
+        (0.8, Paint::Black),
+        (0.5, Paint::Glare),
+    ];
+    for (transmission, paint) in things {
+        let at_rest = through(transmission, 1.0);
+        let mut pressed = at_rest.clone();
+        pressed.room.things = vec![Patch {
+            centre_mm: [0.0, 6.0],
+            radius_mm: 5.0,
+            paint,
+        }];
+        uncertainties_hold_after(at_rest, pressed);
     }
 }
 

@@ -158,8 +158,8 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "press with one tip; at rest, take a new tare",
         ),
         Status::FRAME_DISTURBED => (
-            "specks or little light disturb the picture: the force is less certain",
-            "clean film and lens; look at the light, then find the exposure anew: hivtac expose",
+            "specks, little light, or what shows through the film: the force is less certain",
+            "clean film and lens, use an opaque film; look at the light, then: hivtac expose",
         ),
         _ => (
             "this tool does not know of it",

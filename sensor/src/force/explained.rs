@@ -198,8 +198,8 @@ impl Resting {
     ) -> Observed<'a> {
         let (mut moved, mut noise) = (Column::defaults(2 * self.px.len()), List::default());
         let scale = self.mounting.scale();
-        let [blur, motion] = [frame.blur, frame.motion].map(|px| scale * px.to_f32());
-        let blurred = blur * blur + motion * motion;
+        let parts = [frame.blur, frame.motion, frame.beside].map(|px| scale * px.to_f32());
+        let blurred: f32 = parts.iter().map(|part| part * part).sum();
         let at_rest = self.px.iter().zip(self.areas.iter());
         let pairs = markers.iter().zip(at_rest).zip(moved.as_chunks_mut().0);
         for (k, ((marker, ([x, y], area)), moved)) in pairs.enumerate() {
@@ -335,7 +335,8 @@ impl Resting {
             widen(&mut force, OF_OTHER_UNITS);
         }
         let mut status = trust(&force, by_noise, range);
-        let is_blurred = noise.blur.0 > 0 && estimate.unexplained > UNEXPLAINED_BLURRED;
+        let is_uncertain = noise.blur.0 > 0 || noise.beside.0 > 0;
+        let is_blurred = is_uncertain && estimate.unexplained > UNEXPLAINED_BLURRED;
         if is_blurred || !estimate.is_explained() && !self.may_be_loose(&force) {
             status |= Status::UNEXPLAINED;
         } else if !estimate.is_explained() {

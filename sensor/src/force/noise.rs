@@ -21,6 +21,14 @@ const MOST_AT_ONCE: f32 = 8.0;
 /// The means' scatter nearly always stays below these: 3 of their standard deviations.
 const SCATTER: f32 = 0.6;
 const LASTING_SCATTER: f32 = 0.15;
+/// A shift of a marker, px, that noise may seem to make (seen: 0.008). It is less than the noise of
+/// a marker's place.
+const EVEN_PX: f32 = 0.01;
+/// The shift is known to a factor of this: it depends on colours that were not looked at, and on
+/// how sharp the marker's edge is.
+const UNKNOWN_COLOUR: f32 = 1.25;
+/// What shows through the film and makes a marker this uncertain, 0.03 px, disturbs a frame.
+const DISTURBED: Px = Px(1_966);
 /// Largest variance that is accepted, relative to the modelled one. Beyond it the residual no
 /// longer separates good frames from bad. A camera with 4 times the noise reaches 7.
 const LARGEST: f32 = 10.0;
@@ -34,6 +42,8 @@ pub struct FrameNoise {
     pub blur: Px,
     /// Another one, of markers whose motion changes (`Motion::unsteadiness`).
     pub motion: Px,
+    /// Another one, of markers beside which something shows through the film.
+    pub beside: Px,
 }
 
 impl FrameNoise {
@@ -42,7 +52,13 @@ impl FrameNoise {
         times: 1.0,
         blur: Px(0),
         motion: Px(0),
+        beside: Px(0),
     };
+
+    /// Whether what shows through the film is more than noise.
+    pub fn is_disturbed(&self) -> bool {
+        self.beside >= DISTURBED
+    }
 }
 
 /// The noise level of the frames up to now.
@@ -59,6 +75,8 @@ pub struct NoiseLevel {
     lasting: f32,
     /// Uncertainty of the current frame's markers by their motion.
     motion: Px,
+    /// And by what shows through the film beside them.
+    beside: Px,
     /// What stays for as long as the markers do.
     misfit: Misfit,
 }
@@ -71,6 +89,7 @@ impl NoiseLevel {
         variance: 1.0,
         lasting: 1.0,
         motion: Px(0),
+        beside: Px(0),
         misfit: Misfit::NONE,
     };
 
@@ -82,12 +101,20 @@ impl NoiseLevel {
     /// Call at the beginning of each frame.
     pub fn begin_frame(&mut self) {
         self.before = self.now.take();
-        self.motion = Px(0);
+        (self.motion, self.beside) = (Px(0), Px(0));
     }
 
     /// Sets the uncertainty of the current frame's markers by their motion.
     pub fn set_motion(&mut self, motion: Px) {
         self.motion = motion;
+    }
+
+    /// Sets the square of the largest shift of a marker of the current frame, px², by what shows
+    /// through the film beside it. Not inlined, so that it stays out of the near memory.
+    #[inline(never)]
+    pub fn set_beside(&mut self, shift_px2: f32) {
+        let more = shift_px2 - EVEN_PX * EVEN_PX;
+        self.beside = Px::of_f32(UNKNOWN_COLOUR * sqrt(more.max(0.0)));
     }
 
     /// Returns the noise to expect of a frame, at least the model's, with this additional blur.
@@ -97,6 +124,7 @@ impl NoiseLevel {
             times: sqrt(variance),
             blur,
             motion: self.motion,
+            beside: self.beside,
         }
     }
 
@@ -123,7 +151,7 @@ impl NoiseLevel {
     /// Takes a press of a frame with this expected `noise`, which explains the markers. While their
     /// motion changes, the press says nothing of what stays.
     pub fn saw_press(&mut self, noise: FrameNoise, estimate: &Estimate, markers: &[Marker]) {
-        if noise.motion == Px(0) {
+        if noise.motion == Px(0) && noise.beside == Px(0) {
             self.misfit.saw(noise.times, estimate, markers);
         }
     }

@@ -1,5 +1,6 @@
 //! Holds a blob: 8-connected runs with exact integer moments.
 
+use crate::markers::beside::Beside;
 #[cfg(test)]
 use crate::markers::{moments::Moments, runs::Run, tables::Weights};
 use hivtac_terms::division::Divisor;
@@ -42,6 +43,8 @@ pub struct Blob {
     pub weight_x: u64,
     /// Σw·y.
     pub weight_y: u64,
+    /// What is beside it; [`Beside::NONE`] if pixels are not weighed.
+    pub beside: Beside,
     /// Leftmost column.
     pub x0: u16,
     /// Topmost row.
@@ -80,6 +83,7 @@ impl Blob {
         self.weight += other.weight;
         self.weight_x += other.weight_x;
         self.weight_y += other.weight_y;
+        self.beside.add(&other.beside);
         self.x0 = self.x0.min(other.x0);
         self.y0 = self.y0.min(other.y0);
         self.x1 = self.x1.max(other.x1);

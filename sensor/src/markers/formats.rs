@@ -1,5 +1,6 @@
 //! Reads rows of each pixel format: RGB565 through a table, YUV422 and mono directly.
 
+use crate::markers::beside;
 use crate::markers::kernels::{threshold_cr, threshold_luma, weigh_luma};
 use crate::markers::runs::Run;
 use crate::markers::tables::{FULL_WEIGHT, Pixels, Table, Weights};
@@ -18,6 +19,8 @@ pub struct Formats<T> {
     threshold: Threshold,
     /// The weight of each luma, if pixels are mono.
     luma: [u8; 256],
+    /// The lowest bit of red in an RGB565 pixel as it lies in memory.
+    red: u8,
 }
 
 impl<T: Table> Formats<T> {
@@ -26,6 +29,7 @@ impl<T: Table> Formats<T> {
         table: T::CLOSED,
         threshold: Threshold::Rgb565(HsvBox::RED),
         luma: [0; 256],
+        red: 11,
     };
 
     /// Sets format and threshold. The byte order applies to RGB565 only; other formats have only
@@ -37,6 +41,10 @@ impl<T: Table> Formats<T> {
         threshold.check()?;
         if let Threshold::Rgb565(hsv_box) = threshold {
             self.table.set(hsv_box, order)?;
+            self.red = match order {
+                ByteOrder::Native => 11,
+                ByteOrder::Swapped => 3,
+            };
         }
         if let Threshold::Mono(mono) = threshold {
             for (luma, weight) in (0..=u8::MAX).zip(&mut self.luma) {
@@ -58,6 +66,15 @@ impl<T: Table> Formats<T> {
             // Σw·x = (x0 − 1)·Σw + Σw·(x − x0 + 1).
             sum_x: u32::from(run.x0) * sum + sums - sum,
         }
+    }
+
+    /// The pull of an RGB565 pixel.
+    #[inline(always)]
+    fn pull_rgb565(&self, row: &[u16], column: u16) -> u8 {
+        let Some(raw) = row.get(usize::from(column)) else {
+            return 0;
+        };
+        beside::pull(self.table.weight(row, column), raw >> (self.red % 16))
     }
 
     /// The threshold in use.
@@ -100,6 +117,19 @@ impl<T: Table> Pixels for Formats<T> {
             Threshold::Rgb565(_) => self.table.weight(row, column),
             Threshold::Yuv422(yuv422) => yuv422.weight(row, column),
             Threshold::Mono(mono) => mono.weight(row, column),
+        }
+    }
+
+    #[inline(always)]
+    fn beside(&self, row: &[u16], run: Run) -> [u8; 2] {
+        match &self.threshold {
+            Threshold::Rgb565(_) => {
+                let (left, right) = beside::columns(run);
+                let left = left.map_or(0, |left| self.pull_rgb565(row, left));
+                [left, self.pull_rgb565(row, right)]
+            }
+            Threshold::Yuv422(yuv422) => yuv422.beside(row, run),
+            Threshold::Mono(mono) => mono.beside(row, run),
         }
     }
 

@@ -128,6 +128,18 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         }
     }
 
+    /// Looks beside the runs of row `y`, the last one that was pushed.
+    #[inline(always)]
+    pub fn look_beside(&mut self, y: u16, beside: impl Fn(Run) -> [u8; 2]) {
+        let (_, Row { edges, labels }) = last_two(&mut self.rows, self.last);
+        for (&[x0, end], label) in edges.runs().iter().zip(labels) {
+            let pull = beside(Run { x0, x1: end - 1 });
+            if let Some(slot) = self.forest.slots.get_mut(usize::from(*label)) {
+                slot.moments.beside.add_row(pull, y);
+            }
+        }
+    }
+
     /// Returns whether the frame has had more runs than it may.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted

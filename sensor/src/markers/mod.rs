@@ -9,6 +9,7 @@
 //! | `tables`, `formats`, `screen` | which pixels pass the threshold, and their weights |
 //! | `mask`, `dilate`, `history`, `runs` | rows of bits, and runs of them |
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
+//! | `beside` | what shows through the film beside a blob |
 //! | `scanner` | from rows to blobs, as rows arrive |
 //! | `lost` | markers that a frame does not show |
 //! | `majority` | removes specks and holes from rows of bits |
@@ -16,6 +17,7 @@
 //! | `settings` | what must be set before the first frame |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
 
+pub mod beside;
 pub mod blob;
 pub mod formats;
 pub mod lost;

@@ -1,6 +1,7 @@
 //! Sums the moments of a blob run by run. Multiples of the moments are stored, which cost the
 //! fewest instructions per run.
 
+use crate::markers::beside::Beside;
 use crate::markers::blob::Blob;
 use crate::markers::runs::Run;
 use crate::markers::tables::Weights;
@@ -39,6 +40,8 @@ pub struct Moments {
     weight: u32,
     weight_x: u64,
     weight_y: u64,
+    /// What is beside its even rows.
+    pub beside: Beside,
     x0: u16,
     y0: u16,
     x1: u16,
@@ -62,6 +65,7 @@ impl Moments {
         weight: 0,
         weight_x: 0,
         weight_y: 0,
+        beside: Beside::NONE,
         x0: u16::MAX,
         y0: u16::MAX,
         x1: 0,
@@ -128,6 +132,7 @@ impl Moments {
         self.weight += other.weight;
         self.weight_x += other.weight_x;
         self.weight_y += other.weight_y;
+        self.beside.add(&other.beside);
         self.x0 = self.x0.min(other.x0);
         self.y0 = self.y0.min(other.y0);
         self.x1 = self.x1.max(other.x1);
@@ -151,6 +156,7 @@ impl Moments {
             weight: self.weight,
             weight_x: self.weight_x,
             weight_y: self.weight_y,
+            beside: self.beside,
             x0: self.x0,
             y0: self.y0,
             x1: self.x1,

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::markers::beside::Beside;
 use crate::markers::blob::Blob;
 use crate::markers::dilate::{Dilation, MAX_ROWS};
 use crate::markers::history::{Band, History};
@@ -116,7 +117,7 @@ pub struct Scan<'a> {
 /// For each frame call [`begin`](Self::begin), [`push_rows`](Self::push_rows) with all rows from
 /// the top, one or more at a time as they arrive, and [`finish`](Self::finish). A scanner holds a
 /// few rows of mask and of pixels, and the sums of the blobs that the current row may still touch.
-/// That is below 68 KiB with 64 blobs, whatever the height, and 112 bytes for each additional blob.
+/// That is below 68 KiB with 64 blobs, whatever the height, and 120 bytes for each additional blob.
 #[derive(Clone, Debug)]
 pub struct Scanner<const BLOBS: usize> {
     settings: ScanSettings,
@@ -360,7 +361,13 @@ impl<const BLOBS: usize> Scanner<BLOBS> {
             self.set_pixels += self.labels.push(y, &self.dilation, i, &near);
             if self.settings.weighted && !self.labels.is_idle() {
                 match band.row(y).or_else(|| self.history.row(y)) {
-                    Some(row) => self.labels.weigh(y, |run| pixels.weigh(row, run)),
+                    Some(row) => {
+                        self.labels.weigh(y, |run| pixels.weigh(row, run));
+                        if Beside::is_looked_at(y) {
+                            let beside = |run| pixels.beside(row, run);
+                            self.labels.look_beside(y, beside);
+                        }
+                    }
                     None => self.status |= Status::FRAME_INCOMPLETE,
                 }
             }
@@ -418,6 +425,6 @@ mod tests {
     #[test]
     fn memory_is_what_the_documentation_says() {
         assert!(size_of::<Scanner<64>>() < 68 * 1024);
-        assert_eq!(size_of::<Scanner<65>>() - size_of::<Scanner<64>>(), 112);
+        assert_eq!(size_of::<Scanner<65>>() - size_of::<Scanner<64>>(), 120);
     }
 }

@@ -1,5 +1,6 @@
 //! Reads rows of RGB565 pixels through a table over all 65,536 values.
 
+use crate::markers::beside;
 use crate::markers::kernels::{threshold_bytes, weigh_bytes};
 use crate::markers::mask::words_of;
 use hivtac_terms::hsv::{Hsv, rgb888};
@@ -49,6 +50,23 @@ pub trait Pixels {
     /// Returns how much of a pixel of the row a marker covers, 0 to [`FULL_WEIGHT`] at most; 0
     /// beyond the row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
+
+    /// Returns the pull ([`Beside`](crate::markers::beside::Beside)) of a pixel of the row; 0
+    /// beyond the row.
+    #[inline(always)]
+    fn pull(&self, row: &[u16], column: u16) -> u8 {
+        beside::by_weight(self.weight(row, column))
+    }
+
+    /// Returns the pull of the pixels left and right of a run.
+    #[inline(always)]
+    fn beside(&self, row: &[u16], run: Run) -> [u8; 2] {
+        let (left, right) = beside::columns(run);
+        [
+            left.map_or(0, |left| self.pull(row, left)),
+            self.pull(row, right),
+        ]
+    }
 
     /// Returns the sum of the weights of a run's pixels.
     #[inline(never)]

@@ -432,6 +432,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
             Err(reason) => (None, *reason),
         };
         let rows = self.settings.geometry.height;
+        self.noise
+            .set_beside(seen.map_or(0.0, |seen| seen.shift_px2));
         let moved = seen.and_then(|seen| {
             let markers = MarkerList::from(seen.markers);
             let moved = at_the_middle(&self.motion, &mut self.noise, &markers, Lost::NONE, rows)?;
@@ -581,6 +583,9 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 let is_again = matches!(self.look, Look::Again);
                 let blur = if is_again { BLUR } else { Px(0) };
                 let noise = self.noise.of_frame(blur);
+                if noise.is_disturbed() {
+                    *status |= Status::FRAME_DISTURBED;
+                }
                 let estimate = resting.estimate(forward, markers, noise, &output);
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);

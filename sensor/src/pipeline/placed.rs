@@ -162,6 +162,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let prepared = self.prepared.as_ref();
         let mut status = prepared.map_or(Status::OK, |prepared| prepared.standing);
         let rows = self.settings.geometry.height;
+        self.noise.set_beside(placed.shift_px2);
         let moved = at_the_middle(
             &self.motion,
             &mut self.noise,
@@ -202,6 +203,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         };
         let is_again = matches!(self.look, Look::Again);
         let noise = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
+        if noise.is_disturbed() {
+            *status |= Status::FRAME_DISTURBED;
+        }
         let seen = Seen {
             forward,
             resting,

@@ -52,6 +52,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let (seen, lost) = (&three.markers, three.lost);
         let (seen, lost_one) = (MarkerList::from(*seen), Lost::only(lost));
         let rows = self.settings.geometry.height;
+        self.noise.set_beside(three.shift_px2());
         let moved = at_the_middle(&self.motion, &mut self.noise, &seen, lost_one, rows);
         let mut markers = moved.unwrap_or(seen);
         let noise = self.noise.of_frame(Px(0));
@@ -61,6 +62,9 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         status |= prepared.finder.judge_three(&three, trust, &markers.array());
         let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
         status |= found | Status::MARKER_LOST;
+        if noise.is_disturbed() {
+            status |= Status::FRAME_DISTURBED;
+        }
         let is_touched = found.contains(Status::CONTACT);
         let is_known = !is_touched || forward.is_far_from(lost, &estimate);
         let is_explained = is_known && estimate.is_explained_by_three(is_touched);

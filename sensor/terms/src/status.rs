@@ -68,8 +68,9 @@ bits! {
     UNEXPLAINED = 20, "unexplained";
     /// Re-zeroing has moved the rest position from where it was taken.
     REZEROED = 21, "rezeroed";
-    /// The frame has specks or little light. Its markers were found by a second look, and the
-    /// standard uncertainties are larger.
+    /// The frame has specks or little light, and its markers were found by a second look; or the
+    /// film beside a marker looks different on one side, by what shows through it or mirrors on it.
+    /// The standard uncertainties are larger.
     FRAME_DISTURBED = 22, "frame_disturbed";
     /// The untouched film was last seen away from its rest position; standard uncertainties include
     /// that.

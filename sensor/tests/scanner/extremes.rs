@@ -2,6 +2,7 @@
 //! largest.
 
 use super::reference::{Mask, scan, settings};
+use hivtac_sensor::markers::beside::Beside;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::scanner::{
     MAX_DILATIONS, MAX_HEIGHT, MAX_WIDTH, ScanSettings, Scanner,
@@ -40,6 +41,7 @@ fn full(width: u64, height: u64) -> Blob {
         weight: 0,
         weight_x: 0,
         weight_y: 0,
+        beside: Beside::NONE,
         x0: 0,
         y0: 0,
         x1: width as u16 - 1,

@@ -1,6 +1,9 @@
 //! Computes what the scanner should find, pixel by pixel: dilation by definition, blobs by flood
 //! fill, moments by summing.
 
+use std::collections::HashSet;
+
+use hivtac_sensor::markers::beside::Beside;
 use hivtac_sensor::markers::blob::Blob;
 use hivtac_sensor::markers::scanner::{Scan, ScanSettings, Scanner};
 
@@ -78,6 +81,7 @@ impl Mask {
                 let passed = |(x, y): &&(usize, usize)| self.passed[y * self.width + x];
                 let blob = Blob {
                     passed: pixels.iter().filter(passed).count() as u32,
+                    beside: beside(&pixels, self.width, &weight),
                     ..sum(&pixels, &weight)
                 };
                 found.push((order(&pixels), blob));
@@ -149,7 +153,31 @@ fn sum(pixels: &[(usize, usize)], weight: impl Fn(usize, usize) -> u8) -> Blob {
         y0: rows().min().unwrap(),
         x1: columns().max().unwrap(),
         y1: rows().max().unwrap(),
+        beside: Beside::NONE,
     }
+}
+
+/// The weights two columns left and right of each run in an even row.
+fn beside(pixels: &[(usize, usize)], width: usize, weight: impl Fn(usize, usize) -> u8) -> Beside {
+    let inside: HashSet<_> = pixels.iter().copied().collect();
+    let mut sums = Beside::NONE;
+    for &(x, y) in pixels.iter().filter(|(_, y)| y % 2 == 0) {
+        let mut add = |at: Option<usize>, sign: i32| {
+            let at = at.filter(|at| *at < width);
+            let weight = u32::from(at.map_or(0, |x| weight(x, y)));
+            let pull = if weight > 64 { 0 } else { weight + weight / 2 };
+            sums.both += pull;
+            sums.right += sign * pull as i32;
+            sums.by_row = sums.by_row.wrapping_add(pull * y as u32);
+        };
+        if x == 0 || !inside.contains(&(x - 1, y)) {
+            add(x.checked_sub(2), -1);
+        }
+        if !inside.contains(&(x + 1, y)) {
+            add(Some(x + 2), 1);
+        }
+    }
+    sums
 }
 
 /// Settings that fit a mask.

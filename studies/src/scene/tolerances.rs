@@ -61,7 +61,7 @@ struct Built {
 type Dimension = (&'static str, &'static str, fn(&mut Built));
 
 /// The dimensions of units with the film of the simulated sensor's tables, and none.
-const BY_TABLES: [Dimension; 12] = [
+const BY_TABLES: [Dimension; 13] = [
     ("nothing", "–", |_| ()),
     (
         "each bore off its place, as `--place-mm` says",
@@ -96,6 +96,9 @@ const BY_TABLES: [Dimension; 12] = [
         unit.options.film.unit.stiffness = 1.2
     }),
     ("tip's radius", "+0.1 mm", |unit| unit.tip_mm += 0.1),
+    ("a camera whose pixels see one colour each", "–", |unit| {
+        unit.options.bayer = true
+    }),
 ];
 /// Those of units whose film is solved by finite elements, and none.
 const SOLVED: [Dimension; 7] = [

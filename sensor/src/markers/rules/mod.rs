@@ -66,7 +66,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::Px;
-use pattern::Pattern;
+use pattern::{Pattern, larger};
 use shape::{RadialShape, Shape, nominal_edge};
 
 /// Four markers, the properties of their images, and their pattern.
@@ -78,6 +78,8 @@ pub struct Found {
     images: [Image; 4],
     /// Their pattern.
     pattern: Pattern,
+    /// The largest [`Shape::shift_px2`] of a marker.
+    pub shift_px2: f32,
 }
 
 impl Found {
@@ -270,6 +272,7 @@ impl Finder {
             markers: shapes.map(Shape::marker),
             images: [image(a)?, image(b)?, image(c)?, image(d)?],
             pattern,
+            shift_px2: most_shifted(shapes.into_iter()),
         })
     }
 
@@ -292,6 +295,11 @@ impl Finder {
             density: shape.density,
         })
     }
+}
+
+/// The largest [`Shape::shift_px2`].
+fn most_shifted<'s>(shapes: impl Iterator<Item = &'s Shape>) -> f32 {
+    shapes.fold(0.0, |most, shape| larger(most, shape.shift_px2))
 }
 
 /// Every way to take four of `count` items, in order.

@@ -5,7 +5,7 @@
 //! place with another, is no marker. What is left of the rules for four markers: the film that
 //! explains more markers than it must exposes one that lies.
 
-use super::pattern::distance;
+use super::pattern::{distance, larger};
 use super::shape::Shape;
 use super::trust::{HOLLOW, LOPSIDED, LOPSIDED_PIXELS};
 use super::{Finder, Reading};
@@ -33,6 +33,8 @@ pub struct Placed {
     pub markers: MarkerList,
     /// Markers without an image.
     pub lost: Lost,
+    /// The largest [`Shape::shift_px2`] of an image.
+    pub shift_px2: f32,
 }
 
 impl Finder {
@@ -48,6 +50,7 @@ impl Finder {
         may_be_shifted: bool,
     ) -> Result<Placed, Status> {
         let mut markers = MarkerList::of(rest.iter().copied());
+        let mut shift_px2 = 0.0;
         let mut images = List::<u32, MOST_MARKERS>::defaults(rest.len());
         let (dx, dy) = match may_be_shifted {
             true => self.shift(blobs, rest),
@@ -58,6 +61,7 @@ impl Finder {
             let place = images.get_mut(identity).zip(markers.get_mut(identity));
             if let Some((images, marker)) = place {
                 *images += 1;
+                shift_px2 = larger(shift_px2, shape.shift_px2);
                 *marker = shape.marker();
             }
         }
@@ -69,7 +73,11 @@ impl Finder {
                 *marker = *rest;
             }
         }
-        let placed = Placed { markers, lost };
+        let placed = Placed {
+            markers,
+            lost,
+            shift_px2,
+        };
         match placed.may_lose(0) {
             true => Ok(placed),
             false => Err(Status::MARKERS_MISSING),

@@ -34,6 +34,8 @@ pub struct Shape {
     pub lopsided: f32,
     /// Mean weight of its pixels; 0 if pixels were not weighed.
     pub density: f32,
+    /// [`Beside::shift_px2`](crate::markers::beside::Beside::shift_px2).
+    pub shift_px2: f32,
     central: Central,
 }
 
@@ -98,6 +100,7 @@ impl Shape {
             hollow: (1.0 - fill) * 0.5 * (xx + yy),
             lopsided: lopsided.to_f32(),
             density: blob.weight as f32 * by_area,
+            shift_px2: blob.beside.shift_px2(blob.area, [blob.y0, blob.y1]),
             central,
         })
     }

@@ -15,7 +15,7 @@
 use super::pattern::Pattern;
 use super::placed::nearest;
 use super::shape::{RadialShape, Shape};
-use super::{Finder, Found, Image, Trust};
+use super::{Finder, Found, Image, Trust, most_shifted};
 use crate::markers::blob::Blob;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
@@ -29,6 +29,13 @@ pub struct Three {
     pub lost: usize,
     /// Their images; `None` for the lost one.
     shapes: [Option<Shape>; 4],
+}
+
+impl Three {
+    /// The largest [`Shape::shift_px2`] of a marker.
+    pub fn shift_px2(&self) -> f32 {
+        most_shifted(self.shapes.iter().flatten())
+    }
 }
 
 impl Finder {
@@ -127,6 +134,7 @@ impl Finder {
             markers,
             images: images.map(|image| image.unwrap_or(invented)),
             pattern,
+            shift_px2: 0.0,
         })
     }
 }
