@@ -99,6 +99,8 @@ fn the_sensing_runs_from_itcm() {
         "8pipeline7hanging",
         "5force6misfit",
         "10NoiseLevel9end_frame",
+        "10NoiseLevel10set_beside",
+        "hivtac_sensor12known_answer",
         "5force10of_outputs",
         "8Geometry9rest_area",
         "8Geometry10along_flat",

@@ -1,6 +1,6 @@
 //! Tests that stated uncertainties hold in pictures that differ from the model's: pixels that see
-//! one colour each, and a film that lets a room, a fingertip or other things through. The table is in
-//! `docs/results/effects.md`.
+//! one colour each, and a film that lets a room, a fingertip or other things through. The table is
+//! in `docs/results/effects.md`.
 
 use hivtac_sensor::pipeline::Measurement;
 use hivtac_tests::judged::{Contacts, errors};

@@ -24,8 +24,8 @@ const LASTING_SCATTER: f32 = 0.15;
 /// A shift of a marker, px, that noise may seem to make (seen: 0.008). It is less than the noise of
 /// a marker's place.
 const EVEN_PX: f32 = 0.01;
-/// The shift is known to a factor of this: it depends on colours that were not looked at, and on how
-/// sharp the marker's edge is.
+/// The shift is known to a factor of this: it depends on colours that were not looked at, and on
+/// how sharp the marker's edge is.
 const UNKNOWN_COLOUR: f32 = 1.25;
 /// What shows through the film and makes a marker this uncertain, 0.03 px, disturbs a frame.
 const DISTURBED: Px = Px(1_966);

@@ -15,8 +15,8 @@ use crate::markers::runs::Run;
 const PER_PX: f32 = 95.0;
 /// How far beside a run the film is seen, px: the lens smears a marker's edge less.
 const FAR_PX: u16 = 2;
-/// Pull by brightness, of 5 bits: −15.5 times its natural logarithm, and a constant. A film twice as
-/// bright on one side moves the edge there by 0.11 px, because weights are ratios to the red.
+/// Pull by brightness, of 5 bits: −15.5 times its natural logarithm, and a constant. A film twice
+/// as bright on one side moves the edge there by 0.11 px, because weights are ratios to the red.
 const BY_LEVEL: [u8; 32] = [
     64, 47, 39, 34, 30, 27, 24, 22, 20, 19, 17, 16, 14, 13, 12, 11, 10, 9, 8, 7, 7, 6, 5, 5, 4, 3,
     3, 2, 2, 1, 1, 0,

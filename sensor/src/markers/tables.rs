@@ -51,8 +51,8 @@ pub trait Pixels {
     /// beyond the row.
     fn weight(&self, row: &[u16], column: u16) -> u8;
 
-    /// Returns the pull ([`Beside`](crate::markers::beside::Beside)) of a pixel of the row; 0 beyond
-    /// the row.
+    /// Returns the pull ([`Beside`](crate::markers::beside::Beside)) of a pixel of the row; 0
+    /// beyond the row.
     #[inline(always)]
     fn pull(&self, row: &[u16], column: u16) -> u8 {
         beside::by_weight(self.weight(row, column))

@@ -55,9 +55,11 @@ pub enum Kind {
     FlashFails,
     /// The board's supply sags to 2.7 V, at which the microcontroller still runs.
     SupplyLow,
+    /// The board's crystal does not start in the whole run.
+    CrystalSilent,
 }
 
-const NAMES: [(&str, Kind); 21] = [
+const NAMES: [(&str, Kind); 22] = [
     ("camera-absent", Kind::CameraAbsent),
     ("camera-wrong-id", Kind::CameraWrongId),
     ("camera-used", Kind::CameraUsed),
@@ -79,6 +81,7 @@ const NAMES: [(&str, Kind); 21] = [
     ("usb-stuck", Kind::UsbStuck),
     ("flash-fails", Kind::FlashFails),
     ("supply-low", Kind::SupplyLow),
+    ("crystal-silent", Kind::CrystalSilent),
 ];
 
 /// Longest time, ms: a thousand days.

@@ -181,6 +181,19 @@ fn a_program_that_stands_still_in_its_start_ends_in_the_loader() {
     assert_eq!((report.resets, report.port), (4, Port::Empty));
 }
 
+/// The core waits for the crystal until the watchdog resets it. The chip's loader needs none.
+#[test]
+#[ignore = "20 s: as one that stands still in its start"]
+fn a_board_whose_crystal_does_not_start_ends_in_the_loader() {
+    let image = Image::of_elf(&std::fs::read(firmware()).unwrap()).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("flash.elf");
+    std::fs::write(&path, elf(FLASH.start, image.bytes())).unwrap();
+    let setup = Setup::new(path, 8_500).fault("crystal-silent");
+    let report = setup.try_run(&folder.path().join("truth")).unwrap().report;
+    assert_eq!((report.resets, report.port), (4, Port::Empty));
+}
+
 /// Neither pulls of the reset line, as of a supply that comes and goes, nor power cuts count; and
 /// after one of them the program has four starts again.
 #[test]
