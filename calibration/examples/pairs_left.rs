@@ -32,9 +32,9 @@ fn main() -> Result<()> {
     let (mut lefts, mut squares) = (Vec::new(), 0.0);
     for line in fs::read_to_string(pairs)?.lines() {
         let numbers: Result<Vec<f64>, _> = line.split(',').map(str::parse).collect();
-        let (left, size) = left(&numbers?, &forward, &interaction)?;
+        let (left, variance) = left(&numbers?, &forward, &interaction)?;
         squares += left.iter().map(|part| part * part).sum::<f64>();
-        lefts.push(Moved::of(left.map(|part| part / (size * size))));
+        lefts.push(Moved::of(left.map(|part| part / variance.sqrt())));
     }
     let count = lefts.len() as f64;
     ensure!(count > 0.0, "there are no pairs");
@@ -53,7 +53,7 @@ fn main() -> Result<()> {
     Ok(fs::write(path, bytes)?)
 }
 
-/// What the model leaves of a pair's motion, focal lengths, and the size of both.
+/// What the model leaves of a pair's motion, focal lengths, and how the variance of that grows.
 fn left(
     numbers: &[f64],
     forward: &Forward<'_>,
@@ -81,5 +81,5 @@ fn left(
     for (left, told) in left.iter_mut().zip(told.moved.iter()) {
         *left -= f64::from(*told);
     }
-    Ok((left, f64::from(both.size)))
+    Ok((left, f64::from(both.left())))
 }

@@ -123,12 +123,12 @@ impl Pairs {
     }
 
     /// Takes what a search found.
-    fn take(&mut self, found: &Found) {
+    fn take(&mut self, found: Option<Found>) {
         self.search = None;
         self.looked = 0;
-        if found.is_explained() {
+        if let Some(found) = found {
             self.missed = 0;
-            self.known = Some(PairEstimate::from(*found));
+            self.known = Some(PairEstimate::from(found));
         }
     }
 }
@@ -189,8 +189,8 @@ impl Resting {
             return None;
         }
         let found = search.found();
-        let best = (is_now && found.is_explained()).then(|| search.best(&problem));
-        pairs.take(&found);
+        let best = is_now.then(|| search.best(&problem)).flatten();
+        pairs.take(found);
         best
     }
 

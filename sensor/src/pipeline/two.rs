@@ -30,7 +30,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
 
     /// Call after each frame, before [`look_again`](Self::look_again). Makes the measurement that
     /// of [two contacts](Self::two_contacts), if two explain it; then there is no second look. They
-    /// are followed from those of the frame before. Until they are found, for 28 to 76 steps, the
+    /// are followed from those of the frame before. Until they are found, for 29 to 77 steps, the
     /// measurement stays as it is.
     pub fn follow_two_contacts(&mut self, measurement: &mut Measurement, work: Work) {
         if !is_asked(measurement) {

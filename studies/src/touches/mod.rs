@@ -55,6 +55,9 @@ pub struct Touches {
     /// Presses of each row of one needle or ball, with ten frames each.
     #[arg(long, default_value_t = 100)]
     singles: u32,
+    /// Selects the presses.
+    #[arg(long, default_value_t = 0)]
+    seed: u32,
     /// Print one JSON object and write no page.
     #[arg(long)]
     json: bool,
@@ -129,7 +132,7 @@ impl Touches {
         kind: Kind,
         number: u32,
     ) -> Result<Vec<Outcome>> {
-        let press = kind.press(number)?;
+        let press = kind.press(self.seed, number)?;
         let moved = press.moved(film)?;
         let mut random = seeded(u64::from(number) + 7);
         let frames = match kind.is_single() {
@@ -168,7 +171,7 @@ impl Bench<'_> {
             search.best(problem)
         };
         let both = || find(&self.forward, &observed, &self.mounting, unknown, searched);
-        let both = (!one.is_explained()).then(both).flatten();
+        let both = (!one.is_explained()).then(both).flatten().flatten();
         let is_one_without_a_dot = !one.is_explained()
             && (0..images.len()).any(|dot| {
                 let mut others = observed;

@@ -81,14 +81,13 @@ impl Kind {
         matches!(self, Kind::One | Kind::Ball(_))
     }
 
-    /// The press with this number: the same for the same number.
+    /// The press with this number of a seed: the same for the same numbers.
     ///
     /// # Errors
     /// Never, as long as the sizes are those of patches.
-    pub fn press(self, number: u32) -> Result<Press> {
-        // No limit was chosen on those of one contact.
+    pub fn press(self, seed: u32, number: u32) -> Result<Press> {
         let first = if self.is_single() { 50_000 } else { 1_000 };
-        let mut random = seeded(first + u64::from(number));
+        let mut random = seeded(100_000 * u64::from(seed) + first + u64::from(number));
         let single_mn = match self.is_single() {
             true => random.random_range(ONE_MN[0]..ONE_MN[1]),
             false => TOGETHER_MN,
@@ -188,8 +187,8 @@ mod tests {
     fn presses_are_what_their_kind_says() {
         for kind in Kind::all() {
             for number in 0..20 {
-                let press = kind.press(number).unwrap();
-                assert_eq!(press.needles, kind.press(number).unwrap().needles);
+                let press = kind.press(0, number).unwrap();
+                assert_eq!(press.needles, kind.press(0, number).unwrap().needles);
                 let mut reach = press.needles.iter().flat_map(|(place, _)| place);
                 assert!(reach.all(|part| part.abs() <= REACH_MM), "{kind}");
                 if let Kind::Pair { apart_mm, .. } = kind {

@@ -10,6 +10,7 @@ use crate::force::forward::estimate::{Estimate, Observed, Start};
 use crate::force::forward::mounting::Mounting;
 use crate::force::forward::pose::Pose;
 use crate::force::forward::solve::{Column, PRIOR, Rows, Solved, norm, solve_here, square};
+use hivtac_terms::contact_shape::ContactShape;
 
 /// Most steps of a descent.
 pub(super) const STEPS: usize = 16;
@@ -63,6 +64,18 @@ impl Problem<'_> {
     /// Returns the one contact that explains the markers best.
     pub fn one(&self, start: Start) -> Estimate {
         (self.forward).estimate(self.observed, self.mounting, self.unknown, start)
+    }
+
+    /// Returns the one contact of unknown width near another that explains the markers best; `None`
+    /// if it is not known how a wide contact moves them.
+    pub(super) fn one_wide(&self, near: Pose) -> Option<Estimate> {
+        let wide = self.forward.widths?.pressing(ContactShape::Unknown);
+        let observed = Observed {
+            wide,
+            ..*self.observed
+        };
+        let start = Start::At(near);
+        Some((self.forward).estimate(&observed, self.mounting, self.unknown, start))
     }
 
     /// Returns known contacts with what they leave unexplained of these markers, without a step.

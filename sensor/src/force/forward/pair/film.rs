@@ -1,5 +1,6 @@
 //! Predicts the motion of the markers' images under two contacts, with its slopes.
 
+use super::far_mm;
 use super::interaction::{INPUTS, Interaction};
 use crate::force::forward::Forward;
 use crate::force::forward::pose::Pose;
@@ -61,6 +62,15 @@ impl Both {
         let ([a, b], [c, d]) = (first.tilt, second.tilt);
         let ([x, y], [z, w]) = (first.place_mm, second.place_mm);
         [self.size, self.part, a, b, c, d, x, y, z, w]
+    }
+
+    /// How the variance of what the model leaves grows with both contacts, relative to that of a
+    /// size of 1 at one place. What it leaves grows with the distance, too: chosen on other pairs
+    /// than the network's.
+    pub fn left(&self) -> f32 {
+        let square = self.size * self.size;
+        let [first, second] = &self.poses;
+        square * square * self.size * (1.0 + far_mm(first, second))
     }
 
     /// The part of each contact, and the contact with the size of both.

@@ -25,8 +25,8 @@ const OF_EIGHT_V: &[u8] = include_bytes!("../../../../data/pairs-8v.bin");
 /// The file has the channels of both hidden layers (u8), the number of markers (u8) and a zero.
 /// Then f32: the mean and the reciprocal deviation of each input, and the distance at which the
 /// factor is half of the largest, mm. The [`Network`] follows. Then comes a lower factor of the
-/// covariance that the model leaves, f32, for a size of both of 1: what it leaves grows as the
-/// squared size. It has the errors of the single contacts' tables for pairs, too.
+/// covariance that the model leaves, f32, where [`Both::left`] is 1. It has the errors of the
+/// single contacts' tables for pairs, too.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interaction<'a> {
     head: &'a [u8; HEAD],
@@ -133,7 +133,7 @@ impl<'a> Interaction<'a> {
 
     /// Adds what the network leaves to a covariance.
     pub fn add_uncertainty(&self, both: &Both, covariance: &mut Covariance) {
-        let of_size = both.size * both.size * both.size * both.size;
+        let left = both.left();
         let row = |nth: usize| self.left.get(triangle(nth)..triangle(nth + 1));
         for one in 0..COORDINATES {
             for other in 0..=one {
@@ -144,7 +144,7 @@ impl<'a> Interaction<'a> {
                     let [a, b] = [a, b].map(|part| f32::from_le_bytes(*part));
                     a * b
                 });
-                covariance.add(one, other, of_size * products.sum::<f32>());
+                covariance.add(one, other, left * products.sum::<f32>());
             }
         }
     }

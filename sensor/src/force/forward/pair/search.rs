@@ -2,12 +2,18 @@
 //! frame.
 
 use super::descent::{Problem, STEPS};
-use super::{ALONG, APART_MM, DESCENTS, PARTS, Pair, PairEstimate, has_rival, is_explained};
+use super::{
+    ALONG, APART_MM, DESCENTS, LEAST_APART_MM, PARTS, Pair, PairEstimate, far_mm, has_rival,
+    is_explained,
+};
 use crate::force::forward::pose::Pose;
 
 /// Number of starts, and how many are compared in place of one step.
 const STARTS: usize = ALONG.len() * APART_MM.len() * PARTS.len();
 const AT_ONCE: usize = 4;
+/// One contact of unknown width has four unknowns fewer than two: it explains the markers as well
+/// if it leaves at most so much more, as noise does on average.
+const FEWER_UNKNOWNS: f32 = 4.0;
 
 /// A number of steps that may be taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +44,9 @@ pub struct Search {
     /// The start from which steps are taken, and how many were.
     descent: usize,
     steps: usize,
+    /// Whether one contact, wider than a needle, explains the markers as well; `None` before all
+    /// steps are taken.
+    is_one: Option<bool>,
 }
 
 impl Search {
@@ -49,18 +58,22 @@ impl Search {
             nearest: [(f32::INFINITY, [one; 2]); DESCENTS],
             descent: 0,
             steps: 0,
+            is_one: None,
         }
     }
 
     /// Goes on until it is over, or the work is done. Returns whether it is over.
     pub fn go_on(&mut self, problem: &Problem<'_>, work: &mut Work) -> bool {
-        while self.descent < DESCENTS && work.take() {
-            match self.start < STARTS {
-                true => self.compare(problem),
-                false => self.step(problem),
+        while self.is_one.is_none() && work.take() {
+            if self.start < STARTS {
+                self.compare(problem);
+            } else if self.descent < DESCENTS {
+                self.step(problem);
+            } else {
+                self.is_one = Some(self.is_one_wide(problem));
             }
         }
-        self.descent >= DESCENTS
+        self.is_one.is_some()
     }
 
     /// Compares the next starts.
@@ -106,31 +119,49 @@ impl Search {
         }
     }
 
-    /// Returns the best contacts that were found, once the search is over, and what they leave
-    /// unexplained.
-    pub fn found(&self) -> Found {
+    /// Returns whether one contact of unknown width explains the markers as well as two do that
+    /// are not told apart. A ball is no needle, and moves markers as two near needles do.
+    fn is_one_wide(&self, problem: &Problem<'_>) -> bool {
+        let (unexplained, [first, second]) = self.best_of_all();
+        let wide = || problem.one_wide(self.one);
+        far_mm(&first, &second) < LEAST_APART_MM
+            && is_explained(unexplained)
+            && wide().is_some_and(|wide| {
+                wide.is_explained() && wide.unexplained < unexplained + FEWER_UNKNOWNS
+            })
+    }
+
+    /// The contacts that leave least, and how much.
+    fn best_of_all(&self) -> (f32, Pair) {
         let mut best = (f32::INFINITY, [self.one; 2]);
         for found in &self.nearest {
             if found.0 < best.0 {
                 best = *found;
             }
         }
-        let (unexplained, pair) = best;
+        best
+    }
+
+    /// Returns the contacts that were found, once the search is over, and what they leave
+    /// unexplained. Returns `None` if two do not explain the markers, or one does as well.
+    pub fn found(&self) -> Option<Found> {
+        let (unexplained, pair) = self.best_of_all();
         let rivals = |other: &(f32, Pair)| has_rival((unexplained, &pair), (other.0, &other.1));
-        Found {
+        let is_two = is_explained(unexplained) && self.is_one == Some(false);
+        is_two.then(|| Found {
             pair,
             unexplained,
             is_only: !self.nearest.iter().any(rivals),
-        }
+        })
     }
 
     /// [`found`](Self::found), with how well they are known in the markers of the search.
-    pub fn best(&self, problem: &Problem<'_>) -> PairEstimate {
-        let Found { pair, is_only, .. } = self.found();
-        PairEstimate {
+    pub fn best(&self, problem: &Problem<'_>) -> Option<PairEstimate> {
+        let Found { pair, is_only, .. } = self.found()?;
+        Some(PairEstimate {
             is_only,
             ..problem.step(pair).here
-        }
+        })
     }
 }
 
@@ -143,13 +174,6 @@ pub struct Found {
     pub unexplained: f32,
     /// Whether no other two contacts were found that explain the markers nearly as well.
     pub is_only: bool,
-}
-
-impl Found {
-    /// Returns whether the contacts explain the markers; false if the residual is NaN.
-    pub fn is_explained(&self) -> bool {
-        is_explained(self.unexplained)
-    }
 }
 
 impl From<Found> for PairEstimate {
