@@ -25,22 +25,22 @@ fn model() -> Model<'static> {
     Model::parse(&FILE.0).unwrap()
 }
 
-fn layout() -> Layout {
+pub fn layout() -> Layout {
     "8v".parse().unwrap()
 }
 
-fn scene(change: impl FnOnce(&mut Options)) -> Scene {
+pub fn scene(change: impl FnOnce(&mut Options)) -> Scene {
     let scene = layout_scene(layout()).unwrap();
     let mut options = scene.options().clone();
     change(&mut options);
     scene.with_options(options).unwrap()
 }
 
-fn nominal() -> Scene {
+pub fn nominal() -> Scene {
     scene(|_| {})
 }
 
-fn untared() -> Box<Sensor<'static>> {
+pub fn untared() -> Box<Sensor<'static>> {
     forward::untared(&model()).unwrap()
 }
 
@@ -59,7 +59,7 @@ fn tare(sensor: &mut Sensor<'_>, scene: &Scene, load: &Load) -> Option<Result<Re
 }
 
 /// A sensor that was tared on this scene.
-fn tared(scene: &Scene) -> Box<Sensor<'static>> {
+pub fn tared(scene: &Scene) -> Box<Sensor<'static>> {
     let mut sensor = untared();
     let rest = tare(&mut sensor, scene, &Load::REST).unwrap().unwrap();
     sensor.set_tare(Some(rest), Drift::NONE);
@@ -77,8 +77,8 @@ fn loads() -> impl Iterator<Item = (u64, Load)> {
     })
 }
 
-/// Errors of direction, |F| and place over what 95 of 100 are within.
-fn errors(force: &Force, load: &Load) -> [f64; 3] {
+/// Errors of direction, degrees, |F|, N, and place, mm; and what 95 of 100 of each are within.
+pub fn errors_and_limits(force: &Force, load: &Load) -> ([f64; 3], [f64; 3]) {
     let newtons = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let length = newtons.iter().map(|part| part * part).sum::<f64>().sqrt();
     let off_deg = angle_deg(
@@ -88,11 +88,17 @@ fn errors(force: &Force, load: &Load) -> [f64; 3] {
     let place = force.place.unwrap();
     let [x, y] = load.offset_mm();
     let off_mm = (f64::from(place.x.0) * 1e-3 - x).hypot(f64::from(place.y.0) * 1e-3 - y);
-    [
-        off_deg.unwrap() / (1.731e-3 * f64::from(force.direction_sigma.0)),
-        (length - load.magnitude_n()).abs() / (1.96e-6 * f64::from(force.magnitude_sigma.0)),
-        off_mm / (2.448e-3 * f64::from(place.sigma.0)),
-    ]
+    let errors = [
+        off_deg.unwrap(),
+        (length - load.magnitude_n()).abs(),
+        off_mm,
+    ];
+    let limits = [
+        1.731e-3 * f64::from(force.direction_sigma.0),
+        1.96e-6 * f64::from(force.magnitude_sigma.0),
+        2.448e-3 * f64::from(place.sigma.0),
+    ];
+    (errors, limits)
 }
 
 /// Number of presses with a force, and with all three errors within the stated 95 %; the lost
@@ -112,10 +118,13 @@ fn judged(sensor: &mut Sensor<'_>, scene: &Scene) -> (u32, [u32; 3], Vec<Lost>) 
         assert!(!is_lost || measurement.status.contains(Status::MARKER_LOST));
         shown += 1;
         lost.push(measurement.lost);
-        let errors = errors(&force, &load);
-        println!("{number}: {errors:.2?} {:?}", measurement.status);
-        for (within, error) in within.iter_mut().zip(errors) {
-            *within += u32::from(error <= 1.0);
+        let (errors, limits) = errors_and_limits(&force, &load);
+        println!(
+            "{number}: {errors:.4?} {limits:.4?} {:?}",
+            measurement.status
+        );
+        for (within, (error, limit)) in within.iter_mut().zip(errors.iter().zip(limits)) {
+            *within += u32::from(*error <= limit);
         }
     }
     (shown, within, lost)
@@ -244,7 +253,7 @@ fn the_models_files_are_as_they_are_made() {
 }
 
 /// A sensor with the model of the four dots, without a tare.
-fn of_four() -> Box<Sensor<'static>> {
+pub fn of_four() -> Box<Sensor<'static>> {
     static FILE: &AlignedFile<[u8]> = &AlignedFile(*include_bytes!("../models/default.hvtm"));
     forward::untared(&Model::parse(&FILE.0).unwrap()).unwrap()
 }

@@ -3,6 +3,7 @@
 mod collect;
 mod command_line;
 mod committed_model;
+mod dots;
 mod evaluate;
 mod layouts;
 mod numerics;
