@@ -22,7 +22,8 @@ use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_wire::decoder::{Decoder, Received};
 use hivtac_wire::frame::{HOST_FRAME_LIMIT, MAX_DEVICE_FRAME, encode};
 use hivtac_wire::message::{
-    DeviceHello, DeviceMessage, HostMessage, Outcome, PROTOCOL_VERSION, Reply, Request, Sample,
+    DeviceHello, DeviceMessage, HostMessage, ModelIdentity, ModelSource, Outcome, PROTOCOL_VERSION,
+    Reply, Request, Sample,
 };
 use hivtac_wire::settings::{RestPosition, TareReport};
 use hivtac_wire::version::SCHEMA_HASH;
@@ -58,17 +59,26 @@ pub fn markers(force: [f64; 3]) -> [Marker; 4] {
     ]
 }
 
-pub fn hello() -> DeviceHello {
+/// The hello of a sensor whose model is for this many markers; without any, it has no model.
+fn hello(markers: Option<u8>) -> DeviceHello {
+    let threshold = Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255]));
     DeviceHello {
         protocol: PROTOCOL_VERSION,
         schema: SCHEMA_HASH,
         device_id: [1; 12],
         board: "fake".try_into().unwrap(),
         firmware: "fake".try_into().unwrap(),
-        model: None,
+        model: markers.map(|markers| ModelIdentity {
+            crc: 1,
+            name: "fake".try_into().unwrap(),
+            markers,
+            simulated: true,
+            threshold,
+            source: ModelSource::BuiltIn,
+        }),
         width: 320,
         height: 240,
-        threshold: Threshold::Rgb565(HsvBox::of_limits([170, 10, 100, 255, 45, 255])),
+        threshold,
         preset: "ov7725".try_into().unwrap(),
         dilations: 1,
         centroid: CentroidEstimator::RednessWeighted,
@@ -90,6 +100,8 @@ pub struct FakeSensor {
     pub pose: Arc<Mutex<[f64; 2]>>,
     /// The answer to a tare.
     pub tare: Arc<Mutex<Outcome>>,
+    /// Number of markers that its model is for; none without a model.
+    pub markers: Arc<Mutex<Option<u8>>>,
 }
 
 impl FakeSensor {
@@ -110,18 +122,20 @@ impl FakeSensor {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp:{}", listener.local_addr().unwrap());
         let tare = Arc::new(Mutex::new(Outcome::Done));
-        let answered = tare.clone();
+        let markers = Arc::new(Mutex::new(None));
+        let (answered, of_model) = (tare.clone(), markers.clone());
         std::thread::spawn(move || {
             let mut counts = [0, 0];
             while let Ok((stream, _)) = listener.accept() {
-                let outcome = *answered.lock().unwrap();
-                talk(stream, &mut film, outcome, &mut counts, after);
+                let told = (*answered.lock().unwrap(), *of_model.lock().unwrap());
+                talk(stream, &mut film, told, &mut counts, after);
             }
         });
         Self {
             port,
             pose: Arc::default(),
             tare,
+            markers,
         }
     }
 }
@@ -129,7 +143,7 @@ impl FakeSensor {
 fn talk(
     mut stream: TcpStream,
     film: &mut Film,
-    tare: Outcome,
+    told: (Outcome, Option<u8>),
     [frame, start]: &mut [u32; 2],
     after: usize,
 ) {
@@ -149,7 +163,7 @@ fn talk(
                         return;
                     };
                     let was = streaming;
-                    answer(&mut stream, message, tare, &mut streaming);
+                    answer(&mut stream, message, told, &mut streaming);
                     *start += u32::from(streaming && !was);
                 }
             }
@@ -167,9 +181,14 @@ fn talk(
     }
 }
 
-fn answer(stream: &mut TcpStream, message: HostMessage, tare: Outcome, streaming: &mut bool) {
+fn answer(
+    stream: &mut TcpStream,
+    message: HostMessage,
+    (tare, markers): (Outcome, Option<u8>),
+    streaming: &mut bool,
+) {
     match message {
-        HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello())),
+        HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello(markers))),
         HostMessage::Down(_) => {}
         HostMessage::Command(hivtac_wire::message::Command { id, request }) => {
             let mut outcome = Outcome::Done;

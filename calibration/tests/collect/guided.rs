@@ -4,17 +4,18 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use hivtac_calibration::data::collect::simulated::SimulatedGauge;
-use hivtac_calibration::data::dataset::{MarkerDetector, Recipe, Sensing};
-use hivtac_calibration::data::rest::features_from_q16;
+use hivtac_calibration::forward::layout_scene;
 use hivtac_sensor::force::model::Model;
+use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::force::{ContactList, Force};
-use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{MicroNewtons, MilliDegrees, UnsignedMicroNewtons, UnsignedMilliDegrees};
 use hivtac_twin::Load;
+use hivtac_twin::film::Layout;
 use hivtac_wire::message::Sample;
 
 use super::fake::*;
+use crate::layouts;
 
 /// α and β in degrees, x and y in mm; each pressed with 0.1 N.
 const LOADS: [[f64; 4]; 6] = [
@@ -55,10 +56,8 @@ fn press_n(load: usize, time_s: f64) -> f64 {
 type Pressed = Arc<Mutex<Vec<(f64, f64)>>>;
 
 /// The simulated sensor's film, measured by the sensing in rendered frames.
-fn film(pressed: Pressed) -> Film {
-    let recipe = Recipe::default();
-    let scene = recipe.scene(0).unwrap();
-    let mut sensing = Sensing::unmodelled(&recipe).unwrap();
+fn film(pressed: Pressed, layout: Layout, mut sensor: Box<Sensor<'static>>) -> Film {
+    let scene = layout_scene(layout).unwrap();
     let (mut time_s, mut begun_s, mut last_start) = (0.0, 0.0, 0);
     Box::new(move |frame, start| {
         time_s += FRAME_S;
@@ -77,13 +76,8 @@ fn film(pressed: Pressed) -> Film {
             false => Load::REST,
         };
         let rendered = scene.render_load(&load, frame.into()).unwrap();
-        let seen = sensing.detect(&rendered).unwrap().unwrap();
-        let centroids = features_from_q16(&seen.features_q16).unwrap().centroids;
-        let marker = |k: usize| Marker {
-            x: centroids[k].0,
-            y: centroids[k].1,
-            area: seen.areas_px[k],
-        };
+        sensor.forget_frame();
+        let seen = sensor.measure_frame(&rendered.to_rgb565());
         Sample {
             sequence: frame,
             frame,
@@ -91,7 +85,7 @@ fn film(pressed: Pressed) -> Film {
             status: Status::NOT_CALIBRATED,
             force: Some(felt(force_n)),
             contacts: ContactList::default(),
-            markers: [0, 1, 2, 3].map(marker).into(),
+            markers: seen.markers.unwrap(),
         }
     })
 }
@@ -124,12 +118,23 @@ fn number(text: &str, words: &str) -> f64 {
 #[test]
 #[ignore = "slow: 900 rendered frames and a fit"]
 fn a_person_is_led_to_a_units_own_model() {
+    is_led_to_its_model(Layout::default(), layouts::of_four());
+}
+
+#[test]
+#[ignore = "slow: 900 rendered frames and a fit"]
+fn a_person_is_led_to_the_model_of_a_unit_of_eight_dots() {
+    is_led_to_its_model(layouts::layout(), layouts::untared());
+}
+
+fn is_led_to_its_model(layout: Layout, sensor: Box<Sensor<'static>>) {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let poses = LOADS.map(|[alpha, beta, x, y]| format!("{alpha},{beta},{x},{y}\n"));
     std::fs::write(here.join("poses.csv"), poses.concat()).unwrap();
     let pressed = Pressed::default();
-    let sensor = FakeSensor::of_film(film(pressed.clone()), usize::MAX);
+    let sensor = FakeSensor::of_film(film(pressed.clone(), layout, sensor), usize::MAX);
+    *sensor.markers.lock().unwrap() = Some(layout.count() as u8);
     let unit = ["unit", "--into", "unit", "--poses", "poses.csv"];
     let with_sensor = [
         &unit[..],

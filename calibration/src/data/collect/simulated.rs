@@ -13,7 +13,7 @@ use serde::Deserialize;
 /// Options of `collect simulate-gauge`.
 #[derive(Debug, clap::Args)]
 pub struct SimulateArgs {
-    /// The truth log of a rig (`hivtac-rig --truth`).
+    /// The truth log of a rig or of a twin (`hivtac-rig --truth`, `hivtac twin --truth`).
     #[arg(long, value_name = "FILE")]
     truth: PathBuf,
     #[command(flatten)]
@@ -66,7 +66,7 @@ impl Default for SimulatedGauge {
 
 #[derive(Deserialize)]
 struct Exposure {
-    time_s: f64,
+    time_us: u64,
     magnitude_n: f64,
 }
 
@@ -80,11 +80,11 @@ impl SimulateArgs {
             .with_context(|| format!("cannot read {}", self.truth.display()))?;
         let exposures = text.lines().map(|line| {
             let Exposure {
-                time_s,
+                time_us,
                 magnitude_n,
             } = serde_json::from_str(line)
                 .with_context(|| format!("{} is no truth log: {line}", self.truth.display()))?;
-            Ok((time_s, magnitude_n))
+            Ok((1e-6 * time_us as f64, magnitude_n))
         });
         let forces: Vec<(f64, f64)> = exposures.collect::<Result<_>>()?;
         fs::write(&self.out, self.gauge.lines(&forces)?)
