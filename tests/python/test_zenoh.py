@@ -1,5 +1,5 @@
-"""`hivtac serve --ros2` on Zenoh, on the simulated sensor, received by a client that is none of this
-project's: `zenoh-ros2-sdk`, which speaks as `rmw_zenoh_cpp` does, over Zenoh's own router.
+"""`hivtac serve --ros2` on Zenoh, on the simulated sensor, received by a client that is none of
+this project's: `zenoh-ros2-sdk`, which speaks as `rmw_zenoh_cpp` does, over Zenoh's own router.
 
     HIVTAC_TOOL=… python tests/python/test_zenoh.py
 

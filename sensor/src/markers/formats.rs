@@ -222,6 +222,11 @@ impl Pixels for Mono {
             weight_of(self, pair.to_le_bytes()[usize::from(column % 2)])
         })
     }
+
+    /// Nothing: without colour a film in uneven light looks like one that something shows through.
+    fn beside(&self, _: &[u16], _: Run) -> [u8; 2] {
+        [0; 2]
+    }
 }
 
 #[cfg(test)]
