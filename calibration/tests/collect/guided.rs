@@ -4,8 +4,7 @@ use std::path::Path;
 use std::sync::{Arc, Mutex};
 
 use hivtac_calibration::data::collect::simulated::SimulatedGauge;
-use hivtac_calibration::forward::{self, layout_scene, rest_of};
-use hivtac_sensor::force::forward::Drift;
+use hivtac_calibration::forward::layout_scene;
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::force::{ContactList, Force};
@@ -191,36 +190,6 @@ fn is_led_to_its_model(layout: Layout, sensor: Box<Sensor<'static>>) {
     let stdout = String::from_utf8(done.stdout).unwrap();
     assert!(done.status.success(), "{stdout}: {said}");
     assert_good(here, &stdout);
-    measures(here, layout);
-}
-
-/// Checks the forces of the kept model, after a tare, under presses that were not among the loads.
-fn measures(here: &Path, layout: Layout) {
-    let bytes = std::fs::read(here.join("unit/unit.hvtm")).unwrap();
-    let model = Model::parse(&bytes).unwrap();
-    let scene = layout_scene(layout).unwrap();
-    let mut sensor = forward::untared(&model).unwrap();
-    let rest = rest_of(&mut sensor, &scene, 100_000).unwrap();
-    sensor.set_tare(Some(rest), Drift::NONE);
-    for (number, [force_n, alpha, beta, x, y]) in (200_000..).zip([
-        [0.07, 3.0, -5.0, 1.0, -2.0],
-        [0.1, -6.0, 2.0, -2.5, 1.5],
-        [0.15, 0.0, 4.0, 0.5, 0.5],
-    ]) {
-        let load = Load::from_angles(force_n, alpha, beta).unwrap();
-        let load = load.with_offset_mm([x, y]).unwrap();
-        let frame = scene.render_load(&load, number).unwrap();
-        sensor.forget_frame();
-        let seen = sensor.measure_frame(&frame.to_rgb565());
-        assert!(!seen.status.contains(Status::NOT_CALIBRATED), "{seen:?}");
-        let (errors, limits) = layouts::errors_and_limits(&seen.force.unwrap(), &load);
-        // The limits are those of 95 %; half as much again is 3 σ.
-        let is_within = errors
-            .iter()
-            .zip(limits)
-            .all(|(error, limit)| *error < 1.5 * limit);
-        assert!(is_within, "{errors:?}, stated {limits:?}, under {load:?}");
-    }
 }
 
 /// Checks the verdict on loads left out, and the model's file.
