@@ -128,7 +128,8 @@ fn hard_cases_anywhere_are_seldom_wrong_if_any_shape_may_press() {
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
 fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
-    hold(60..150, 3);
+    // Of some 3,500 forces, in 5 % of salt and in JPEG of low quality.
+    hold(60..150, 4);
 }
 
 /// Checks honest frames in which no marker reaches the picture's border: at most one in a thousand
