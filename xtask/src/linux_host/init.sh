@@ -16,7 +16,6 @@ ip link set eth0 up
 dmesg -c > /dev/null
 
 DEVICE=/sys/bus/usb/devices/1-1
-TTY=/dev/ttyACM0
 
 # Waits up to 60 s for a command to succeed.
 until_so() {
@@ -30,9 +29,15 @@ until_so() {
 is_suspended() { grep -q suspended "$DEVICE/power/runtime_status"; }
 has_lines() { [ "$(grep -c . /tmp/amid)" -ge 5 ]; }
 
+# The port has another number than before if a program still held it.
+has_port() {
+    TTY=/dev/$(ls "$DEVICE:1.0/tty")
+    test -c "$TTY"
+}
+
 # Forces come: so many of them, without an error.
 forces() {
-    until_so test -c "$TTY" || { echo "no $TTY"; return 1; }
+    until_so has_port || { echo "no port"; return 1; }
     timeout 900 hivtac monitor --port "$TTY" --timeout 60 --frames "$1" > /tmp/forces 2>&1 ||
         { tail -n 5 /tmp/forces; return 1; }
 }
