@@ -335,6 +335,9 @@ impl Resting {
             widen(&mut force, OF_OTHER_UNITS);
         }
         let mut status = trust(&force, by_noise, range);
+        if noise.is_disturbed() {
+            status |= Status::FRAME_DISTURBED;
+        }
         let is_uncertain = noise.blur.0 > 0 || noise.beside.0 > 0;
         let is_blurred = is_uncertain && estimate.unexplained > UNEXPLAINED_BLURRED;
         if is_blurred || !estimate.is_explained() && !self.may_be_loose(&force) {

@@ -583,9 +583,6 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 let is_again = matches!(self.look, Look::Again);
                 let blur = if is_again { BLUR } else { Px(0) };
                 let noise = self.noise.of_frame(blur);
-                if noise.is_disturbed() {
-                    *status |= Status::FRAME_DISTURBED;
-                }
                 let estimate = resting.estimate(forward, markers, noise, &output);
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);

@@ -203,9 +203,6 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         };
         let is_again = matches!(self.look, Look::Again);
         let noise = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
-        if noise.is_disturbed() {
-            *status |= Status::FRAME_DISTURBED;
-        }
         let seen = Seen {
             forward,
             resting,

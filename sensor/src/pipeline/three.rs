@@ -62,9 +62,6 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         status |= prepared.finder.judge_three(&three, trust, &markers.array());
         let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
         status |= found | Status::MARKER_LOST;
-        if noise.is_disturbed() {
-            status |= Status::FRAME_DISTURBED;
-        }
         let is_touched = found.contains(Status::CONTACT);
         let is_known = !is_touched || forward.is_far_from(lost, &estimate);
         let is_explained = is_known && estimate.is_explained_by_three(is_touched);
