@@ -29,6 +29,7 @@ mod sparse;
 mod spline;
 pub mod sweep;
 mod tables;
+mod torsion;
 #[cfg(test)]
 mod verification;
 mod view;
