@@ -1,11 +1,11 @@
 //! The fields of a force: name, unit and digits for terminal, JSON, CSV, live page and Python.
 
 use crate::decimal::Decimal;
-use Quantity::{Angle, Length, Newtons};
-use hivtac_terms::force::{Force, MOST_CONTACTS, Place};
+use Quantity::{Angle, Length, NewtonMetres, Newtons};
+use hivtac_terms::force::{Force, MOST_CONTACTS, Place, Torque};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// What a field measures. The wire counts it in thousandths of a degree, in µN or in µm.
+/// What a field measures. The wire counts it in thousandths of a degree, in µN, in µm or in nN·m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Degrees.
@@ -14,6 +14,8 @@ pub enum Quantity {
     Newtons,
     /// Millimetres.
     Length,
+    /// Newton metres.
+    NewtonMetres,
 }
 
 impl Quantity {
@@ -23,6 +25,7 @@ impl Quantity {
             Angle => "°",
             Newtons => "mN",
             Length => "mm",
+            NewtonMetres => "mN·mm",
         }
     }
 
@@ -31,6 +34,7 @@ impl Quantity {
         match self {
             Angle | Length => 3,
             Newtons => 6,
+            NewtonMetres => 9,
         }
     }
 }
@@ -69,6 +73,12 @@ pub const PLACE: [Field<Place>; 3] = [
     field("place_sigma_mm", "place ±", Length, |it| it.sigma.0.into()),
 ];
 
+/// The torque about the film's normal; few frames show one.
+pub const TORQUE: [Field<Torque>; 2] = [
+    field("torque_z_nm", "torque", NewtonMetres, |it| it.z.0.into()),
+    field("torque_sigma_nm", "", NewtonMetres, |it| it.sigma.0.into()),
+];
+
 const fn field<T>(
     name: &'static str,
     symbol: &'static str,
@@ -99,12 +109,13 @@ impl<T> Field<T> {
         Decimal::thousandths(self.integer(of))
     }
 
-    /// Its value in rad, N or m.
+    /// Its value in rad, N, m or N·m.
     pub fn si(&self, of: &T) -> f64 {
         let integer = self.integer(of) as f64;
         match self.quantity {
             Angle => (integer / 1e3).to_radians(),
             Newtons | Length => integer / 1e6,
+            NewtonMetres => integer / 1e9,
         }
     }
 }
@@ -116,6 +127,7 @@ pub fn contact_names() -> Vec<String> {
             .map(|it| it.name)
             .into_iter()
             .chain(PLACE.map(|it| it.name))
+            .chain(TORQUE.map(|it| it.name))
     };
     let numbers = 1..=MOST_CONTACTS;
     let names =
@@ -123,18 +135,23 @@ pub fn contact_names() -> Vec<String> {
     names.collect()
 }
 
-/// A force as a JSON object of all fields; those of an unknown place are `null`.
+/// A force as a JSON object of all fields; those of an unknown place or torque are `null`.
 pub struct ForceJson(pub Force);
 
 impl Serialize for ForceJson {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let ForceJson(force) = self;
-        let mut fields = serializer.serialize_map(Some(FORCE.len() + PLACE.len()))?;
+        let mut fields =
+            serializer.serialize_map(Some(FORCE.len() + PLACE.len() + TORQUE.len()))?;
         for field in FORCE {
             fields.serialize_entry(field.name, &field.decimal(force))?;
         }
         for field in PLACE {
             let number = force.place.as_ref().map(|place| field.decimal(place));
+            fields.serialize_entry(field.name, &number)?;
+        }
+        for field in TORQUE {
+            let number = force.torque.as_ref().map(|torque| field.decimal(torque));
             fields.serialize_entry(field.name, &number)?;
         }
         fields.end()
@@ -152,8 +169,14 @@ pub fn place_si(force: &Force) -> [f64; 3] {
     place.map_or([f64::NAN; 3], |place| PLACE.map(|it| it.si(place)))
 }
 
-/// Returns the torque about the film's middle, N·m, of a force at its place, or of the two contacts
-/// whose sum it is. What has no place adds nothing.
+/// Returns the torque about the film's normal and its standard uncertainty, N·m; NaN if unknown.
+pub fn torque_si(force: &Force) -> [f64; 2] {
+    let torque = force.torque.as_ref();
+    torque.map_or([f64::NAN; 2], |torque| TORQUE.map(|it| it.si(torque)))
+}
+
+/// Returns the torque about the film's middle, N·m: of a force at its place, or of the two contacts
+/// whose sum it is, and that about the film's normal. What is unknown adds nothing.
 pub fn torque_nm(force: &Force, contacts: &[Force]) -> [f64; 3] {
     let parts = match contacts {
         [_, _] => contacts,
@@ -161,6 +184,9 @@ pub fn torque_nm(force: &Force, contacts: &[Force]) -> [f64; 3] {
     };
     let mut sum = [0.0; 3];
     for part in parts {
+        if let Some(torque) = &part.torque {
+            sum[2] += TORQUE[0].si(torque);
+        }
         let Some(place) = part.place else { continue };
         let [x, y] = place_m(place);
         let [fx, fy, fz] = part.cartesian.map(|un| f64::from(un.0) * 1e-6);

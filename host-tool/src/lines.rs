@@ -1,7 +1,7 @@
 //! Formats one line for each sample: for people, as JSON, or as CSV.
 
 use hivtac_host::decimal::Decimal;
-use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE, contact_names};
+use hivtac_host::force_fields::{FORCE, Field, ForceJson, PLACE, TORQUE, contact_names};
 use hivtac_host::shown::to_json;
 use hivtac_host::truth::Truth;
 use hivtac_terms::force::{Force, MOST_CONTACTS};
@@ -214,11 +214,13 @@ fn json_row(row: &Row) -> String {
 }
 
 fn csv_header(truth: bool) -> String {
-    let [force, place] = [
-        FORCE.map(|it| it.name).to_vec(),
-        PLACE.map(|it| it.name).to_vec(),
-    ];
-    let mut names = [&["seq", "frame", "time_us"], &force[..], &place[..]].concat();
+    let (force, place, torque) = (
+        FORCE.map(|it| it.name),
+        PLACE.map(|it| it.name),
+        TORQUE.map(|it| it.name),
+    );
+    let mut names = vec!["seq", "frame", "time_us"];
+    names.extend([&force[..], &place, &torque].concat());
     names.extend(["contact", "slip", "status"]);
     let mut header = names.join(",");
     header.extend(contact_names().iter().map(|name| format!(",{name}")));
@@ -253,9 +255,11 @@ fn csv_row(row: &Row) -> String {
 
 fn csv_force(force: Option<&Force>) -> Vec<String> {
     let place = force.and_then(|force| force.place.as_ref());
+    let torque = force.and_then(|force| force.torque.as_ref());
     let force = FORCE.map(|it| field(force.map(|force| it.decimal(force))));
     let place = PLACE.map(|it| field(place.map(|place| it.decimal(place))));
-    [&force[..], &place[..]].concat()
+    let torque = TORQUE.map(|it| field(torque.map(|torque| it.decimal(torque))));
+    [&force[..], &place, &torque].concat()
 }
 
 /// The value as text; empty for `None`.
@@ -276,11 +280,11 @@ fn csv_truth(truth: Option<Truth>) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use hivtac_terms::force::{ContactList, Place};
+    use hivtac_terms::force::{ContactList, Place, Torque};
     use hivtac_terms::marker::MarkerList;
     use hivtac_terms::units::{
-        MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
-        UnsignedMilliDegrees,
+        MicroNewtons, Micrometres, MilliDegrees, NanoNewtonMetres, SignedMicrometres,
+        UnsignedMicroNewtons, UnsignedMilliDegrees, UnsignedNanoNewtonMetres,
     };
 
     fn sample(force: Option<Force>, status: Status) -> Sample {
@@ -301,6 +305,12 @@ mod tests {
         sigma: Micrometres(85),
     };
 
+    const TORQUE: Torque = Torque {
+        z: NanoNewtonMetres(-21_000),
+        sigma: UnsignedNanoNewtonMetres(3_100),
+    };
+
+    /// Without a place it has no torque.
     fn force(place: Option<Place>) -> Force {
         Force {
             alpha: MilliDegrees(-5000),
@@ -310,6 +320,7 @@ mod tests {
             direction_sigma: UnsignedMilliDegrees(480),
             magnitude_sigma: UnsignedMicroNewtons(900),
             place,
+            torque: place.map(|_| TORQUE),
         }
     }
 
@@ -390,11 +401,13 @@ mod tests {
                 r#"{"seq":41,"frame":42,"time_us":1400000,"force":{"alpha_deg":-5.000,"#,
                 r#""beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"#,
                 r#""z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"#,
-                r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085},"#,
+                r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085,"#,
+                r#""torque_z_nm":-0.000021000,"torque_sigma_nm":0.000003100},"#,
                 r#""contacts":[{"alpha_deg":-5.000,"#,
                 r#""beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"#,
                 r#""z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"#,
-                r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085}],"#,
+                r#""place_x_mm":1.250,"place_y_mm":-0.007,"place_sigma_mm":0.085,"#,
+                r#""torque_z_nm":-0.000021000,"torque_sigma_nm":0.000003100}],"#,
                 r#""contact":true,"slip":false,"status":["not_calibrated","contact"]}"#
             )
         );
@@ -413,7 +426,8 @@ mod tests {
         let sample = sample(Some(force(None)), Status::default());
         let line = row(Format::Json, &sample, Some(Some(truth())));
         let end = concat!(
-            r#""place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null},"contacts":[],"#,
+            r#""place_x_mm":null,"place_y_mm":null,"place_sigma_mm":null,"#,
+            r#""torque_z_nm":null,"torque_sigma_nm":null},"contacts":[],"#,
             r#""contact":false,"slip":false,"status":[],"truth":{"alpha_deg":-5.25,"beta_deg":2.5,"magnitude_n":0.1015,"#,
             r#""x_n":-0.01,"y_n":0.004,"z_n":-0.1,"place_x_mm":null,"place_y_mm":null}}"#
         );
@@ -440,7 +454,7 @@ mod tests {
         assert_eq!(json["contacts"][1]["magnitude_n"], 0.02);
         let line = row(Format::Csv, &two, None);
         assert!(
-            line.ends_with(",0.020000,-0.008707,0.004362,-0.099525,0.480,0.000900,,,"),
+            line.ends_with(",0.020000,-0.008707,0.004362,-0.099525,0.480,0.000900,,,,,"),
             "{line}"
         );
     }
@@ -465,25 +479,26 @@ mod tests {
     #[test]
     fn csv_fields_that_are_not_there_are_empty() {
         let contact = "-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,0.480,0.000900";
+        let placed = "1.250,-0.007,0.085,-0.000021000,0.000003100";
         let force_of_all = format!("41,42,1400000,{contact}");
-        let none = ",".repeat(10);
+        let none = ",".repeat(12);
         assert_eq!(
             row(Format::Csv, &with_place(), Some(Some(truth_with_place()))),
             format!(
-                "{force_of_all},1.250,-0.007,0.085,true,false,not_calibrated|contact,\
-                 {contact},1.250,-0.007,0.085,{none},-5.25,2.5,0.1015,-0.01,0.004,-0.1,1.2504,-0.5"
+                "{force_of_all},{placed},true,false,not_calibrated|contact,\
+                 {contact},{placed},{none},-5.25,2.5,0.1015,-0.01,0.004,-0.1,1.2504,-0.5"
             )
         );
         let without_place = sample(Some(force(None)), Status::default());
         assert_eq!(
             row(Format::Csv, &without_place, None),
-            format!("{force_of_all},,,,false,false,,{none},{none}")
+            format!("{force_of_all},,,,,,false,false,,{none},{none}")
         );
         let without = sample(None, Status::MARKERS_MISSING | Status::FRAME_DROPPED);
         assert_eq!(
             row(Format::Csv, &without, Some(Some(truth()))),
             format!(
-                "41,42,1400000,,,,,,,,,,,,,,markers_missing|frame_dropped,{none},{none},\
+                "41,42,1400000,,,,,,,,,,,,,,,,markers_missing|frame_dropped,{none},{none},\
                  -5.25,2.5,0.1015,-0.01,0.004,-0.1,,"
             )
         );

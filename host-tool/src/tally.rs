@@ -441,6 +441,7 @@ mod tests {
             direction_sigma: UnsignedMilliDegrees(0),
             magnitude_sigma: UnsignedMicroNewtons(0),
             place,
+            torque: None,
         };
         let place = |x, y| {
             force(Some(Place {

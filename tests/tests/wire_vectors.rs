@@ -7,14 +7,15 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
-use hivtac_terms::force::{ContactList, Force, Place};
+use hivtac_terms::force::{ContactList, Force, Place, Torque};
 use hivtac_terms::marker::{Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{Creep, Filter, Output, Rezero, TemporalSettings};
 use hivtac_terms::threshold::{HsvBox, Mono, PixelFormat, Threshold, Yuv422};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Px,
-    SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, NanoNewtonMetres,
+    Px, SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    UnsignedNanoNewtonMetres,
 };
 use hivtac_wire::decoder::{Decoder, Received, Rejected};
 use hivtac_wire::failure::{Failure, FailureKind};
@@ -127,6 +128,7 @@ fn sample_of(status: Status, place: Option<Place>, markers: MarkerList) -> Devic
         direction_sigma: UnsignedMilliDegrees(480),
         magnitude_sigma: UnsignedMicroNewtons(900),
         place,
+        torque: None,
     };
     DeviceMessage::Sample(Sample {
         sequence: 41,
@@ -145,6 +147,21 @@ const PLACE: Place = Place {
     sigma: Micrometres(85),
 };
 
+fn sample_with_eight_markers() -> DeviceMessage {
+    let status = Status::NOT_CALIBRATED | Status::CONTACT;
+    let mut message = sample_of(status, Some(PLACE), eight_markers());
+    if let DeviceMessage::Sample(Sample {
+        force: Some(force), ..
+    }) = &mut message
+    {
+        force.torque = Some(Torque {
+            z: NanoNewtonMetres(-21_000),
+            sigma: UnsignedNanoNewtonMetres(3_100),
+        });
+    }
+    message
+}
+
 /// A sample of two contacts; `are_apart` if each is known.
 fn sample_of_two(are_apart: bool) -> DeviceMessage {
     let contact = |size, vector: [i32; 3], sigmas: [u32; 2], [x, y]: [i32; 2], around| Force {
@@ -159,6 +176,7 @@ fn sample_of_two(are_apart: bool) -> DeviceMessage {
             y: SignedMicrometres(y),
             sigma: Micrometres(around),
         }),
+        torque: None,
     };
     let status = Status::NOT_CALIBRATED | Status::CONTACT | Status::TWO_CONTACTS;
     let mut message = sample(status, Some(PLACE));
@@ -490,14 +508,7 @@ fn device_messages() -> BTreeMap<String, DeviceMessage> {
         ("sample-two-contacts", sample_of_two(true)),
         ("sample-sum-of-two", sample_of_two(false)),
         ("sample-with-markers", sample_with_markers()),
-        (
-            "sample-with-eight-markers",
-            sample_of(
-                Status::NOT_CALIBRATED | Status::CONTACT,
-                Some(PLACE),
-                eight_markers(),
-            ),
-        ),
+        ("sample-with-eight-markers", sample_with_eight_markers()),
         ("stats", stats()),
         ("log", log()),
         ("reply-done", reply(7, Outcome::Done)),

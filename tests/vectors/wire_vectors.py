@@ -13,7 +13,7 @@ import re
 import zlib
 
 PROTOCOL = 2
-SCHEMA = 0xB2E554BDE685E40D
+SCHEMA = 0x9BED6DF6848F805D
 SCHEMA_OF_VERSION_1 = 0xE67EC00410F1123B
 
 
@@ -219,13 +219,20 @@ CARTESIAN = [
     signed("z", -99_525),
 ]
 SIGMAS = [unsigned("direction_sigma_mdeg", 480), unsigned("magnitude_sigma_un", 900)]
-PLACE = [
+NO_TORQUE = [raw("torque: None", [0])]
+TORQUE = [
+    raw("torque: Some", [1]),
+    signed("z_nnm", -21_000),
+    unsigned("sigma_nnm", 3_100),
+]
+PLACE_ALONE = [
     raw("place: Some", [1]),
     signed("x_um", 1250),
     signed("y_um", -730),
     unsigned("sigma_um", 85),
 ]
-NO_PLACE = [raw("place: None", [0])]
+PLACE = PLACE_ALONE + NO_TORQUE
+NO_PLACE = [raw("place: None", [0])] + NO_TORQUE
 NO_FORCE = [raw("force: None", [0])]
 NO_CONTACTS = [raw("contacts: 0", [0])]
 NO_MARKERS = [raw("markers: 0", [0])]
@@ -243,6 +250,7 @@ def contact(number, angles, size, vector, sigmas, place):
         signed("x_um", place[0]),
         signed("y_um", place[1]),
         unsigned("sigma_um", place[2]),
+        *NO_TORQUE,
     ]
 
 
@@ -318,7 +326,7 @@ DEVICE = {
     "sample-with-markers": sample(7, 8, 300_000, 0x4000, "model_missing")
     + NO_FORCE + NO_CONTACTS + FOUR,
     "sample-with-eight-markers": sample(41, 42, 1_400_000, 0x12000, "not_calibrated, contact")
-    + ANGLES + CARTESIAN + SIGMAS + PLACE + NO_CONTACTS + EIGHT,
+    + ANGLES + CARTESIAN + SIGMAS + PLACE_ALONE + TORQUE + NO_CONTACTS + EIGHT,
     "stats": [raw("Stats", [2])] + [unsigned(name, value) for name, value in STATS],
     "log": [
         raw("Log", [3]),

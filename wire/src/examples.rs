@@ -12,7 +12,7 @@ use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::down::{Direction, Down};
 use hivtac_terms::fixed::Q;
-use hivtac_terms::force::{ContactList, Force, MOST_CONTACTS, Place};
+use hivtac_terms::force::{ContactList, Force, MOST_CONTACTS, Place, Torque};
 use hivtac_terms::marker::{MOST_MARKERS, Marker, MarkerList};
 use hivtac_terms::status::Status;
 use hivtac_terms::temporal::{
@@ -20,8 +20,9 @@ use hivtac_terms::temporal::{
 };
 use hivtac_terms::threshold::{HsvBox, PixelFormat, Threshold};
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, Permille, Px,
-    SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, Microseconds, MilliDegrees, MilliPx, Milliseconds, NanoNewtonMetres,
+    Permille, Px, SignedMicrometres, Sixteenths, SmallPermille, UnsignedMicroNewtons,
+    UnsignedMilliDegrees, UnsignedNanoNewtonMetres,
 };
 use proptest::prelude::*;
 use serde::de::DeserializeOwned;
@@ -188,6 +189,10 @@ const LONGEST_FORCE: Force = Force {
         x: SignedMicrometres(i32::MIN),
         y: SignedMicrometres(i32::MIN),
         sigma: Micrometres(u32::MAX),
+    }),
+    torque: Some(Torque {
+        z: NanoNewtonMetres(i32::MIN),
+        sigma: UnsignedNanoNewtonMetres(u32::MAX),
     }),
 };
 

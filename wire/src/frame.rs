@@ -13,10 +13,10 @@ pub(crate) const CRC_BYTES: usize = 4;
 
 /// Longest body of a device in this protocol version: all its settings, each number with its
 /// longest encoding.
-pub const MAX_DEVICE_BODY: usize = 467;
+pub const MAX_DEVICE_BODY: usize = 470;
 
 /// Longest body of a sample in this protocol version: one with force, two contacts and markers.
-pub const MAX_SAMPLE_BODY: usize = 437;
+pub const MAX_SAMPLE_BODY: usize = 470;
 
 /// Longest body of a host in this protocol version: a rest position.
 pub const MAX_HOST_BODY: usize = 280;

@@ -74,7 +74,7 @@ mod tests {
     /// vectors.
     #[test]
     fn the_schema_hash_is_that_of_docs_wire_md() {
-        assert_eq!(SCHEMA_HASH, 0xb2e5_54bd_e685_e40d, "{SCHEMA_HASH:#018x}");
+        assert_eq!(SCHEMA_HASH, 0x9bed_6df6_848f_805d, "{SCHEMA_HASH:#018x}");
     }
 
     #[test]

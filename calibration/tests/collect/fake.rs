@@ -270,6 +270,7 @@ pub fn pressed(
             direction_sigma: UnsignedMilliDegrees(10_000),
             magnitude_sigma: UnsignedMicroNewtons(20_000),
             place,
+            torque: None,
         }),
         contacts: ContactList::default(),
         markers: markers(force_n(size_n, [0.0; 2])).into(),

@@ -101,6 +101,7 @@ fn felt(force_n: f64) -> Force {
         direction_sigma: UnsignedMilliDegrees(10_000),
         magnitude_sigma: UnsignedMicroNewtons(20_000),
         place: None,
+        torque: None,
     }
 }
 

@@ -60,7 +60,10 @@ typedef struct hivtac_sample {
     uint8_t contact;             /* 1 if something touches the film, else 0 */
     uint8_t slip;                /* 1 if it slips, else 0 */
     double force_n[3];           /* force on the film, N */
-    double torque_nm[3];         /* its torque about the film's middle, N m; 0 without a place */
+    double torque_nm[3];         /* its torque about the film's middle, N m: of the force at its
+                                    place, and torque_z_nm; what is unknown adds 0 */
+    double torque_z_nm;          /* torque about the film's normal at the place, N m */
+    double torque_sigma_nm;      /* standard uncertainty of that, N m */
     double magnitude_n;          /* size of the force, N */
     double magnitude_sigma_n;    /* standard uncertainty of the size, N */
     double direction_sigma_rad;  /* standard uncertainty of the direction, rad */

@@ -1,6 +1,6 @@
 //! A sample as C reads it.
 
-use hivtac_host::force_fields::{FORCE, place_si, torque_nm};
+use hivtac_host::force_fields::{FORCE, place_si, torque_nm, torque_si};
 use hivtac_host::grip::matrix::covariance;
 use hivtac_host::reader::Arrived;
 use hivtac_terms::force::{Force, MOST_CONTACTS};
@@ -34,6 +34,8 @@ pub struct CSample {
     slip: u8,
     force_n: [f64; 3],
     torque_nm: [f64; 3],
+    torque_z_nm: f64,
+    torque_sigma_nm: f64,
     magnitude_n: f64,
     magnitude_sigma_n: f64,
     direction_sigma_rad: f64,
@@ -63,6 +65,7 @@ impl From<&Arrived> for CSample {
         if let Some(force) = &sample.force {
             numbers.set(force);
             numbers.torque_nm = torque_nm(force, contacts);
+            [numbers.torque_z_nm, numbers.torque_sigma_nm] = torque_si(force);
         }
         numbers.contact_count = contacts.len() as u64;
         for (place, contact) in numbers.contacts.iter_mut().zip(contacts) {
@@ -86,6 +89,8 @@ const UNKNOWN: CSample = CSample {
     slip: 0,
     force_n: [f64::NAN; 3],
     torque_nm: [f64::NAN; 3],
+    torque_z_nm: f64::NAN,
+    torque_sigma_nm: f64::NAN,
     magnitude_n: f64::NAN,
     magnitude_sigma_n: f64::NAN,
     direction_sigma_rad: f64::NAN,

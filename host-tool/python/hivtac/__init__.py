@@ -115,6 +115,10 @@ class Contact:
     """(2,): where it touches, m from the film's middle; `None` if unknown."""
     place_sigma: float | None
     """Standard uncertainty of each coordinate of the place, m."""
+    torque_z: float | None
+    """Torque about the film's normal at the place, N·m; `None` if the frame shows none."""
+    torque_sigma: float | None
+    """Standard uncertainty of that torque, N·m: 95 of 100 are within 1.960 times this."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +156,10 @@ class Sample:
     """(2,): place where the tip touches, m from the film's middle; `None` if unknown."""
     place_sigma: float | None
     """Standard uncertainty of each coordinate of the place, m."""
+    torque_z: float | None
+    """Torque about the film's normal at the place, N·m; `None` if the frame shows none."""
+    torque_sigma: float | None
+    """Standard uncertainty of that torque, N·m: 95 of 100 are within 1.960 times this."""
     contacts: tuple[Contact, ...]
     """Each contact: one, two, or none if nothing touches the film. `force` is their sum, or what
     the settings filter and creep make of it. None, too, if `status` has `two_contacts` and the two
@@ -538,6 +546,7 @@ def _contact(
     direction_sigma: float,
     magnitude_sigma: float,
     place: tuple[list[float], float] | None,
+    torque: tuple[float, float] | None,
 ) -> Contact:
     alpha, beta = angles
     return Contact(
@@ -549,6 +558,8 @@ def _contact(
         magnitude_sigma=magnitude_sigma,
         place=np.array(place[0]) if place else None,
         place_sigma=place[1] if place else None,
+        torque_z=torque[0] if torque else None,
+        torque_sigma=torque[1] if torque else None,
     )
 
 

@@ -1,6 +1,6 @@
 //! Converts a device's messages to tuples and dictionaries in SI units.
 
-use hivtac_host::force_fields::{FORCE, PLACE};
+use hivtac_host::force_fields::{FORCE, PLACE, TORQUE};
 use hivtac_host::shown::{shown, unit_number};
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
@@ -11,8 +11,16 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 /// Force, N; α, β, rad; |F|, N; standard uncertainties of the direction, rad, and of |F|, N; place,
-/// m, and its standard uncertainty, m.
-type ForceNumbers = ([f64; 3], [f64; 2], f64, f64, f64, Option<([f64; 2], f64)>);
+/// m, and its standard uncertainty, m; torque about the normal and its standard uncertainty, N·m.
+type ForceNumbers = (
+    [f64; 3],
+    [f64; 2],
+    f64,
+    f64,
+    f64,
+    Option<([f64; 2], f64)>,
+    Option<(f64, f64)>,
+);
 
 /// Sequence, frame, device time, s, host times of arrival and exposure, s, status bits, names of
 /// these, force, each contact, and column, row and area of each marker, px.
@@ -61,8 +69,9 @@ fn force(force: &Force) -> ForceNumbers {
         let [x, y, sigma] = PLACE.map(|it| it.si(place));
         ([x, y], sigma)
     });
+    let torque = (force.torque.as_ref()).map(|torque| TORQUE.map(|it| it.si(torque)).into());
     let (vector, angles) = ([x, y, z], [alpha, beta]);
-    (vector, angles, size, angle_sigma, size_sigma, place)
+    (vector, angles, size, angle_sigma, size_sigma, place, torque)
 }
 
 /// The device's identity.

@@ -11,6 +11,7 @@ use super::pair::step;
 use super::run::device_id;
 use hivtac_sensor::force::forward::{Forward, Mounting, Pose, Prediction, Stiffness};
 use hivtac_sensor::force::model::{Model, Origin};
+use hivtac_terms::layout::EIGHT_V;
 use hivtac_twin::{
     Camera, Dots, FilmError, Frame, Layout, Load, Pressed, Scene, SceneError, Shutter, units,
 };
@@ -59,7 +60,7 @@ impl Calibrated {
         let forward = model.forward.ok_or(no_film)?;
         let layout = match forward.rest_image.at.len() {
             4 => Layout::default(),
-            _ if forward.rest_image.is_eight_v(NEAR_MM) => {
+            _ if forward.rest_image.is_layout(&EIGHT_V, NEAR_MM) => {
                 "8v".parse().map_err(|error: FilmError| error.to_string())?
             }
             _ => return Err("its dots are those of neither layout 4 nor 8v".to_owned()),

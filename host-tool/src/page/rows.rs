@@ -2,7 +2,7 @@
 
 use super::feed::News;
 use super::lights;
-use crate::force_fields::{FORCE, PLACE};
+use crate::force_fields::{FORCE, PLACE, TORQUE};
 use crate::shown::to_json;
 use hivtac_terms::force::Force;
 use hivtac_wire::message::Sample;
@@ -86,10 +86,23 @@ impl From<&Sample> for Row {
 }
 
 /// Fx, Fy, Fz, |F| and its standard uncertainty; α, β and the direction's standard uncertainty;
-/// then the place or `null`. Integers as in the wire format.
+/// then the place or `null`, and the torque or `null`. Integers as in the wire format.
 fn force_row(force: &Force) -> Value {
     let [alpha, beta, size, x, y, z, angle_sigma, size_sigma] = FORCE.map(|it| it.integer(force));
     let place = force.place.as_ref();
     let place = place.map(|place| PLACE.map(|it| it.integer(place)));
-    json!([x, y, z, size, size_sigma, alpha, beta, angle_sigma, place])
+    let torque = force.torque.as_ref();
+    let torque = torque.map(|torque| TORQUE.map(|it| it.integer(torque)));
+    json!([
+        x,
+        y,
+        z,
+        size,
+        size_sigma,
+        alpha,
+        beta,
+        angle_sigma,
+        place,
+        torque
+    ])
 }

@@ -4,7 +4,7 @@ pub mod channel;
 #[cfg(feature = "zenoh")]
 pub mod type_hash;
 
-use crate::force_fields::{FORCE, place_m, place_si, torque_nm};
+use crate::force_fields::{FORCE, place_m, place_si, torque_nm, torque_si};
 use hivtac_terms::force::Force;
 use hivtac_terms::marker::Marker;
 
@@ -262,8 +262,7 @@ impl Cdr {
     }
 }
 
-/// A [`WRENCH`] of a force, or of the two contacts whose sum it is. Its torque is zero if the place
-/// is unknown.
+/// A [`WRENCH`] of a force, or of the two contacts whose sum it is. Its torque is [`torque_nm`].
 pub fn wrench(stamp_ns: u64, frame: &str, force: &Force, contacts: &[Force]) -> Vec<u8> {
     let force_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     wrench_of(stamp_ns, frame, force_n, torque_nm(force, contacts))
@@ -307,7 +306,7 @@ pub fn polygon(stamp_ns: u64, frame: &str, markers: &[Marker]) -> Vec<u8> {
 }
 
 /// The fields of a contact in [`CONTACTS`].
-const CONTACT_FIELDS: [&str; 10] = [
+const CONTACT_FIELDS: [&str; 12] = [
     "x",
     "y",
     "z",
@@ -318,6 +317,8 @@ const CONTACT_FIELDS: [&str; 10] = [
     "place_sigma",
     "magnitude_sigma",
     "direction_sigma",
+    "torque_z",
+    "torque_sigma",
 ];
 
 /// [`CONTACTS`]. An unknown place is NaN.
@@ -353,7 +354,15 @@ pub fn contacts(stamp_ns: u64, frame: &str, contacts: &[Force]) -> Vec<u8> {
 fn contact_numbers(force: &Force) -> [f32; CONTACT_FIELDS.len()] {
     let [_, _, size, fx, fy, fz, angle_sigma, size_sigma] = FORCE.map(|it| it.si(force));
     let [x, y, sigma] = place_si(force);
-    [x, y, 0.0, fx, fy, fz, size, sigma, size_sigma, angle_sigma].map(|number| number as f32)
+    let [torque, torque_sigma] = torque_si(force);
+    let place = [x, y, 0.0];
+    let sigmas = [sigma, size_sigma, angle_sigma, torque, torque_sigma];
+    let mut numbers = [0.0; CONTACT_FIELDS.len()];
+    let all = place.into_iter().chain([fx, fy, fz, size]).chain(sigmas);
+    for (number, value) in numbers.iter_mut().zip(all) {
+        *number = value as f32;
+    }
+    numbers
 }
 
 /// The frame and the vector of a `geometry_msgs/msg/Vector3Stamped`, from CDR behind its encoding.
@@ -492,14 +501,17 @@ mod tests {
             ..Force::default()
         };
         let both = contacts(0, "film", &[force(50_000), force(20_000)]);
-        let second = [2e-3_f32, 0.0, 0.0, 0.0, 0.0, -0.02, 0.02, 0.0, 0.0, 0.0];
-        let end = [second.map(f32::to_le_bytes).concat(), vec![1]].concat();
+        let place_and_force = [2e-3_f32, 0.0, 0.0, 0.0, 0.0, -0.02, 0.02];
+        let sigmas_and_torque = [0.0, 0.0, 0.0, f32::NAN, f32::NAN];
+        let second = [&place_and_force[..], &sigmas_and_torque].concat();
+        let second = second.into_iter().flat_map(f32::to_le_bytes);
+        let end: Vec<u8> = second.chain([1]).collect();
         assert!(both.ends_with(&end), "{both:?}");
-        let sizes = [40_u32, 80, 80].map(u32::to_le_bytes).concat();
-        let numbers = both.len() - 1 - 80;
+        let sizes = [48_u32, 96, 96].map(u32::to_le_bytes).concat();
+        let numbers = both.len() - 1 - 96;
         assert_eq!(both[numbers - 12..numbers], sizes);
         let none = contacts(0, "film", &[]);
-        assert_eq!(none.len(), both.len() - 80);
+        assert_eq!(none.len(), both.len() - 96);
         let mut unplaced = force(50_000);
         unplaced.place = None;
         assert_eq!(contacts(0, "film", &[unplaced]).last(), Some(&0));

@@ -322,6 +322,7 @@ pub fn sample(sequence: u32, frame: u32) -> DeviceMessage {
                 y: SignedMicrometres(-730),
                 sigma: Micrometres(85),
             }),
+            torque: None,
         }),
         contacts: ContactList::default(),
         markers: MarkerList::default(),

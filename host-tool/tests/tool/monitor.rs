@@ -8,7 +8,7 @@ use hivtac_terms::status::Status;
 use hivtac_wire::message::*;
 use std::io::Write;
 
-const JSON_41: &str = r#"{"seq":41,"frame":42,"time_us":1399986,"force":{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"place_x_mm":1.250,"place_y_mm":-0.730,"place_sigma_mm":0.085},"contacts":[{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"place_x_mm":1.250,"place_y_mm":-0.730,"place_sigma_mm":0.085}],"contact":true,"slip":false,"status":["not_calibrated","contact"]}"#;
+const JSON_41: &str = r#"{"seq":41,"frame":42,"time_us":1399986,"force":{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"place_x_mm":1.250,"place_y_mm":-0.730,"place_sigma_mm":0.085,"torque_z_nm":null,"torque_sigma_nm":null},"contacts":[{"alpha_deg":-5.000,"beta_deg":2.500,"magnitude_n":0.100000,"x_n":-0.008707,"y_n":0.004362,"z_n":-0.099525,"direction_sigma_deg":0.480,"magnitude_sigma_n":0.000900,"place_x_mm":1.250,"place_y_mm":-0.730,"place_sigma_mm":0.085,"torque_z_nm":null,"torque_sigma_nm":null}],"contact":true,"slip":false,"status":["not_calibrated","contact"]}"#;
 
 fn without_force(sequence: u32, frame: u32) -> DeviceMessage {
     DeviceMessage::Sample(Sample {
@@ -64,21 +64,23 @@ fn csv_has_a_header() {
     assert_eq!(
         run.stdout,
         "seq,frame,time_us,alpha_deg,beta_deg,magnitude_n,x_n,y_n,z_n,\
-         direction_sigma_deg,magnitude_sigma_n,place_x_mm,place_y_mm,place_sigma_mm,\
+         direction_sigma_deg,magnitude_sigma_n,place_x_mm,place_y_mm,place_sigma_mm,torque_z_nm,torque_sigma_nm,\
          contact,slip,status,\
          contact1_alpha_deg,contact1_beta_deg,contact1_magnitude_n,\
          contact1_x_n,contact1_y_n,contact1_z_n,\
          contact1_direction_sigma_deg,contact1_magnitude_sigma_n,contact1_place_x_mm,\
          contact1_place_y_mm,contact1_place_sigma_mm,\
+         contact1_torque_z_nm,contact1_torque_sigma_nm,\
          contact2_alpha_deg,contact2_beta_deg,contact2_magnitude_n,\
          contact2_x_n,contact2_y_n,contact2_z_n,\
          contact2_direction_sigma_deg,contact2_magnitude_sigma_n,contact2_place_x_mm,\
-         contact2_place_y_mm,contact2_place_sigma_mm\n\
+         contact2_place_y_mm,contact2_place_sigma_mm,\
+         contact2_torque_z_nm,contact2_torque_sigma_nm\n\
          41,42,1399986,-5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,\
-         0.480,0.000900,1.250,-0.730,0.085,true,false,not_calibrated|contact,\
+         0.480,0.000900,1.250,-0.730,0.085,,,true,false,not_calibrated|contact,\
          -5.000,2.500,0.100000,-0.008707,0.004362,-0.099525,\
-         0.480,0.000900,1.250,-0.730,0.085,,,,,,,,,,,\n\
-         42,43,7,,,,,,,,,,,,,,markers_missing|frame_dropped,,,,,,,,,,,,,,,,,,,,,,\n"
+         0.480,0.000900,1.250,-0.730,0.085,,,,,,,,,,,,,,,\n\
+         42,43,7,,,,,,,,,,,,,,,,markers_missing|frame_dropped,,,,,,,,,,,,,,,,,,,,,,,,,,\n"
     );
     assert_eq!(run.code, Some(0));
 }

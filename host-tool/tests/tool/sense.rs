@@ -273,6 +273,8 @@ fn check_found(found: &Value, measurement: &Measurement) {
             "magnitude_sigma_n": micro(force.magnitude_sigma.0 as i32),
             "place_x_mm": milli(place.x.0), "place_y_mm": milli(place.y.0),
             "place_sigma_mm": f64::from(place.sigma.0) / 1e3,
+            "torque_z_nm": force.torque.map(|torque| f64::from(torque.z.0) / 1e9),
+            "torque_sigma_nm": force.torque.map(|torque| f64::from(torque.sigma.0) / 1e9),
         })
     );
     assert_eq!(found["contact"], true, "{force:?}");

@@ -2,19 +2,21 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
-    Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
-    Sigma, Start, Turned, centre_mm,
+    Arm, Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed,
+    Pose, Sigma, Start, Turned, centre_mm,
 };
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
 use crate::force::rest::Rest;
 use crate::markers::lost::Lost;
 use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::force::Torque;
 use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, NanoNewtonMetres, Px, SignedMicrometres, UnsignedMicroNewtons,
+    UnsignedMilliDegrees, UnsignedNanoNewtonMetres,
 };
 
 /// Where a unit's markers rest, and what follows from that before the first frame.
@@ -232,6 +234,7 @@ impl Resting {
             hanging,
             pressing: (forward.shapes).and_then(|shapes| shapes.pressing(self.shape)),
             wide: (forward.widths).and_then(|widths| widths.pressing(self.shape)),
+            turning: forward.torques.map(|torques| torques.of(self.shape)),
         }
     }
 
@@ -394,7 +397,12 @@ fn force(
         .direction()
         .map(|part| MicroNewtons(rounded(micronewtons * part)));
     let place_mm = centre_mm(pose, &forward.limits);
-    of_vector(cartesian, place_mm, estimate.sigma(&strength))
+    let (force, by_noise) = of_vector(cartesian, place_mm, estimate.sigma(&strength));
+    let torque = estimate.arm().map(|Arm { mm, sigma_mm }| Torque {
+        z: NanoNewtonMetres(rounded(micronewtons * mm)),
+        sigma: UnsignedNanoNewtonMetres(rounded(micronewtons * sigma_mm).max(1).unsigned_abs()),
+    });
+    (Force { torque, ..force }, by_noise)
 }
 
 /// Returns the force of a vector at a place, mm, and the standard uncertainty of |F| by noise.
@@ -423,6 +431,7 @@ pub(super) fn of_vector(
             y,
             sigma: Micrometres(place),
         }),
+        torque: None,
     };
     (force, UnsignedMicroNewtons(by_noise))
 }

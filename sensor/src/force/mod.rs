@@ -147,6 +147,7 @@ pub fn of_outputs(model: &Model<'_>, output: &Output) -> (Force, Status) {
         direction_sigma,
         magnitude_sigma,
         place: place_of(model, output.place, polar.magnitude),
+        torque: None,
     };
     let status = trust(&force, magnitude_sigma, &model.range);
     (force, status)

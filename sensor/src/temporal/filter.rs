@@ -156,6 +156,7 @@ fn late_force(own: &Force, cartesian: [MicroNewtons; 3], place: Option<Place>) -
         direction_sigma: UnsignedMilliDegrees(both(own.direction_sigma.0, turned).min(180_000)),
         magnitude_sigma: UnsignedMicroNewtons(both(own.magnitude_sigma.0, grown)),
         place,
+        torque: own.torque,
     }
 }
 

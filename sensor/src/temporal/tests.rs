@@ -25,6 +25,7 @@ pub fn force_of(vector: [i32; 3]) -> Force {
             y: SignedMicrometres(0),
             sigma: Micrometres(5),
         }),
+        torque: None,
     }
 }
 

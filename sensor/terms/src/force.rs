@@ -3,8 +3,8 @@
 use crate::list::List;
 use crate::status::Status;
 use crate::units::{
-    MicroNewtons, Micrometres, MilliDegrees, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees,
+    MicroNewtons, Micrometres, MilliDegrees, NanoNewtonMetres, SignedMicrometres,
+    UnsignedMicroNewtons, UnsignedMilliDegrees, UnsignedNanoNewtonMetres,
 };
 
 /// A force with its standard uncertainty. Film frame, right-handed: x right and y down in the
@@ -33,6 +33,9 @@ pub struct Force {
     pub magnitude_sigma: UnsignedMicroNewtons,
     /// Where the tip touches the film; `None` if the model has no place outputs.
     pub place: Option<Place>,
+    /// The torque about the film's normal; `None` if the frame does not show one: the contact
+    /// explains the markers without it, or its effect on this layout is unknown.
+    pub torque: Option<Torque>,
 }
 
 /// Most contacts that are told apart.
@@ -74,6 +77,20 @@ pub struct Place {
     /// If the covariance is the same in all directions, 95 of 100 true places are within 2.448
     /// times this distance of the one found.
     pub sigma: Micrometres,
+}
+
+/// A torque about the place, along the film's normal there, as friction under a turning contact
+/// brings it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct Torque {
+    /// Its component along z: positive from x towards y.
+    pub z: NanoNewtonMetres,
+    /// Standard uncertainty of that: 95 of 100 true values are within 1.960 times this.
+    pub sigma: UnsignedNanoNewtonMetres,
 }
 
 #[cfg(test)]

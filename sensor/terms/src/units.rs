@@ -114,6 +114,22 @@ pub struct UnsignedMicroNewtons(pub u32);
 )]
 pub struct UnsignedMilliDegrees(pub u32);
 
+/// A torque, in thousandths of a millionth of a newton metre: µN times mm.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct NanoNewtonMetres(pub i32);
+
+/// A standard uncertainty of a torque, in thousandths of a millionth of a newton metre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(
+    feature = "wire",
+    derive(serde::Serialize, serde::Deserialize, postcard_schema::Schema)
+)]
+pub struct UnsignedNanoNewtonMetres(pub u32);
+
 /// A time, in thousandths of a second.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(

@@ -120,7 +120,7 @@ fn rows_of<'a>(
             }
         }
         if !row.is_empty() {
-            if kind != Kind::Cylinder(12.0) {
+            if kind != Kind::Cylinder(12.0) && kind.arm_mm() == 0.0 {
                 all.extend(&row);
             }
             rows.push(row);

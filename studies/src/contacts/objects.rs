@@ -21,6 +21,9 @@ const BESIDE_MM: f64 = 1.5;
 /// Radii of flat faces, of cylinders and of balls, mm.
 const FACES_MM: [f64; 2] = [1.0, 3.0];
 const CYLINDER_MM: f64 = 0.8;
+/// Largest torque over the force of a needle and of a disc that turn, mm: some friction times two
+/// thirds of the radius.
+const ARMS_MM: [f64; 2] = [0.5, 1.0];
 
 /// A kind of objects.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,10 +42,14 @@ pub enum Kind {
     Cylinder(f64),
     /// A rigid ball of this diameter, mm.
     Ball(f64),
+    /// The model's own tip, which also turns.
+    TurnedNeedle,
+    /// A soft disc that also turns, with a radius in this range, mm.
+    TurnedDisc([f64; 2]),
 }
 
 /// All kinds.
-pub const KINDS: [Kind; 11] = [
+pub const KINDS: [Kind; 13] = [
     Kind::Needle,
     Kind::Disc([0.25, 1.0]),
     Kind::Disc([1.0, 2.5]),
@@ -54,6 +61,8 @@ pub const KINDS: [Kind; 11] = [
     Kind::Cylinder(12.0),
     Kind::Ball(10.0),
     Kind::Ball(40.0),
+    Kind::TurnedNeedle,
+    Kind::TurnedDisc([1.0, 2.5]),
 ];
 
 /// What presses.
@@ -75,6 +84,8 @@ pub struct Press {
     pub state: Equilibrium,
     /// The true force on the film, N, film frame.
     pub force_n: [f64; 3],
+    /// The z component of the true torque along the film's normal, N·mm.
+    pub torque_nmm: f64,
     /// The true centre of pressure, mm: the mean of the points of the mounted film that touch,
     /// weighted by the normal pressure.
     pub centre_mm: [f64; 2],
@@ -96,9 +107,19 @@ pub fn presses(film: &Film, of_each: u32, seed: u64, near_dots: bool) -> Vec<Pre
 }
 
 impl Object {
-    /// The film under it with a force, N, and the centre of the pressure, mm.
-    fn press(self, film: &Film, force_n: [f64; 3]) -> Result<(Equilibrium, [f64; 2])> {
+    /// The film under it with a force, N, and a torque, N·mm, and the centre of the pressure, mm.
+    /// A body does not turn.
+    fn press(
+        self,
+        film: &Film,
+        force_n: [f64; 3],
+        torque_nmm: f64,
+    ) -> Result<(Equilibrium, [f64; 2])> {
         Ok(match self {
+            Object::Patch(patch) if torque_nmm != 0.0 => {
+                let state = film.press_twisted(&patch, force_n, torque_nmm, &film.rest());
+                (state?, patch.centre_mm())
+            }
             Object::Patch(patch) => {
                 let state = film.press_patch(&patch, force_n, &film.rest());
                 (state?, patch.centre_mm())
@@ -122,6 +143,13 @@ impl Kind {
             Kind::Pad => "finger's pad, 4 × 2.5 mm".into(),
             Kind::Cylinder(length) => format!("cylinder of {length} mm"),
             Kind::Ball(diameter) => format!("ball of {diameter} mm"),
+            Kind::TurnedNeedle => format!("needle that turns, to {} N·mm/N", ARMS_MM[0]),
+            Kind::TurnedDisc([from, to]) => {
+                format!(
+                    "soft disc, {from} to {to} mm, that turns, to {} N·mm/N",
+                    ARMS_MM[1]
+                )
+            }
         }
     }
 
@@ -147,16 +175,28 @@ impl Kind {
         };
         let load = Load::from_angles(force_n, alpha_deg, beta_deg)?;
         let (name, object, shape) = self.object(place_mm, &mut random)?;
+        let arm_mm = self.arm_mm();
+        let torque_nmm = force_n * random.random_range(-arm_mm..=arm_mm);
         let [x, y] = place_mm;
-        let (state, centre_mm) = (object.press(film, load.vector_n()))
+        let (state, centre_mm) = (object.press(film, load.vector_n(), torque_nmm))
             .with_context(|| format!("{name} at ({x:.2}, {y:.2}) mm, {:.0} mN", 1e3 * force_n))?;
         Ok(Press {
             kind: self,
             shape,
             state,
             force_n: load.vector_n(),
+            torque_nmm,
             centre_mm,
         })
+    }
+
+    /// The largest torque of a kind over its force, mm.
+    pub fn arm_mm(self) -> f64 {
+        match self {
+            Kind::TurnedNeedle => ARMS_MM[0],
+            Kind::TurnedDisc(_) => ARMS_MM[1],
+            _ => 0.0,
+        }
     }
 
     /// Draws an object over a point of the film, mm.
@@ -174,11 +214,11 @@ impl Kind {
         let micrometres = |mm: f64| Micrometres((1e3 * mm).round() as u32);
         let flat = |radius_mm| Some(ContactShape::Flat(micrometres(radius_mm)));
         Ok(match self {
-            Kind::Needle => {
+            Kind::Needle | Kind::TurnedNeedle => {
                 let tip = Object::Patch(Patch::tip(place_mm, NOMINAL_RADIUS_MM)?);
                 ("needle".into(), tip, Some(ContactShape::Needle))
             }
-            Kind::Disc(range) => {
+            Kind::Disc(range) | Kind::TurnedDisc(range) => {
                 let radius = between(range);
                 let name = format!("soft disc of {radius:.2} mm");
                 let disc = Object::Patch(Patch::disc(place_mm, radius)?);

@@ -13,6 +13,9 @@ use serde::Serialize;
 use super::objects::Press;
 use crate::press::{Judged, judged};
 
+/// The stated 95 % of a torque, in standard uncertainties.
+const TORQUE_BOUND: f64 = 1.960;
+
 /// What the sensor made of the frames of a kind of presses.
 #[derive(Debug, Default, Serialize)]
 pub struct Row {
@@ -33,6 +36,9 @@ pub struct Row {
     stronger: f64,
     /// Frames with errors within their stated 95 % bounds, of the same three.
     within: [u32; 3],
+    /// Errors of the torque about z, N·mm, of forces that have one, and how many are within their
+    /// stated 95 %.
+    torque: (Vec<f64>, u32),
 }
 
 impl Row {
@@ -70,6 +76,12 @@ impl Row {
         self.of_three += u32::from(status.contains(Status::MARKER_LOST));
         self.loosely += u32::from(status.contains(Status::LOOSELY_EXPLAINED));
         let size_mn = 1e3 * norm(press.force_n);
+        if let Some(torque) = &force.torque {
+            let error = (f64::from(torque.z.0) * 1e-6 - press.torque_nmm).abs();
+            let bound = TORQUE_BOUND * f64::from(torque.sigma.0) * 1e-6;
+            self.torque.0.push(error);
+            self.torque.1 += u32::from(error <= bound);
+        }
         let Judged { errors, bounds } = judged(force, press.force_n, press.centre_mm)?;
         self.stronger += errors[1] / size_mn;
         // |F| in parts of the true size, places in mm.
@@ -92,6 +104,8 @@ impl Row {
             *self.refused.entry(reason.clone()).or_default() += count;
         }
         self.stronger += other.stronger;
+        self.torque.0.extend(&other.torque.0);
+        self.torque.1 += other.torque.1;
         for k in 0..3 {
             self.errors[k].extend(&other.errors[k]);
             self.within[k] += other.within[k];
@@ -122,7 +136,7 @@ impl Row {
             self.reasons()
         );
         if forces == 0.0 {
-            return format!("{before} – | – | – | – |\n");
+            return format!("{before} – | – | – | – | – |\n");
         }
         let parts = self.errors.each_ref().map(|errors| {
             let mut sorted = errors.clone();
@@ -133,10 +147,27 @@ impl Row {
         let [a, b, c] = self.within.map(|within| 100.0 * f64::from(within) / forces);
         format!(
             "{before} {angle:.2}° [{most_angle:.1}] | {:.1} % [{:.1}], {:+.1} % | {place:.3} mm \
-             [{most_place:.2}] | {a:.0}, {b:.0}, {c:.0} % |\n",
+             [{most_place:.2}] | {a:.0}, {b:.0}, {c:.0} % | {} |\n",
             100.0 * size,
             100.0 * most_size,
-            100.0 * self.stronger / forces
+            100.0 * self.stronger / forces,
+            self.torques()
+        )
+    }
+
+    /// The torque's column: frames that have one, in parts of those with a force; its error; how
+    /// many are within the stated 95 %.
+    fn torques(&self) -> String {
+        let (errors, within) = &self.torque;
+        if errors.is_empty() {
+            return "–".into();
+        }
+        let count = errors.len() as f64;
+        let rms = (errors.iter().map(|error| error * error).sum::<f64>() / count).sqrt();
+        format!(
+            "{:.0} %, {rms:.4} N·mm, {:.0} %",
+            100.0 * count / self.errors[0].len() as f64,
+            100.0 * f64::from(*within) / count
         )
     }
 }
@@ -146,7 +177,8 @@ pub fn table(rows: &[Row]) -> String {
     let mut text = String::from(
         "| what presses | `contact` | presses | forces | loosely | of three markers | refused \
          | direction, median [95 %] | \\|F\\|, median [95 %], mean | place, median [95 %] | within the stated 95 %: \
-         direction, \\|F\\|, place |\n|---|---|--:|--:|--:|--:|---|--:|--:|--:|--:|\n",
+         direction, \\|F\\|, place | torque: frames, rms, within the stated 95 % \
+         |\n|---|---|--:|--:|--:|--:|---|--:|--:|--:|--:|--:|\n",
     );
     text.extend(rows.iter().map(Row::line));
     text
@@ -165,7 +197,7 @@ mod tests {
             ..Row::new("pad".into(), "needle")
         };
         let line = "| pad | needle | 2 | 0 % | 0 % | 0 % | 25.0 % `markers_missing`, 75.0 % \
-                    `unexplained` | – | – | – | – |\n";
+                    `unexplained` | – | – | – | – | – |\n";
         assert_eq!(row.line(), line);
         assert_eq!(table(&[row]).lines().count(), 3);
     }

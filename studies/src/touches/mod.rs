@@ -17,6 +17,7 @@ use hivtac_sensor::force::forward::{
 };
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::lost::Lost;
+use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::list::List;
 use hivtac_twin::film::Layout;
 use rayon::prelude::*;
@@ -162,6 +163,7 @@ impl Bench<'_> {
             hanging: None,
             pressing: None,
             wide: None,
+            turning: (self.forward.torques).map(|torques| torques.of(ContactShape::Needle)),
         };
         let one = self.one(&observed, Start::Anywhere);
         let unknown = self.forward.unknown(true);

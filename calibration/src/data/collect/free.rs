@@ -213,6 +213,7 @@ mod tests {
             direction_sigma: UnsignedMilliDegrees(10_000),
             magnitude_sigma: UnsignedMicroNewtons(20_000),
             place,
+            torque: None,
         };
         Sample {
             sequence: 0,

@@ -1,15 +1,16 @@
 // Samples as the page reads them.
 
 /**
- * Converts a sample of the stream to named values in mN, degrees and mm. `parts` has the two
- * contacts that the force is the sum of, if they are told apart.
+ * Converts a sample of the stream to named values in mN, degrees, mm and mN·mm. `parts` has the
+ * two contacts that the force is the sum of, if they are told apart.
  */
 export function named([sequence, frame, timeUs, status, row, parts = []]) {
   const force = row && namedForce(row);
   return { sequence, frame, seconds: timeUs / 1e6, status, force, parts: parts.map(namedForce) };
 }
 
-function namedForce([x, y, z, magnitude, magnitudeSigma, alpha, beta, directionSigma, place]) {
+function namedForce(row) {
+  const [x, y, z, magnitude, magnitudeSigma, alpha, beta, directionSigma, place, torque] = row;
   return {
     vector: [x / 1e3, y / 1e3, z / 1e3],
     magnitude: magnitude / 1e3,
@@ -18,5 +19,6 @@ function namedForce([x, y, z, magnitude, magnitudeSigma, alpha, beta, directionS
     beta: beta / 1e3,
     directionSigma: directionSigma / 1e3,
     place: place && { x: place[0] / 1e3, y: place[1] / 1e3, sigma: place[2] / 1e3 },
+    torque: torque && { z: torque[0] / 1e3, sigma: torque[1] / 1e3 },
   };
 }

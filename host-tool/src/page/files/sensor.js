@@ -195,6 +195,7 @@ export class SensorView {
     show("beta", force?.beta, angle, 2);
     show("place-x", force?.place?.x, force?.place?.sigma, 3);
     show("place-y", force?.place?.y, force?.place?.sigma, 3);
+    show("torque", force?.torque?.z, force?.torque?.sigma, 1);
     const has = (bit) => this.newest !== null && (this.newest.status & bit) !== 0;
     const touches = has(SLIP) ? "slips" : has(TWO_CONTACTS) ? "two" : has(CONTACT) ? "yes" : "no";
     this.say("contact", force ? touches : "–");

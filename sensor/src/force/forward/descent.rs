@@ -8,6 +8,7 @@ use super::pose::{Pose, limited};
 use super::predict::Prediction;
 use super::residual;
 use super::solve::{Column, PRIOR, Rows, Solved, UNKNOWNS, Unknowns, solve, square};
+use super::torsion::{Arm, Turning};
 use super::widths::{self, Wide};
 use crate::force::kernels::sqrt;
 
@@ -54,6 +55,8 @@ struct Markers<'a> {
     observed: &'a Observed<'a>,
     mounting: &'a Mounting,
     unknown: Unknown<'a>,
+    /// The torque of what presses, if that counts.
+    turning: Option<&'a Turning<'a>>,
 }
 
 /// The storage of a descent. It is large, and therefore changed in place.
@@ -69,6 +72,8 @@ struct Point {
     prediction: Prediction,
     /// The part of the markers' motion that the load does not explain, focal lengths.
     left: Column,
+    /// The motion by a torque, if that counts.
+    by_arm: Column,
 }
 
 /// How a path bends.
@@ -86,6 +91,8 @@ struct White {
     /// That square, plus the square of the distance from the prior.
     square: f32,
     solved: Option<Solved>,
+    /// The arm of the torque, if that counts.
+    arm: Option<Arm>,
 }
 
 impl Storage {
@@ -95,6 +102,7 @@ impl Storage {
             pose: Pose::default(),
             prediction: Prediction::zeros(0),
             left: Column::default(),
+            by_arm: Column::default(),
         };
         Storage {
             points: [point(), point()],
@@ -109,7 +117,7 @@ impl<'a> Descent<'a> {
         forward: &'a Forward<'a>,
         observed: &'a Observed<'a>,
         mounting: &'a Mounting,
-        unknown: Unknown<'a>,
+        (unknown, turning): (Unknown<'a>, Option<&'a Turning<'a>>),
         guess: Pose,
         storage: &'a mut Storage,
     ) -> Self {
@@ -119,6 +127,7 @@ impl<'a> Descent<'a> {
             observed,
             mounting,
             unknown,
+            turning,
         };
         here.put(forward, &markers, within(forward, guess));
         let mut descent = Self {
@@ -174,7 +183,8 @@ impl<'a> Descent<'a> {
         } = self;
         let put = |covariance: &mut Covariance| here.put_covariance(forward, markers, covariance);
         let wide = markers.observed.wide.as_ref();
-        self.white = (self.whitening.set(put)).map(|()| here.white(self.whitening, wide));
+        let turning = markers.turning;
+        self.white = (self.whitening.set(put)).map(|()| here.white(self.whitening, wide, turning));
     }
 
     /// The solution, if the markers determine one.
@@ -225,6 +235,7 @@ impl<'a> Descent<'a> {
             unexplained: white.map_or(f32::INFINITY, |white| white.unexplained),
             left: self.here.by_noise(self.markers.observed, self.whitening),
             solved: white.and_then(|white| white.solved),
+            arm: white.and_then(|white| white.arm),
             coordinates: self.markers.observed.coordinates(),
             looks: self.looks,
         }
@@ -313,11 +324,17 @@ impl Point {
     #[inline(never)]
     fn put(&mut self, forward: &Forward<'_>, markers: &Markers<'_>, pose: Pose) {
         let Markers {
-            observed, mounting, ..
+            observed,
+            mounting,
+            turning,
+            ..
         } = markers;
         let limits = &forward.limits;
         let Point {
-            prediction, left, ..
+            prediction,
+            left,
+            by_arm,
+            ..
         } = self;
         (forward.tables).put(&pose, limits, &mounting.beside_mm, prediction);
         if let Some(hanging) = observed.hanging {
@@ -328,6 +345,9 @@ impl Point {
         }
         if let Some(wide) = &observed.wide {
             wide.add_to(&pose, limits, prediction);
+        }
+        if let Some(turning) = turning {
+            *by_arm = turning.motion(&pose, limits);
         }
         left.reset(observed.moved.len(), 0.0);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());
@@ -349,6 +369,7 @@ impl Point {
             observed,
             mounting,
             unknown,
+            turning,
         } = markers;
         let (pose, limits) = (&self.pose, &forward.limits);
         unknown.put(pose, limits, &self.prediction.moved, covariance);
@@ -362,18 +383,33 @@ impl Point {
         if let Some(wide) = &observed.wide {
             wide.add_uncertainty(pose, limits, &self.prediction.moved, covariance);
         }
+        if let Some(turning) = turning {
+            turning.add_to(&self.by_arm, covariance);
+        }
     }
 
     /// Not inlined, so that its stack is released on return.
     #[inline(never)]
-    fn white(&self, whitening: &Whitening, wide: Option<&Wide<'_>>) -> White {
+    fn white(
+        &self,
+        whitening: &Whitening,
+        wide: Option<&Wide<'_>>,
+        turning: Option<&Turning<'_>>,
+    ) -> White {
         let at = (&self.left, &self.pose);
         let mut equations = Equations::new(whitening, &self.prediction, at, wide);
         let markers = equations.side.get(..self.left.len());
+        let (unexplained, whole) = (square(markers.unwrap_or_default()), square(&equations.side));
+        let solved = equations.solve();
+        let known = turning.filter(|_| solved.is_some());
         White {
-            unexplained: square(markers.unwrap_or_default()),
-            square: square(&equations.side),
-            solved: equations.solve(),
+            unexplained,
+            square: whole,
+            solved,
+            arm: known.map(|turning| {
+                let units = (&equations.columns, equations.width.as_ref());
+                turning.arm((&self.by_arm, whitening), units, &equations.side)
+            }),
         }
     }
 

@@ -9,6 +9,7 @@ use super::predict::Markers;
 use super::residual;
 use super::shapes::Pressing;
 use super::solve::{Column, MOST_DOTS, Solved};
+use super::torsion::{Arm, Turning};
 use super::weight::Hanging;
 use super::widths::Wide;
 use super::{Forward, Strength};
@@ -57,6 +58,8 @@ pub struct Observed<'a> {
     pub pressing: Option<Pressing<'a>>,
     /// What presses, if its width is an unknown; otherwise `None`.
     pub wide: Option<Wide<'a>>,
+    /// The torque of what presses; `None` if it is none, or its effect is unknown.
+    pub turning: Option<Turning<'a>>,
 }
 
 impl Observed<'_> {
@@ -112,6 +115,8 @@ pub struct Estimate {
     /// The solution of the markers' equations at this load; `None` if they do not determine all
     /// unknowns.
     pub solved: Option<Solved>,
+    /// The torque over |F|, if it counted; otherwise `None`.
+    pub(super) arm: Option<Arm>,
     /// Number of coordinates that were seen.
     pub coordinates: usize,
     /// How often the film was run forwards: once at the start, and once for each step.
@@ -119,12 +124,7 @@ pub struct Estimate {
 }
 
 impl Forward<'_> {
-    /// Takes steps from a guess, or without one from where the markers moved most. If they get
-    /// stuck, or end at a load that does not explain the markers, also takes steps from where the
-    /// markers moved most, or from the nearest of a few presses, unless the start forbids it.
-    /// These succeed where the first steps began badly. Returns the better load. Compiled once,
-    /// because the near memory is scarce.
-    #[inline(never)]
+    /// As [`Self::estimate_with`]. Where no load explains the markers, a torque may.
     pub fn estimate(
         &self,
         observed: &Observed<'_>,
@@ -132,12 +132,39 @@ impl Forward<'_> {
         unknown: Unknown<'_>,
         start: Start,
     ) -> Estimate {
+        let turning = observed.turning.as_ref();
+        let (resort, always) = match turning {
+            Some(turning) if turning.is_last_resort => (Some(turning), None),
+            always => (None, always),
+        };
+        let found = self.estimate_with(observed, mounting, (unknown, always), start);
+        if resort.is_none() || found.is_explained() {
+            return found;
+        }
+        let start = Start::At(found.pose);
+        let turned = self.estimate_with(observed, mounting, (unknown, resort), start);
+        let looks = found.looks + turned.looks;
+        let better = if turned.is_explained() { turned } else { found };
+        Estimate { looks, ..better }
+    }
+
+    /// Takes steps from a guess, or without one from where the markers moved most. If they get
+    /// stuck, or end at a load that does not explain the markers, also takes steps from where the
+    /// markers moved most, or from the nearest of a few presses, unless the start forbids it.
+    /// These succeed where the first steps began badly. Returns the better load. Compiled once,
+    /// because the near memory is scarce.
+    #[inline(never)]
+    fn estimate_with(
+        &self,
+        observed: &Observed<'_>,
+        mounting: &Mounting,
+        by: (Unknown<'_>, Option<&Turning<'_>>),
+        start: Start,
+    ) -> Estimate {
         let mut storage = Storage::new();
         let mut descend = |guess| {
             let storage = &mut storage;
-            self.descend(Descent::new(
-                self, observed, mounting, unknown, guess, storage,
-            ))
+            self.descend(Descent::new(self, observed, mounting, by, guess, storage))
         };
         let where_most = |size| Pose {
             size,
@@ -213,6 +240,15 @@ impl Estimate {
     fn noisier(&self) -> f32 {
         let usual = residual::usual(self.coordinates);
         libm::sqrtf(1.0 + (self.unexplained - usual).max(0.0) / usual)
+    }
+
+    /// Returns the torque over |F|; its uncertainty is widened if the residual is larger than
+    /// usual. `None` if no torque counted.
+    pub fn arm(&self) -> Option<Arm> {
+        self.arm.map(|arm| Arm {
+            sigma_mm: self.noisier() * arm.sigma_mm,
+            ..arm
+        })
     }
 
     /// Returns the standard uncertainties; `None` if the markers do not determine all unknowns.
@@ -303,6 +339,7 @@ mod tests {
                 spread,
                 width: OfWidth::KNOWN,
             }),
+            arm: None,
             looks: 1,
         }
     }

@@ -22,7 +22,9 @@
 //! | `covariance` | what is unknown of the unit, in addition to the noise |
 //! | `weight` | the effect of the film's own weight |
 //! | `shapes` | the effect of the shape of what presses, of four markers |
+//! | `motions` | tables of the images' motion by the place that is pressed |
 //! | `widths` | the effect of how wide the contact is, which more markers tell |
+//! | `torsion` | the effect of a torque about the film's normal |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 //! | `three` | the same while a marker is lost |
 //! | `pair` | two contacts, where one does not explain the markers |
@@ -34,6 +36,7 @@ mod covariance;
 mod descent;
 mod drift;
 mod estimate;
+mod motions;
 mod mounting;
 pub mod pair;
 mod pose;
@@ -44,6 +47,7 @@ mod solve;
 mod table;
 mod terms;
 mod three;
+mod torsion;
 pub mod weight;
 mod widths;
 
@@ -64,6 +68,7 @@ pub use table::{Answer, OUTPUTS, Place, Table};
 #[cfg(any(test, feature = "encode"))]
 pub use terms::{EVEN, ODD};
 pub use terms::{Limits, MOST_TILTS, Powers, Sizes, Terms, Tilts};
+pub use torsion::{Arm, Torques, Turning};
 pub use weight::{Gravity, Hanging, Turned, Weight};
 pub use widths::{OF_FACE, PER_WIDTH_MM, TIP_MM, Wide, Widths, centre_mm};
 
@@ -103,6 +108,8 @@ pub struct Forward<'a> {
     pub shapes: Option<Shapes<'a>>,
     /// The effect of how wide the contact is; `None` if it is unknown.
     pub widths: Option<Widths<'a>>,
+    /// The effect of a torque about the normal; `None` if it is unknown.
+    pub torques: Option<Torques<'a>>,
 }
 
 /// What is known of units other than the one that a model was made on.

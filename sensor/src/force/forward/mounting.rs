@@ -4,7 +4,6 @@ use super::predict::Markers;
 use super::solve::{Column, square};
 use crate::force::kernels::sqrt;
 use crate::force::rest::{NEAR, Rest};
-use hivtac_terms::layout::EIGHT_V;
 use hivtac_terms::list::List;
 use hivtac_terms::units::SignedMicrometres;
 
@@ -46,16 +45,15 @@ impl RestImage {
         }
     }
 
-    /// Whether each marker is within this distance, mm, of the one with its identity in the layout
-    /// `8v`.
-    pub fn is_eight_v(&self, near_mm: f32) -> bool {
+    /// Whether each marker is within this distance, mm, of the one with its identity in a layout.
+    pub fn is_layout(&self, layout: &[[SignedMicrometres; 2]], near_mm: f32) -> bool {
         let is_near = |(number, place): (usize, &[SignedMicrometres; 2])| {
             let place_mm = place.map(|part| 1e-3 * part.0 as f32);
             let mut squares = self.squared_distances_mm(place_mm);
             let square = squares.nth(number);
             square.is_some_and(|square| square < near_mm * near_mm)
         };
-        self.at.len() == EIGHT_V.len() && EIGHT_V.iter().enumerate().all(is_near)
+        self.at.len() == layout.len() && layout.iter().enumerate().all(is_near)
     }
 
     /// Where on the film the markers moved most, mm: the mean of their places, weighted by the

@@ -53,6 +53,8 @@ impl Forward<'_> {
     ) -> (Estimate, [f32; 2]) {
         observed.lost = Lost::only(lost);
         observed.lost.clear(&mut observed.moved);
+        // It would explain the only redundant coordinate.
+        observed.turning = None;
         let guess = self.nearest_press(&observed, &mounting.beside_mm);
         let estimate = self.estimate(&observed, mounting, unknown, Start::Near(guess));
         let moved = self.moved(&estimate.pose, &mounting.beside_mm);

@@ -2,38 +2,28 @@
 //! force at the same centre of pressure. Its width is an unknown of the equations.
 //!
 //! Enough markers tell how wide a contact is. A soft disc's radius is the measure: a rigid face of
-//! 0.6 times that radius moves the images alike. A table holds the motions at knots of the place:
-//! polynomials in size and width, and, as standard deviations, what a contact that is longer than
-//! wide, leans, or presses with its rim moves in addition. Film and markers are symmetric, so that
-//! places along +x and +y tell all others.
+//! 0.6 times that radius moves the images alike. A [table](super::motions) holds the motions by
+//! size and width, and, as standard deviations, what a contact that is longer than wide, leans, or
+//! presses with its rim moves in addition.
 
 use super::Column;
-use super::covariance::{Covariance, add_square, between};
+use super::covariance::{Covariance, add_square};
+use super::motions::{MOST_GROUPS, Mirror, Motions, Powers};
 use super::mounting::RestImage;
 use super::pose::{Pose, limited};
 use super::predict::Prediction;
 use super::solve::{Rows, Solved, UNKNOWNS, Unknowns, dot, norm, take};
 use super::terms::Limits;
 use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::layout::EIGHT_V;
 
 /// Groups of columns: the motion by the width; then by contacts that are longer than wide, along x
 /// and between x and y, that lean towards x and y, and whose middle bears more than the rim.
-pub const GROUPS: usize = 6;
+const GROUPS: usize = MOST_GROUPS;
 /// Columns of the motion by the width are the first group.
 const OF_WIDTH: usize = 0;
 /// The last group.
 const OF_RIM: usize = GROUPS - 1;
-/// Most columns of a table.
-const MOST_COLUMNS: usize = 32;
-/// Largest power of size and width.
-const MOST_POWER: usize = 4;
-/// Largest step of the motions, focal lengths.
-const LARGEST_STEP: f32 = 1e-3;
-/// Bytes before the columns, and of a column.
-const HEAD: usize = 8;
-const COLUMN: usize = 8;
-/// Allowed number of knots along an axis.
-const KNOTS: core::ops::RangeInclusive<u8> = 2..=32;
 /// The radius, mm, of the soft disc that is as wide as the tables' tip: width 0. At width 1 it is
 /// larger by `PER_WIDTH_MM`.
 pub const TIP_MM: f32 = 0.42;
@@ -74,23 +64,14 @@ const NEAR_MM: f32 = 1.0;
 /// `calibration/` writes it.
 const OF_EIGHT_V: &[u8] = include_bytes!("../../../data/contact-widths-8v.bin");
 
-/// The motions at knots of the place, borrowed from a table: the number of knots along an axis, of
-/// coordinates and of columns, a zero, and the largest place, mm (f32). For each column its group,
-/// its powers of size and width, a zero, and its step (f32). For each knot, in lines of places from
-/// 0 to the largest, for each column, entries of i16 by coordinate.
+/// The motions by the width.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Widths<'a> {
-    knots: usize,
-    coordinates: usize,
-    end_mm: f32,
-    columns: &'a [[u8; COLUMN]],
-    entries: &'a [[u8; 2]],
-}
+pub struct Widths<'a>(Motions<'a>);
 
 /// A contact whose width is an unknown, as the steps use it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wide<'a> {
-    widths: Widths<'a>,
+    widths: Motions<'a>,
     /// The likely width, and its standard deviation.
     likely: [f32; 2],
     /// The part of the group of contacts that press with their rim, and all standard deviations.
@@ -98,84 +79,15 @@ pub struct Wide<'a> {
     sigmas: [f32; GROUPS],
 }
 
-/// A column of the table.
-#[derive(Clone, Copy)]
-struct Term {
-    group: usize,
-    of_size: usize,
-    of_width: usize,
-    step: f32,
-}
-
-impl Term {
-    fn of([group, of_size, of_width, _, a, b, c, d]: [u8; COLUMN]) -> Term {
-        Term {
-            group: group.into(),
-            of_size: of_size.into(),
-            of_width: of_width.into(),
-            step: f32::from_le_bytes([a, b, c, d]),
-        }
-    }
-
-    fn is_sound(&self) -> bool {
-        self.group < GROUPS
-            && (1..=MOST_POWER).contains(&self.of_size)
-            && (1..=MOST_POWER).contains(&self.of_width)
-            && (0.0..=LARGEST_STEP).contains(&self.step)
-    }
-}
-
-/// A variable's powers from 0 on, and their slopes.
-struct Powers([[f32; 2]; MOST_POWER + 1]);
-
-impl Powers {
-    fn of(value: f32) -> Powers {
-        let mut powers = [[1.0, 0.0]; MOST_POWER + 1];
-        for k in 1..=MOST_POWER {
-            let [before, _] = powers[k - 1];
-            powers[k] = [before * value, k as f32 * before];
-        }
-        Powers(powers)
-    }
-
-    fn at(&self, power: usize) -> [f32; 2] {
-        self.0.get(power).copied().unwrap_or_default()
-    }
-}
-
 impl<'a> Widths<'a> {
     /// That of the nominal film, which stands for all films with its markers; `None` if there is
     /// none for these.
     pub fn nominal(rest_image: &RestImage) -> Option<Widths<'static>> {
-        Widths::new(OF_EIGHT_V).filter(|_| rest_image.is_eight_v(NEAR_MM))
-    }
-
-    /// Takes a table; `None` if a number is out of its range.
-    pub fn new(bytes: &'a [u8]) -> Option<Widths<'a>> {
-        let ([knots, coordinates, columns, _, end @ ..], rest) =
-            bytes.split_first_chunk::<HEAD>()?;
-        let end_mm = f32::from_le_bytes(*end);
-        let (heads, rest) = rest.split_at_checked(COLUMN * usize::from(*columns))?;
-        let (entries, odd) = rest.as_chunks();
-        let widths = Widths {
-            knots: usize::from(*knots),
-            coordinates: usize::from(*coordinates),
-            end_mm,
-            columns: heads.as_chunks().0,
-            entries,
-        };
-        let count = widths.knots * widths.knots * widths.columns.len() * widths.coordinates;
-        let sound = odd.is_empty()
-            && KNOTS.contains(knots)
-            && widths.columns.len() <= MOST_COLUMNS
-            && (0.1..=100.0).contains(&end_mm)
-            && widths.terms().all(|term| term.is_sound())
-            && entries.len() == count;
-        sound.then_some(widths)
-    }
-
-    fn terms(&self) -> impl Iterator<Item = Term> + use<'a> {
-        self.columns.iter().map(|column| Term::of(*column))
+        rest_image
+            .is_layout(&EIGHT_V, NEAR_MM)
+            .then(|| Motions::new(OF_EIGHT_V))
+            .flatten()
+            .map(Widths)
     }
 
     /// Returns what is known of a shape; `None` for the tables' tip.
@@ -190,38 +102,11 @@ impl<'a> Widths<'a> {
             ContactShape::Flat(_) => (set(of_disc(OF_FACE * radius_mm), SET_FACE), -1.0, FACE),
         };
         Some(Wide {
-            widths: *self,
+            widths: self.0,
             likely,
             of_rim,
             sigmas,
         })
-    }
-
-    /// The four knots around a place along +x and +y: where their entries begin, their weights, and
-    /// how these change along x and y, 1/mm.
-    fn corners(&self, place_mm: [f32; 2]) -> [(usize, [f32; 3]); 4] {
-        let last = self.knots.saturating_sub(1).max(1);
-        let per_mm = last as f32 / self.end_mm;
-        let [x, y] = place_mm.map(|part| {
-            let inside = (0.0..self.end_mm).contains(&part);
-            let slope = if inside { per_mm } else { 0.0 };
-            let [(first, a), (second, b)] = between(part / self.end_mm, last + 1);
-            [(first, a, -slope), (second, b, slope)]
-        });
-        let corner = |i: usize, j: usize| {
-            let ((line, of_y, slope_y), (place, of_x, slope_x)) = (y[i], x[j]);
-            let begins = (line * self.knots + place) * self.columns.len() * self.coordinates;
-            (begins, [of_y * of_x, of_y * slope_x, slope_y * of_x])
-        };
-        [corner(0, 0), corner(0, 1), corner(1, 0), corner(1, 1)]
-    }
-
-    /// The entries of a column at a knot that begins there.
-    fn column(&self, begins: usize, number: usize) -> impl Iterator<Item = f32> {
-        let from = begins + number * self.coordinates;
-        let entries = self.entries.get(from..from + self.coordinates);
-        let entries = entries.unwrap_or_default().iter();
-        entries.map(|bytes| f32::from(i16::from_le_bytes(*bytes)))
     }
 }
 
@@ -274,7 +159,7 @@ impl Wide<'_> {
             if part == 0.0 {
                 continue;
             }
-            let ([s, ds], [w, dw]) = (sizes.at(term.of_size), powers.at(term.of_width));
+            let ([s, ds], [w, dw]) = (sizes.at(term.of_size), powers.at(term.of_second));
             let [value, by_size, by_width] =
                 [s * w, ds * w / limits.size, s * dw].map(|f| part * f);
             for (begins, [weight, along_x, along_y]) in corners {
@@ -321,38 +206,16 @@ impl Wide<'_> {
         moved: &Column,
         covariance: &mut Covariance,
     ) {
-        let mirror = Mirror::of(pose.place_mm);
+        let of_group = |group| self.widths.of_group(group, (pose, limits), pose.width);
         for (group, sigma) in self.sigmas.into_iter().enumerate() {
             if group != OF_WIDTH {
-                let moved = mirror.column(&self.group(pose, limits, group));
-                add_square(covariance, &moved, sigma);
+                add_square(covariance, &of_group(group), sigma);
             }
         }
-        let of_width = mirror.column(&self.group(pose, limits, OF_WIDTH));
-        add_of_markers(covariance, &of_width, OF_ITSELF);
+        add_of_markers(covariance, &of_group(OF_WIDTH), OF_ITSELF);
         let [of_each, of_all] = OF_MESH;
         add_of_markers(covariance, moved, of_each);
         add_square(covariance, moved, of_all);
-    }
-
-    /// The motion of a group along +x and +y.
-    fn group(&self, pose: &Pose, limits: &Limits, group: usize) -> Column {
-        let widths = &self.widths;
-        let corners = widths.corners(pose.place_mm.map(f32::abs));
-        let sizes = Powers::of(pose.size / limits.size);
-        let powers = Powers::of(pose.width);
-        let mut sum = Column::defaults(widths.coordinates);
-        let terms = widths.terms().enumerate();
-        for (number, term) in terms.filter(|(_, term)| term.group == group) {
-            let ([s, _], [w, _]) = (sizes.at(term.of_size), powers.at(term.of_width));
-            for (begins, [weight, ..]) in corners {
-                let factor = term.step * s * w * weight;
-                for (sum, entry) in sum.iter_mut().zip(widths.column(begins, number)) {
-                    *sum += factor * entry;
-                }
-            }
-        }
-        sum
     }
 }
 
@@ -470,50 +333,13 @@ pub fn centre_mm(pose: &Pose, limits: &Limits) -> [f32; 2] {
     [0, 1].map(|way| pose.place_mm[way] - along * pose.tilt[way])
 }
 
-/// The mirror image of the film in which a place is along +x and +y.
-#[derive(Clone, Copy)]
-struct Mirror {
-    /// Along x and along y: −1 if mirrored, 1 if not.
-    signs: [f32; 2],
-}
-
-impl Mirror {
-    fn of(place_mm: [f32; 2]) -> Mirror {
-        Mirror {
-            signs: place_mm.map(|part| if part < 0.0 { -1.0 } else { 1.0 }),
-        }
-    }
-
-    /// The mirror image of a marker of `8v`. Of the corners, left and right are 0 and 1, 3 and 2;
-    /// above and below are 0 and 3, 1 and 2. On the axes, 4 and 6 are left and right, 5 and 7 above
-    /// and below.
-    fn of_marker(&self, number: usize) -> usize {
-        let [mirrors_x, mirrors_y] = self.signs.map(|sign| sign < 0.0);
-        match number {
-            0..4 => number ^ usize::from(mirrors_x) ^ (3 * usize::from(mirrors_y)),
-            4 | 6 if mirrors_x => number ^ 2,
-            5 | 7 if mirrors_y => number ^ 2,
-            _ => number,
-        }
-    }
-
-    fn column(&self, column: &Column) -> Column {
-        Column::from_fn(column.len(), |k| {
-            let sign = self.signs.get(k % 2).copied().unwrap_or_default();
-            sign * column.at(2 * self.of_marker(k / 2) + k % 2)
-        })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::force::forward::Markers;
     use crate::force::forward::solve::solve;
-    use hivtac_terms::layout::EIGHT_V;
     use hivtac_terms::units::Micrometres;
     use proptest::prelude::*;
-    use std::vec::Vec;
 
     const LIMITS: Limits = Limits {
         size: 0.6288,
@@ -574,24 +400,6 @@ mod tests {
         let disc = likely(ContactShape::Round(Micrometres(3_300)));
         let face = likely(ContactShape::Flat(Micrometres(2_000)));
         assert!((disc - face).abs() < 1e-6 && disc > 0.0, "{disc} {face}");
-    }
-
-    #[test]
-    fn a_mirrored_place_mirrors_the_motion() {
-        let column = Column::from_fn(16, |k| k as f32);
-        let at = |place_mm| Mirror::of(place_mm).column(&column);
-        assert_eq!(at([1.0, 2.0]), column);
-        let [left, above] = [at([-1.0, 2.0]), at([1.0, -2.0])];
-        assert_eq!(left[..4], [-2.0, 3.0, -0.0, 1.0]);
-        assert_eq!(
-            left[8..],
-            [-12.0, 13.0, -10.0, 11.0, -8.0, 9.0, -14.0, 15.0]
-        );
-        assert_eq!(above[..4], [6.0, -7.0, 4.0, -5.0]);
-        assert_eq!(
-            above[8..],
-            [8.0, -9.0, 14.0, -15.0, 12.0, -13.0, 10.0, -11.0]
-        );
     }
 
     proptest! {
@@ -662,20 +470,6 @@ mod tests {
             let held = solved.step_of_width(ENDS[1], solved.width.step, &mut step);
             prop_assert!(held <= ENDS[1]);
             prop_assert_eq!(step == solved.unknowns, solved.width.step <= 0.0);
-        }
-    }
-
-    #[test]
-    fn nonsense_is_refused() {
-        let sound: Vec<u8> = OF_EIGHT_V.to_vec();
-        assert!(Widths::new(&sound).is_some());
-        assert_eq!(Widths::new(&sound[..sound.len() - 2]), None);
-        assert_eq!(Widths::new(&sound[..5]), None);
-        // Knots, columns, the largest place, a group, a power of the size, and a step.
-        for (at, part) in [(0, 1), (2, 33), (7, 0x7f), (8, 6), (9, 0), (15, 0x7f)] {
-            let mut bytes = sound.clone();
-            bytes[at] = part;
-            assert_eq!(Widths::new(&bytes), None, "{at}");
         }
     }
 }

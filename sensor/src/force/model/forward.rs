@@ -4,7 +4,7 @@ use super::{ModelError, reader::Reader};
 use crate::force::forward::{
     Axis, CovarianceGrid, Dot, Forward, Gravity, Limits, MOST_DOTS, MOST_FUNCTIONS, MOST_STEPS,
     Markers, NODES, Noise, Others, RELATIVE, RestImage, SHAPES_COORDINATES, Shapes, Stiffness,
-    Table, Tables, Terms, Weight, Widths, weight,
+    Table, Tables, Terms, Torques, Weight, Widths, weight,
 };
 use hivtac_terms::list::List;
 use hivtac_terms::marker::LEAST_MARKERS;
@@ -75,6 +75,7 @@ pub(super) fn forward<'a>(reader: &mut Reader<'a>) -> Result<Forward<'a>, ModelE
         weight: has_weight.then(|| weight(reader, dots)).transpose()?,
         shapes: Shapes::nominal().filter(|_| 2 * dots == SHAPES_COORDINATES),
         widths: Widths::nominal(&rest_image),
+        torques: Torques::nominal(&rest_image),
     })
 }
 

@@ -9,6 +9,7 @@ use super::network::{self, COORDINATES, DOTS, FIRST, Network, SECOND};
 use crate::force::forward::covariance::{Covariance, triangle};
 use crate::force::forward::mounting::RestImage;
 use crate::force::forward::solve::Column;
+use hivtac_terms::layout::EIGHT_V;
 
 pub use super::network::INPUTS;
 
@@ -37,7 +38,7 @@ pub struct Interaction<'a> {
 impl Interaction<'static> {
     /// That of a layout, if there is one. `rest` has its markers' places.
     pub fn of_layout(rest: &RestImage) -> Option<Interaction<'static>> {
-        Interaction::new(OF_EIGHT_V).filter(|_| rest.is_eight_v(NEAR_MM))
+        Interaction::new(OF_EIGHT_V).filter(|_| rest.is_layout(&EIGHT_V, NEAR_MM))
     }
 }
 

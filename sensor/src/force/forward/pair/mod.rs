@@ -313,6 +313,7 @@ mod tests {
             hanging: None,
             pressing: None,
             wide: None,
+            turning: None,
         }
     }
 
