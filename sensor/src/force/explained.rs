@@ -2,21 +2,19 @@
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
-    Arm, Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed,
-    Pose, Sigma, Start, Turned, centre_mm,
+    Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
+    Sigma, Start, Turned, centre_mm,
 };
 use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_DIRECTION};
 use crate::force::network::Output;
 use crate::force::rest::Rest;
 use crate::markers::lost::Lost;
 use hivtac_terms::contact_shape::ContactShape;
-use hivtac_terms::force::Torque;
 use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_terms::units::{
-    MicroNewtons, Micrometres, NanoNewtonMetres, Px, SignedMicrometres, UnsignedMicroNewtons,
-    UnsignedMilliDegrees, UnsignedNanoNewtonMetres,
+    MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
 /// Where a unit's markers rest, and what follows from that before the first frame.
@@ -398,10 +396,7 @@ fn force(
         .map(|part| MicroNewtons(rounded(micronewtons * part)));
     let place_mm = centre_mm(pose, &forward.limits);
     let (force, by_noise) = of_vector(cartesian, place_mm, estimate.sigma(&strength));
-    let torque = estimate.arm().map(|Arm { mm, sigma_mm }| Torque {
-        z: NanoNewtonMetres(rounded(micronewtons * mm)),
-        sigma: UnsignedNanoNewtonMetres(rounded(micronewtons * sigma_mm).max(1).unsigned_abs()),
-    });
+    let torque = estimate.torque(micronewtons);
     (Force { torque, ..force }, by_noise)
 }
 

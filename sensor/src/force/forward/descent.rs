@@ -347,7 +347,7 @@ impl Point {
             wide.add_to(&pose, limits, prediction);
         }
         if let Some(turning) = turning {
-            *by_arm = turning.motion(&pose, limits);
+            turning.put(&pose, limits, by_arm);
         }
         left.reset(observed.moved.len(), 0.0);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());

@@ -125,6 +125,7 @@ pub struct Estimate {
 
 impl Forward<'_> {
     /// As [`Self::estimate_with`]. Where no load explains the markers, a torque may.
+    #[inline(never)]
     pub fn estimate(
         &self,
         observed: &Observed<'_>,
@@ -133,19 +134,12 @@ impl Forward<'_> {
         start: Start,
     ) -> Estimate {
         let turning = observed.turning.as_ref();
-        let (resort, always) = match turning {
-            Some(turning) if turning.is_last_resort => (Some(turning), None),
-            always => (None, always),
-        };
+        let always = turning.filter(|turning| !turning.is_last_resort);
         let found = self.estimate_with(observed, mounting, (unknown, always), start);
-        if resort.is_none() || found.is_explained() {
+        if turning.is_none() || always.is_some() || found.is_explained() {
             return found;
         }
-        let start = Start::At(found.pose);
-        let turned = self.estimate_with(observed, mounting, (unknown, resort), start);
-        let looks = found.looks + turned.looks;
-        let better = if turned.is_explained() { turned } else { found };
-        Estimate { looks, ..better }
+        self.under_a_torque(found, observed, mounting, unknown)
     }
 
     /// Takes steps from a guess, or without one from where the markers moved most. If they get
@@ -154,7 +148,7 @@ impl Forward<'_> {
     /// These succeed where the first steps began badly. Returns the better load. Compiled once,
     /// because the near memory is scarce.
     #[inline(never)]
-    fn estimate_with(
+    pub(super) fn estimate_with(
         &self,
         observed: &Observed<'_>,
         mounting: &Mounting,
@@ -237,18 +231,9 @@ impl Estimate {
     }
 
     /// The factor by which the residual exceeds the markers' stated noise, at least 1.
-    fn noisier(&self) -> f32 {
+    pub(super) fn noisier(&self) -> f32 {
         let usual = residual::usual(self.coordinates);
         libm::sqrtf(1.0 + (self.unexplained - usual).max(0.0) / usual)
-    }
-
-    /// Returns the torque over |F|; its uncertainty is widened if the residual is larger than
-    /// usual. `None` if no torque counted.
-    pub fn arm(&self) -> Option<Arm> {
-        self.arm.map(|arm| Arm {
-            sigma_mm: self.noisier() * arm.sigma_mm,
-            ..arm
-        })
     }
 
     /// Returns the standard uncertainties; `None` if the markers do not determine all unknowns.

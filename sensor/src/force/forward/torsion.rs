@@ -9,15 +9,19 @@
 //! Friction limits a torque by |F| times an arm. So the arm is what is found: torque = |F| · arm.
 //! A stiffer film under a larger force then has the same motion.
 
-use super::Column;
-use super::covariance::{Covariance, Whitening, add_square};
+use super::covariance::{Covariance, Unknown, Whitening, add_square};
+use super::estimate::{Estimate, Observed, Start};
 use super::motions::Motions;
-use super::mounting::RestImage;
+use super::mounting::{Mounting, RestImage};
 use super::pose::Pose;
 use super::solve::{Rows, UNKNOWNS, dot};
 use super::terms::Limits;
+use super::{Column, Forward};
+use crate::force::explained::rounded;
 use hivtac_terms::contact_shape::ContactShape;
+use hivtac_terms::force::Torque;
 use hivtac_terms::layout::{EIGHT_V, SQUARE};
+use hivtac_terms::units::{NanoNewtonMetres, UnsignedNanoNewtonMetres};
 
 /// The markers are this near to those of the layout, mm.
 const NEAR_MM: f32 = 1.0;
@@ -80,21 +84,54 @@ impl<'a> Torques<'a> {
     }
 }
 
-impl Turning<'_> {
-    /// The motion by an arm of 1 mm. Not inlined, so that its stack is released on return.
+impl Forward<'_> {
+    /// Returns the load that explains the markers best if a torque may act, or `found`, which does
+    /// not explain them, if that explains them no better.
     #[inline(never)]
-    pub fn motion(&self, pose: &Pose, limits: &Limits) -> Column {
-        let moved = self.torques.of_group(0, (pose, limits), 1.0);
+    pub(super) fn under_a_torque(
+        &self,
+        found: Estimate,
+        observed: &Observed<'_>,
+        mounting: &Mounting,
+        unknown: Unknown<'_>,
+    ) -> Estimate {
+        let by = (unknown, observed.turning.as_ref());
+        let turned = self.estimate_with(observed, mounting, by, Start::At(found.pose));
+        let looks = found.looks + turned.looks;
+        let better = if turned.is_explained() { turned } else { found };
+        Estimate { looks, ..better }
+    }
+}
+
+impl Estimate {
+    /// Returns the torque of a force of this size, µN; `None` if no torque counted. Its
+    /// uncertainty is widened if the residual is larger than usual.
+    #[inline(never)]
+    pub fn torque(&self, micronewtons: f32) -> Option<Torque> {
+        let Arm { mm, sigma_mm } = self.arm?;
+        let sigma = rounded(micronewtons * self.noisier() * sigma_mm);
+        Some(Torque {
+            z: NanoNewtonMetres(rounded(micronewtons * mm)),
+            sigma: UnsignedNanoNewtonMetres(sigma.max(1).unsigned_abs()),
+        })
+    }
+}
+
+impl Turning<'_> {
+    /// Puts the motion by an arm of 1 mm into `motion`. Not inlined, so that its stack is released
+    /// on return.
+    #[inline(never)]
+    pub fn put(&self, pose: &Pose, limits: &Limits, motion: &mut Column) {
+        *motion = self.torques.of_group(0, (pose, limits), 1.0);
         // A mirror turns a torque over.
-        let is_over = pose
-            .place_mm
-            .iter()
-            .fold(false, |over, part| over ^ (*part < 0.0));
-        let sign = if is_over { -1.0 } else { 1.0 };
-        Column::of(moved.iter().map(|part| sign * part))
+        let [over_x, over_y] = pose.place_mm.map(|part| part < 0.0);
+        if over_x != over_y {
+            motion.iter_mut().for_each(|part| *part = -*part);
+        }
     }
 
     /// Adds the covariance of an unknown arm.
+    #[inline(never)]
     pub fn add_to(&self, motion: &Column, covariance: &mut Covariance) {
         add_square(covariance, motion, self.sigma_mm);
     }
@@ -156,6 +193,12 @@ mod tests {
         Torques::nominal(&image(&places_mm)).unwrap()
     }
 
+    fn motion(turning: &Turning<'_>, pose: &Pose) -> Column {
+        let mut motion = Column::default();
+        turning.put(pose, &LIMITS, &mut motion);
+        motion
+    }
+
     #[test]
     fn other_layouts_have_no_table() {
         assert_eq!(Torques::nominal(&image(&[[3.0, 1.0]; 6])), None);
@@ -182,7 +225,7 @@ mod tests {
                     place_mm,
                     ..Pose::default()
                 };
-                let moved = torques.of(ContactShape::Needle).motion(&pose, &LIMITS);
+                let moved = motion(&torques.of(ContactShape::Needle), &pose);
                 let turned = |dot: usize| -> f32 {
                     let at = match moved.len() {
                         8 => [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]][dot],
@@ -261,7 +304,7 @@ mod tests {
             place_mm: [-8.0, 8.0],
             ..Pose::default()
         };
-        let moved = eight_v().of(ContactShape::Unknown).motion(&pose, &LIMITS);
+        let moved = motion(&eight_v().of(ContactShape::Unknown), &pose);
         assert!(norm(&moved) > 0.0 && norm(&moved) < 0.1);
     }
 }
