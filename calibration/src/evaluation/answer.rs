@@ -63,7 +63,7 @@ impl<'m> Chip<'m> {
         let estimate = match self.model.layers().is_empty() {
             true => {
                 let start = Start::Anywhere;
-                resting.estimate_without(forward, &markers, Lost::NONE, noise, start)
+                resting.estimate_without(forward, (&markers, Lost::NONE), noise, (start, true))
             }
             false => {
                 let output = self.network.run(&self.model, &features, &self.tare);

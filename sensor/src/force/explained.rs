@@ -273,17 +273,18 @@ impl Resting {
         (estimate, (Px::of_f32(rest_x + x), Px::of_f32(rest_y + y)))
     }
 
-    /// Returns the load that explains the markers but the `lost` ones best. The steps begin at
-    /// `start`.
+    /// Returns the load that explains the markers but the lost ones best. The steps begin at
+    /// `start`. A torque that is a last resort counts if it `may_turn`.
     pub fn estimate_without(
         &self,
         forward: &Forward<'_>,
-        markers: &[Marker],
-        lost: Lost,
+        (markers, lost): (&[Marker], Lost),
         noise: FrameNoise,
-        start: Start,
+        (start, may_turn): (Start, bool),
     ) -> Estimate {
         let mut observed = self.observed(forward, markers, noise);
+        let turning = observed.turning;
+        observed.turning = turning.filter(|turning| may_turn || !turning.is_last_resort);
         observed.lost = lost;
         lost.clear(&mut observed.moved);
         forward.estimate(

@@ -26,7 +26,7 @@ const SUSPECTS: usize = 3;
 
 /// Frames after which everything was tried that is tried at once after a frame that a load
 /// explained: in each second one something. All of it takes longer than a frame.
-const ATTEMPTS: u8 = 2 * (SUSPECTS as u8 + 2);
+const ATTEMPTS: u8 = 2 * (SUSPECTS as u8 + 3);
 
 /// What the previous frame showed: where the steps of the next one begin.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,6 +55,8 @@ struct Refused {
 enum Attempt {
     /// Steps from the load of the frame before, and nothing else.
     Same,
+    /// Also with a torque.
+    Turned,
     /// Also without the marker that they explain least; or the one after that.
     Without(usize),
     /// Also from elsewhere.
@@ -86,7 +88,8 @@ impl Before {
             nth if nth % 2 == 0 => Attempt::Same,
             1 => Attempt::From(Start::WhereMost),
             3 => Attempt::From(Start::Press),
-            nth => Attempt::Without(usize::from(nth / 2).saturating_sub(2)),
+            5 => Attempt::Turned,
+            nth => Attempt::Without(usize::from(nth / 2).saturating_sub(3)),
         };
         Some((load, attempt))
     }
@@ -289,17 +292,18 @@ impl Seen<'_> {
         may_leave_out: bool,
         are_two: bool,
     ) -> (Estimate, Option<usize>) {
-        let found = self.estimate(None, Start::At(load));
+        let found = self.estimate(None, Start::At(load), false);
         if found.is_explained() || are_two {
             return (found, None);
         }
         let other = match attempt {
             Attempt::Without(nth) if may_leave_out => {
                 let suspect = least_explained(&found.left, self.placed.lost, nth);
-                let others = self.estimate(Some(suspect), Start::At(found.pose));
+                let others = self.estimate(Some(suspect), Start::At(found.pose), false);
                 (others, Some(suspect))
             }
-            Attempt::From(start) => (self.estimate(None, start), None),
+            Attempt::From(start) => (self.estimate(None, start, false), None),
+            Attempt::Turned => (self.estimate(None, Start::At(found.pose), true), None),
             Attempt::Same | Attempt::Without(_) => return (found, None),
         };
         match other.0.is_explained() {
@@ -312,25 +316,25 @@ impl Seen<'_> {
     /// places, then without each marker that is explained least.
     fn usual(&self, before: &Before, may_leave_out: bool) -> (Estimate, Option<usize>) {
         if let Some(load) = before.load {
-            let found = self.estimate(None, Start::At(load));
+            let found = self.estimate(None, Start::At(load), true);
             if found.is_explained() {
                 return (found, None);
             }
             let again = before.left_out.filter(|_| may_leave_out);
             if let Some(suspect) = again.filter(|again| !self.placed.lost.contains(*again)) {
-                let others = self.estimate(Some(suspect), Start::At(load));
+                let others = self.estimate(Some(suspect), Start::At(load), false);
                 if others.is_explained() {
                     return (others, Some(suspect));
                 }
             }
         }
-        let all = self.estimate(None, Start::Anywhere);
+        let all = self.estimate(None, Start::Anywhere, true);
         if all.is_explained() || !may_leave_out {
             return (all, None);
         }
         for nth in 0..SUSPECTS {
             let suspect = least_explained(&all.left, self.placed.lost, nth);
-            let others = self.estimate(Some(suspect), Start::At(all.pose));
+            let others = self.estimate(Some(suspect), Start::At(all.pose), false);
             if others.is_explained() {
                 return (others, Some(suspect));
             }
@@ -338,11 +342,12 @@ impl Seen<'_> {
         (all, None)
     }
 
-    fn estimate(&self, left_out: Option<usize>, start: Start) -> Estimate {
-        let markers = &self.placed.markers;
-        let lost = self.placed.without(left_out);
+    /// Returns the load that explains the markers best without one. `may_turn` allows a torque
+    /// where nothing else does.
+    fn estimate(&self, left_out: Option<usize>, start: Start, may_turn: bool) -> Estimate {
+        let markers = (self.placed.markers.as_ref(), self.placed.without(left_out));
         self.resting
-            .estimate_without(self.forward, markers, lost, self.noise, start)
+            .estimate_without(self.forward, markers, self.noise, (start, may_turn))
     }
 }
 
