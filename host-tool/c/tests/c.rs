@@ -71,7 +71,10 @@ fn built(compiler: &mut Command, into: &Path) {
 }
 
 fn run(program: &Path, port: &str) -> (Output, String) {
-    let output = Command::new(program).arg(port).output().unwrap();
+    // Cargo's path may lead to the library of an earlier build.
+    let mut program = Command::new(program);
+    let program = program.arg(port).env_remove("LD_LIBRARY_PATH");
+    let output = program.output().unwrap();
     let printed = String::from_utf8(output.stdout.clone()).unwrap();
     (output, printed)
 }

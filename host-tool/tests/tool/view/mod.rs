@@ -177,7 +177,8 @@ fn events_carry_forces_and_how_the_device_stands() {
         -5000,
         2500,
         480,
-        [1250, -730, 85]
+        [1250, -730, 85],
+        null
     ]);
     let status = 1 << 13 | 1 << 16;
     assert_eq!(row, json!([59, 59, 59 * 33_333, status, force, []]));
