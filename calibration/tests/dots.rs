@@ -34,9 +34,9 @@ impl Presses {
     }
 }
 
-/// What frames tell.
+/// Counts and errors over frames.
 #[derive(Default)]
-struct Told {
+struct Tally {
     frames: u32,
     /// Frames in which all dots are wholly seen.
     whole: u32,
@@ -48,7 +48,7 @@ struct Told {
     within: [u32; 3],
 }
 
-impl Told {
+impl Tally {
     fn add(&mut self, sensor: &mut Sensor<'_>, scene: &Scene, load: &Load, number: u64) {
         let frame = scene.render_load(load, number).unwrap();
         sensor.forget_frame();
@@ -113,14 +113,18 @@ fn needles_within_8_mm() {
                 force_mn: [force_mn; 2],
             };
             let mut random = ChaCha8Rng::seed_from_u64(within_mm as u64);
-            let mut told = Told::default();
+            let mut tally = Tally::default();
             for number in 0..400 {
                 let load = presses.draw(&mut random);
-                told.add(&mut sensor, &scene, &load, number);
+                tally.add(&mut sensor, &scene, &load, number);
             }
-            told.print(&format!("±{within_mm} mm | {force_mn} mN"));
-            let is_right = told.rms().iter().zip(wanted).all(|(rms, most)| *rms < most);
-            assert!(force_mn != 100.0 || is_right, "{:?}", told.rms());
+            tally.print(&format!("±{within_mm} mm | {force_mn} mN"));
+            let is_right = tally
+                .rms()
+                .iter()
+                .zip(wanted)
+                .all(|(rms, most)| *rms < most);
+            assert!(force_mn != 100.0 || is_right, "{:?}", tally.rms());
         }
     }
 }
@@ -166,22 +170,22 @@ fn what_befalls_a_dot() {
         "a dot moved by 0.1 px",
         "a dot moved by 0.5 px",
     ] {
-        let mut told = Told::default();
+        let mut tally = Tally::default();
         for dot in 0..8 {
             let mut sensor = tared(&nominal());
             let scene = scene(|options| befall(options, fault, dot));
             let mut random = ChaCha8Rng::seed_from_u64(dot as u64);
             for number in 0..100 {
                 let load = presses.draw(&mut random);
-                told.add(&mut sensor, &scene, &load, 1_000 * dot as u64 + number);
+                tally.add(&mut sensor, &scene, &load, 1_000 * dot as u64 + number);
             }
         }
-        told.print(fault);
-        assert!(told.percent(told.forces) > 94.0, "{fault}");
+        tally.print(fault);
+        assert!(tally.percent(tally.forces) > 94.0, "{fault}");
         match fault {
-            "none" => of_none = told.rms(),
+            "none" => of_none = tally.rms(),
             // Little more is known less well.
-            _ => assert!(told.rms()[0] < 1.6 * of_none[0], "{fault}"),
+            _ => assert!(tally.rms()[0] < 1.6 * of_none[0], "{fault}"),
         }
     }
 }

@@ -26,8 +26,10 @@ const SWAPPED: [([f64; 2], [f64; 2], u32); 3] = [
     ([0.0, 0.0], [3.0, 0.0], 100),
     ([0.0, 0.0], [0.0, 3.0], 100),
 ];
-/// The requested |F| if none is given, mN.
+/// The requested |F| where a list gives none, mN: of all loads, but of one that is strong. Loads of
+/// one size say little about other sizes.
 const USUAL_MN: u32 = 100;
+const STRONG_MN: u32 = 200;
 
 /// A planned load.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,13 +62,28 @@ fn of_list(list: &[([f64; 2], [f64; 2], u32)]) -> Vec<Planned> {
     planned.collect()
 }
 
-/// Loads at the poses of a list.
+/// Loads at the poses of a list. The strong one is at the pose nearest to straight down on the
+/// middle, the last of equal ones.
 pub fn of_poses(list: &[Pose]) -> Vec<Planned> {
-    let planned = list.iter().map(|&pose| Planned {
-        pose,
-        force_mn: USUAL_MN,
-    });
-    planned.collect()
+    let mut planned: Vec<Planned> = (list.iter())
+        .map(|&pose| Planned {
+            pose,
+            force_mn: USUAL_MN,
+        })
+        .collect();
+    let off = |it: &Planned| {
+        let place_mm = it.pose.place_mm.unwrap_or_default();
+        let parts = it.pose.angles_deg.iter().chain(&place_mm);
+        parts.map(|part| part * part).sum::<f64>()
+    };
+    let strong = planned
+        .iter_mut()
+        .rev()
+        .min_by(|a, b| off(a).total_cmp(&off(b)));
+    if let Some(strong) = strong {
+        strong.force_mn = STRONG_MN;
+    }
+    planned
 }
 
 /// The instructions for each load, in takes of this many seconds.
@@ -109,6 +126,20 @@ mod tests {
     use crate::data::collect::poses;
 
     use super::*;
+
+    #[test]
+    fn one_load_of_a_list_is_strong() {
+        let poses = |list: &[Planned]| list.iter().map(|it| it.pose).collect::<Vec<_>>();
+        assert_eq!(of_poses(&poses(&usual())), usual());
+        let tilted = of_poses(&poses(&usual()[2..]));
+        let strong: Vec<bool> = tilted.iter().map(|it| it.force_mn == STRONG_MN).collect();
+        // A place is 3 mm off, a tilt is 8°.
+        assert_eq!(
+            strong,
+            [false, false, false, false, false, false, false, true]
+        );
+        assert!(of_poses(&[]).is_empty());
+    }
 
     #[test]
     fn loads_are_told_in_words_and_those_done_are_left_out() {

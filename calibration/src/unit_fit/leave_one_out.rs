@@ -10,6 +10,8 @@ use super::problem::Problem;
 /// Difference between a load found with a model fitted to all others, and its stated values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeaveOneOutError {
+    /// |F| stated, N.
+    pub stated_n: f64,
     /// |F| found minus |F| stated, N.
     pub size_n: f64,
     /// Angle between the two directions, degrees.
@@ -35,6 +37,7 @@ impl Found {
             let turned = parts[1].hypot(parts[2]) * known.direction_sigma_rad();
             let sigma_mm = known.place_sigma_mm();
             Ok(LeaveOneOutError {
+                stated_n: known.magnitude_n(),
                 size_n: parts[0] * known.size_n,
                 direction_deg: turned.to_degrees(),
                 place_mm: (known.each_place_mm.is_finite())

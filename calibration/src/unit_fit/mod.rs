@@ -34,7 +34,7 @@ use std::fmt;
 use anyhow::{Result, ensure};
 
 use crate::loads::SeenLoad;
-use descent::Found;
+use descent::{EXPLAINED, Found};
 use goodness_of_fit::GoodnessOfFit;
 pub use leave_one_out::LeaveOneOutError;
 use numbers::Family;
@@ -53,6 +53,10 @@ const COARSE: f64 = 0.3;
 /// then some tenths of a pixel from the fit, which no film in tolerance reaches.
 const CONTRADICTED: f64 = 2_500.0;
 
+/// χ² over the number of seen coordinates falls by more than this, if not by chance, when a wrong
+/// direction of gravity is left out.
+const LESS: f64 = 0.4;
+
 /// The result of a fit.
 #[derive(Clone, Debug)]
 pub struct Fit {
@@ -60,16 +64,27 @@ pub struct Fit {
     pub own: OwnFilm,
     /// χ² of the seen coordinates and of the priors, over the number of seen coordinates.
     pub chi_square: f64,
-    /// Whether the direction of gravity was known under the loads.
-    is_held: bool,
+    held: Held,
     /// The load that the fit explains worst.
     worst: SeenLoad,
     /// The error of each load when it is left out of the fit.
     pub left_out: Vec<LeaveOneOutError>,
 }
 
+/// What is known of gravity under the loads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Held {
+    /// Nothing.
+    Untold,
+    /// Its direction, as stated.
+    AsTold,
+    /// It is not as stated, in parts of g: only without that, one film explains the loads.
+    Otherwise([f64; 3]),
+}
+
 /// Fits a unit to its rest position and to loads. `stage_mm` is the standard uncertainty of the
-/// stage's zero; `from` is the fit of the unit's old film.
+/// stage's zero; `from` is the fit of the unit's old film. A direction of gravity that contradicts
+/// the loads is left out.
 ///
 /// # Errors
 /// When the film finds no equilibrium under a load, or the loads contradict each other.
@@ -79,11 +94,31 @@ pub fn fit(
     stage_mm: f64,
     from: Option<&OwnFilm>,
 ) -> Result<Fit> {
-    let (problem, found) = unit_of(bench, loads, stage_mm, from)?;
+    let untold = Bench {
+        down: None,
+        ..bench.clone()
+    };
+    let (mut problem, mut found) = unit_of(bench, loads, stage_mm, from)?;
+    let mut held = bench.down.map_or(Held::Untold, |_| Held::AsTold);
+    if let Some(down) = bench.down.filter(|_| found.chi_square() >= EXPLAINED) {
+        let without = unit_of(&untold, loads, stage_mm, from)?;
+        if without.1.chi_square() < EXPLAINED.min(found.chi_square() - LESS) {
+            (problem, found) = without;
+            held = Held::Otherwise(down);
+        }
+    }
+    ensure!(
+        found.chi_square() <= CONTRADICTED,
+        "no unit explains these loads: what is seen of them is off by {:.1} px, root mean square, \
+         most of all of load {}: check its force, its direction and its place, and that the film \
+         was not touched otherwise",
+        bench.noise_px * found.chi_square().sqrt(),
+        found.worst() + 1
+    );
     Ok(Fit {
         chi_square: found.chi_square(),
         worst: loads[found.worst()],
-        is_held: bench.down.is_some(),
+        held,
         left_out: found.left_out(&problem)?,
         own: OwnFilm::new(&problem, &found)?,
     })
@@ -93,7 +128,7 @@ pub fn fit(
 /// Arguments as for [`fit`].
 ///
 /// # Errors
-/// As [`fit`].
+/// When the film finds no equilibrium under a load.
 fn unit_of<'a>(
     bench: &'a Bench,
     loads: &'a [SeenLoad],
@@ -108,22 +143,13 @@ fn unit_of<'a>(
         trust: Trust::WHOLE,
     };
     let [nominal, real] = [Family::Nominal, Family::Real].map(problem);
-    let (problem, found) = match nominal.explained()? {
-        Some(found) => (nominal, found),
+    match nominal.explained()? {
+        Some(found) => Ok((nominal, found)),
         None => {
             let found = real.found()?;
-            (real, found)
+            Ok((real, found))
         }
-    };
-    ensure!(
-        found.chi_square() <= CONTRADICTED,
-        "no unit explains these loads: what is seen of them is off by {:.1} px, root mean square, \
-         most of all of load {}: check its force, its direction and its place, and that the film \
-         was not touched otherwise",
-        bench.noise_px * found.chi_square().sqrt(),
-        found.worst() + 1
-    );
-    Ok((problem, found))
+    }
 }
 
 impl fmt::Display for Fit {
@@ -136,13 +162,22 @@ impl fmt::Display for Fit {
         for FoundNumber { name, value, sigma } in &self.own.numbers {
             writeln!(f, "{name:<46} {value:>9.4} ± {sigma:.4}")?;
         }
-        let turned = match (self.own.knows_weight(), self.is_held) {
+        if let Held::Otherwise([x, y, z]) = self.held {
+            writeln!(
+                f,
+                "The sensor was not held as it was told: gravity along {x:.2}, {y:.2}, {z:.2} \
+                 contradicts the loads, and without it one film explains them. So the fit leaves \
+                 it out. Correct `hivtac settings set down`."
+            )?;
+        }
+        let turned = match (self.own.knows_weight(), self.held) {
             (true, _) => "The model holds when the sensor is turned.",
-            (false, true) => {
+            (false, Held::AsTold) => {
                 "The film finds no equilibrium when it is turned: then the sensor says \
                  `weight_unknown`."
             }
-            (false, false) => {
+            (false, Held::Otherwise(_)) => "When it is turned, it says `weight_unknown`.",
+            (false, Held::Untold) => {
                 "Nobody said which way the sensor was held (`hivtac settings set down`): when it \
                  is turned, it says `weight_unknown`."
             }

@@ -326,6 +326,29 @@ fn a_mounted_film_is_known_turned() {
     }
 }
 
+/// The sensor was told that gravity pulls at its film, which weighs nothing.
+#[test]
+#[ignore = "slow: three fits"]
+fn a_direction_of_gravity_that_contradicts_the_loads_is_left_out() {
+    let truth = stiffer(COARSE);
+    let loads: Vec<SeenLoad> = (0..5).map(|k| truth.load(2 * k)).collect();
+    let bench = Bench {
+        down: Some([0.0, 0.0, -1.0]),
+        fineness: COARSE,
+        ..truth.bench()
+    };
+    let fit = fit(&bench, &loads, 0.1, None).unwrap();
+    assert!(fit.chi_square < EXPLAINED, "{}", fit.chi_square);
+    assert!(!fit.own.knows_weight());
+    let text = fit.to_string();
+    for words in [
+        "gravity along 0.00, 0.00, -1.00 contradicts",
+        "weight_unknown",
+    ] {
+        assert!(text.contains(words), "no {words}: {text}");
+    }
+}
+
 /// Ten loads find a unit with eight dots, and its model predicts how they all move.
 #[test]
 #[ignore = "slow"]

@@ -94,14 +94,36 @@ pub type Clock = Box<dyn FnMut() -> f64 + Send>;
 /// count from 1.
 pub type Film = Box<dyn FnMut(u32, u32) -> Sample + Send>;
 
+/// What the sensor answers, from the next conversation on.
+#[derive(Clone, Copy)]
+pub struct Answers {
+    /// The outcome of a tare.
+    pub tare: Outcome,
+    /// Number of markers that its model is for; none without a model.
+    pub markers: Option<u8>,
+    /// Which way it is held, if that was set.
+    pub down: Option<Direction>,
+}
+
+impl Default for Answers {
+    /// Of a sensor without a model, whose film lies above its camera.
+    fn default() -> Self {
+        Self {
+            tare: Outcome::Done,
+            markers: None,
+            down: Some(ABOVE_THE_CAMERA),
+        }
+    }
+}
+
+/// Gravity on a film that lies above its camera.
+pub const ABOVE_THE_CAMERA: Direction = Direction([0, 0, -1000]);
+
 /// A sensor on a TCP port, whose film is pressed in the pose set by the test.
 pub struct FakeSensor {
     pub port: String,
     pub pose: Arc<Mutex<[f64; 2]>>,
-    /// The answer to a tare.
-    pub tare: Arc<Mutex<Outcome>>,
-    /// Number of markers that its model is for; none without a model.
-    pub markers: Arc<Mutex<Option<u8>>>,
+    pub answers: Arc<Mutex<Answers>>,
 }
 
 impl FakeSensor {
@@ -121,21 +143,19 @@ impl FakeSensor {
     pub fn of_film(mut film: Film, after: usize) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let port = format!("tcp:{}", listener.local_addr().unwrap());
-        let tare = Arc::new(Mutex::new(Outcome::Done));
-        let markers = Arc::new(Mutex::new(None));
-        let (answered, of_model) = (tare.clone(), markers.clone());
+        let answers = Arc::<Mutex<Answers>>::default();
+        let set = answers.clone();
         std::thread::spawn(move || {
             let mut counts = [0, 0];
             while let Ok((stream, _)) = listener.accept() {
-                let told = (*answered.lock().unwrap(), *of_model.lock().unwrap());
-                talk(stream, &mut film, told, &mut counts, after);
+                let answers = *set.lock().unwrap();
+                talk(stream, &mut film, answers, &mut counts, after);
             }
         });
         Self {
             port,
             pose: Arc::default(),
-            tare,
-            markers,
+            answers,
         }
     }
 }
@@ -143,7 +163,7 @@ impl FakeSensor {
 fn talk(
     mut stream: TcpStream,
     film: &mut Film,
-    told: (Outcome, Option<u8>),
+    answers: Answers,
     [frame, start]: &mut [u32; 2],
     after: usize,
 ) {
@@ -163,7 +183,7 @@ fn talk(
                         return;
                     };
                     let was = streaming;
-                    answer(&mut stream, message, told, &mut streaming);
+                    answer(&mut stream, message, answers, &mut streaming);
                     *start += u32::from(streaming && !was);
                 }
             }
@@ -181,21 +201,16 @@ fn talk(
     }
 }
 
-fn answer(
-    stream: &mut TcpStream,
-    message: HostMessage,
-    (tare, markers): (Outcome, Option<u8>),
-    streaming: &mut bool,
-) {
+fn answer(stream: &mut TcpStream, message: HostMessage, answers: Answers, streaming: &mut bool) {
     match message {
-        HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello(markers))),
+        HostMessage::Hello(_) => send(stream, &DeviceMessage::Hello(hello(answers.markers))),
         HostMessage::Down(_) => {}
         HostMessage::Command(hivtac_wire::message::Command { id, request }) => {
             let mut outcome = Outcome::Done;
             match request {
                 Request::Tare { .. } => {
-                    send(stream, &DeviceMessage::Tared(tared()));
-                    outcome = tare;
+                    send(stream, &DeviceMessage::Tared(tared(answers.down)));
+                    outcome = answers.tare;
                 }
                 Request::StartWithMarkers => *streaming = true,
                 Request::Stop => *streaming = false,
@@ -206,8 +221,8 @@ fn answer(
     }
 }
 
-/// A tare while the film lies above its camera.
-fn tared() -> TareReport {
+/// A tare with the sensor held this way.
+fn tared(down: Option<Direction>) -> TareReport {
     TareReport {
         rest: RestPosition {
             format: PixelFormat::Rgb565,
@@ -216,7 +231,7 @@ fn tared() -> TareReport {
             markers: markers([0.0; 3]).into(),
             rect_center: (Px(160 << 16), Px(120 << 16)),
             rect_area: Q::from_bits((88 * 88) << 16),
-            down: Some(Direction([0, 0, -1000])),
+            down,
         },
         spread: Px(0),
         moved: None,

@@ -57,7 +57,7 @@ fn a_film_that_cannot_be_tared_is_not_recorded() {
     let directory = tempfile::tempdir().unwrap();
     let here = directory.path();
     let sensor = FakeSensor::start(clock(), usize::MAX);
-    *sensor.tare.lock().unwrap() = Outcome::MarkersImplausible;
+    sensor.answers.lock().unwrap().tare = Outcome::MarkersImplausible;
     let (output, said) = run(here, &record(&sensor.port, &[]), "\n0, 0\n");
     assert!(!output.status.success(), "{said}");
     let why = "not those of four whole, equal markers";
