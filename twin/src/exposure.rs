@@ -79,7 +79,10 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
         let row = row.clamp(0.0, height - 1.0);
         let below = (row - centre(self.camera.height())) / height;
         let instants = self.shutter.instants(below);
-        let pressed = instants.map(|time_s| self.mechanics.seen(self.film, &(self.load)(time_s)));
+        let pressed = instants.map(|time_s| {
+            let load = (self.load)(time_s);
+            self.mechanics.seen_around(self.film, &load, disc)
+        });
         pressed
             .map(|film| self.outline(disc, |rest| film.displacement(rest)))
             .collect()

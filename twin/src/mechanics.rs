@@ -3,7 +3,7 @@
 use crate::film::DiscMotion;
 use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
 use crate::film::{Dots, Film, FilmError, Layout, Pressed};
-use crate::{Contact, Creep, Load, SceneError};
+use crate::{Contact, Creep, Disc, Load, SceneError};
 
 /// The parts of the film's answer to a load that a scene uses.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -111,11 +111,16 @@ impl Mechanics {
 
     /// Returns the film under a load that it accepts.
     pub(crate) fn press(&self, film: &Film, load: &Load) -> Pressed {
+        self.press_by(load, |load| film.press(load))
+    }
+
+    /// Returns the film as `press` has it, under a load that it accepts.
+    fn press_by(&self, load: &Load, press: impl Fn(&Load) -> Pressed) -> Pressed {
         let load = &self.completed(load);
         match self.stiffness {
-            Stiffness::Computed => film.press(&self.taken(load, load.magnitude_n())),
+            Stiffness::Computed => press(&self.taken(load, load.magnitude_n())),
             Stiffness::Linear => {
-                let full = film.press(&self.taken(load, LINEAR_UP_TO_N));
+                let full = press(&self.taken(load, LINEAR_UP_TO_N));
                 let part = (load.magnitude_n() / LINEAR_UP_TO_N).min(1.0);
                 scaled(full, part)
             }
@@ -126,6 +131,12 @@ impl Mechanics {
     /// accepts.
     pub(crate) fn seen(&self, film: &Film, load: &Load) -> Pressed {
         self.surface.of(self.press(film, load))
+    }
+
+    /// As [`Mechanics::seen`], for a look at this disc alone.
+    pub(crate) fn seen_around(&self, film: &Film, load: &Load, disc: &Disc) -> Pressed {
+        let press = |load: &Load| film.press_around(load, disc);
+        self.surface.of(self.press_by(load, press))
     }
 
     /// Returns a load of another size, straight if `lateral` is false.

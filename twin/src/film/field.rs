@@ -13,6 +13,12 @@ const OWN: f64 = 1.05;
 /// Beyond this distance, in parts of the radius, the motion is the one of tip and markers together.
 const OTHERS: f64 = 4.0;
 
+/// Returns the distance from a marker's centre, mm, up to which the film's motion depends on that
+/// of the marker with this radius, on a film by the tables of the whole film.
+pub fn reach_mm(radius_mm: f64) -> f64 {
+    OTHERS * radius_mm
+}
+
 pub fn displacement(pressed: &Pressed, rest_mm: [f64; 2]) -> [f64; 3] {
     let k = nearest(pressed, rest_mm);
     let centre = pressed.centres_mm[k];

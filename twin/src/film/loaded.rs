@@ -172,15 +172,30 @@ impl Film {
     /// Returns the film under a load that [`Film::check`] accepts. Under any other load the film
     /// stays at the limit of the tables.
     pub fn press(&self, load: &Load) -> Pressed {
-        let pressed = self.pressed(load);
+        self.press_dots(load, |_| true)
+    }
+
+    /// As [`Film::press`], for a look at a disc of the film: where the tables of the whole film
+    /// give the motion, dots that have no part in the disc's are left at rest.
+    pub(crate) fn press_around(&self, load: &Load, disc: &Disc) -> Pressed {
+        let reach_mm = field::reach_mm(self.layout.diameter_mm() / 2.0) + 2.0 * disc.radius_mm;
+        self.press_dots(load, |[x, y]| {
+            let [to_x, to_y] = disc.centre_mm;
+            self.layout.is_nominal() || libm::hypot(x - to_x, y - to_y) < reach_mm
+        })
+    }
+
+    /// Returns the film under a load. Dots whose places, mm, are not wanted are left at rest.
+    fn press_dots(&self, load: &Load, is_wanted: impl Fn([f64; 2]) -> bool) -> Pressed {
+        let pressed = self.pressed(load, is_wanted);
         match self.down {
             None => pressed,
             Some(down) => self.weighted(pressed, down),
         }
     }
 
-    /// Returns the film under a load, without its weight.
-    fn pressed(&self, load: &Load) -> Pressed {
+    /// As [`Film::press_dots`], without the film's weight.
+    fn pressed(&self, load: &Load, is_wanted: impl Fn([f64; 2]) -> bool) -> Pressed {
         if load.magnitude_n() == 0.0 {
             return Pressed {
                 touches_mm: load.offset_mm(),
@@ -189,7 +204,10 @@ impl Film {
         }
         let (pose, force_n) = self.reached(load);
         let at_rest = self.at_rest();
-        let disc = |k| self.disc(&pose, load, k);
+        let disc = |k| match is_wanted(self.marker_mm(k)) {
+            true => self.disc(&pose, load, k),
+            false => DiscMotion::default(),
+        };
         Pressed {
             tip_mm: self.tip_mm(&pose, load.tip_radius_mm()),
             force_n,
@@ -457,6 +475,35 @@ mod tests {
             let discs = film.press(load).discs;
             for (marker, disc) in discs.iter().enumerate() {
                 assert_eq!(film.marker_motion(load, marker), *disc);
+            }
+        }
+    }
+
+    /// Bit for bit: at every disc that is on, beside or far from a dot.
+    #[test]
+    fn a_look_at_one_disc_is_as_one_at_the_whole_film() {
+        let pressed = load(0.15, 6.0, -3.0).with_offset_mm([1.8, 0.9]).unwrap();
+        for layout in ["4", "8v"] {
+            let film = Film::default()
+                .with_layout(layout.parse().unwrap())
+                .unwrap();
+            let whole = film.press(&pressed);
+            let dots = film.markers_mm();
+            let centres = dots.iter().flat_map(|[x, y]| {
+                [0.0, 0.4, 1.1, 1.9, 2.2, 2.9].map(|beside| [x + beside, y - 0.3 * beside])
+            });
+            for centre_mm in centres {
+                let radius_mm = 0.5;
+                let around = film.press_around(
+                    &pressed,
+                    &Disc {
+                        centre_mm,
+                        radius_mm,
+                    },
+                );
+                for corner in crate::disc::rim(centre_mm, radius_mm) {
+                    assert_eq!(around.displacement(corner), whole.displacement(corner));
+                }
             }
         }
     }
