@@ -78,8 +78,8 @@ fn in_octant([i, j]: [usize; 2]) -> usize {
 }
 
 impl Presses {
-    /// Solves the film with a mesh of this fineness. `at` returns its states at a place, mm, by size
-    /// and contact.
+    /// Solves the film with a mesh of this fineness. `at` returns its states at a place, mm, by
+    /// size and contact.
     ///
     /// # Errors
     /// When the film finds no equilibrium.

@@ -24,8 +24,8 @@ const KNOTS: core::ops::RangeInclusive<u8> = 2..=32;
 
 /// The motions at knots of the place, borrowed from a table: the number of knots along an axis, of
 /// coordinates and of columns, a zero, and the largest place, mm (f32). For each column its group,
-/// its powers of size and of the second variable, a zero, and its step (f32). For each knot, in lines of places from
-/// 0 to the largest, for each column, entries of i16 by coordinate.
+/// its powers of size and of the second variable, a zero, and its step (f32). For each knot, in
+/// lines of places from 0 to the largest, for each column, entries of i16 by coordinate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motions<'a> {
     knots: usize,

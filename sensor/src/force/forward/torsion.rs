@@ -14,6 +14,7 @@ use super::estimate::{Estimate, Observed, Start};
 use super::motions::Motions;
 use super::mounting::{Mounting, RestImage};
 use super::pose::Pose;
+use super::residual;
 use super::solve::{Rows, UNKNOWNS, dot};
 use super::terms::Limits;
 use super::{Column, Forward};
@@ -29,6 +30,10 @@ const NEAR_MM: f32 = 1.0;
 /// friction of 1, two thirds of the contact's radius are the most.
 const NEEDLE_MM: f32 = 0.5;
 const OTHER_MM: f32 = 1.0;
+/// Coordinates of four markers.
+const FEW: usize = 8;
+/// The largest arm that is believed where it is a last resort, mm.
+const MOST_MM: f32 = 0.7;
 
 /// The tables of nominal films, as the example `torques` of `calibration/` writes them.
 const OF_SQUARE: &[u8] = include_bytes!("../../../data/torques-4.bin");
@@ -79,7 +84,7 @@ impl<'a> Torques<'a> {
         Turning {
             torques: self.0,
             sigma_mm: if is_needle { NEEDLE_MM } else { OTHER_MM },
-            is_last_resort: is_needle || self.0.coordinates <= 8,
+            is_last_resort: is_needle || self.0.coordinates <= FEW,
         }
     }
 }
@@ -98,12 +103,27 @@ impl Forward<'_> {
         let by = (unknown, observed.turning.as_ref());
         let turned = self.estimate_with(observed, mounting, by, Start::At(found.pose));
         let looks = found.looks + turned.looks;
-        let better = if turned.is_explained() { turned } else { found };
+        let better = if turned.is_explained_by_a_torque() {
+            turned
+        } else {
+            found
+        };
         Estimate { looks, ..better }
     }
 }
 
 impl Estimate {
+    /// Whether the load explains the markers with a torque that friction can bring. A marker that
+    /// is seen in a wrong place asks for one, too: few markers leave little to tell.
+    fn is_explained_by_a_torque(&self) -> bool {
+        let is_likely = self.arm.is_some_and(|arm| arm.mm.abs() <= MOST_MM);
+        let most = match self.coordinates {
+            ..=FEW => residual::usual(self.coordinates),
+            _ => residual::stuck(self.coordinates),
+        };
+        is_likely && self.unexplained <= most
+    }
+
     /// Returns the torque of a force of this size, µN; `None` if no torque counted. Its
     /// uncertainty is widened if the residual is larger than usual.
     #[inline(never)]
