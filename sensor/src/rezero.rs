@@ -1,10 +1,10 @@
 //! Finds where the untouched film rests: how far from its rest position, and re-zeroing, which
 //! follows it.
 //!
-//! The markers' rest positions drift with temperature and with what the film remembers of its
-//! loads. Frames with all markers within half a pixel of the rest position show the untouched film,
-//! whether or not a force explains them: a touch moves the markers farther. The mean of a second of
-//! such frames gives the drift.
+//! The markers' rest positions drift with temperature and with the film's creep. Frames with all
+//! markers within half a pixel of the rest position show the untouched film, whether or not a force
+//! explains them: a touch moves the markers farther. The mean of a second of such frames gives the
+//! drift.
 //!
 //! Once this has lasted long enough, each coordinate of the rest position follows that mean. It
 //! moves by at most a rate, and never farther from where it was taken than a total.

@@ -1,4 +1,4 @@
-//! Computes the force that explains the markers best, with the film run forwards.
+//! Computes the force that explains the markers best, by the forward model.
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{

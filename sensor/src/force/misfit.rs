@@ -1,11 +1,11 @@
-//! Measures how far pressed markers are from where any contact moves them.
+//! Measures errors of the markers' centres that change from place to place, by the residuals of
+//! presses.
 //!
-//! Some errors of a marker's centre stay for as long as the marker does: those of a camera whose
-//! pixels see one colour each, of a film through which the room is seen, and of whatever the model
-//! has otherwise than the unit. Two successive frames do not show them
-//! ([noise](super::NoiseLevel)). But they change once the markers have moved by some pixels, and a
-//! contact explains only five of the coordinates. So the mean of what presses at many places left
-//! unexplained is their variance.
+//! Some errors of a marker's centre last as long as the marker rests. They come from a camera whose
+//! pixels see one colour each, a film that shows the room, or differences of model and unit. Two
+//! successive frames do not show them ([noise](super::NoiseLevel)). But they change once the
+//! markers have moved by some pixels, and a contact explains only five of the coordinates. So the
+//! mean squared residual of presses at many places is their variance.
 
 use crate::force::forward::{Estimate, Markers, residual};
 use hivtac_terms::marker::Marker;

@@ -1,10 +1,10 @@
-//! Measures how noisy frames are, from what the film leaves unexplained in two successive frames.
+//! Measures the noise of frames, by the residuals of two successive frames.
 //!
 //! N markers have 2·N coordinates, and a load explains five of them. The others, three of four
-//! markers, are left over, whatever the load is. An object on the film or a model error leaves
-//! nearly the same there in two successive frames, 6 ms apart; noise leaves independent values. So
+//! markers, are residuals, whatever the load is. An object on the film or a model error gives
+//! nearly the same residuals in two successive frames, 6 ms apart; noise gives independent ones. So
 //! half the squared difference of two frames is the variance of noise alone. It shows little light,
-//! a high gain or flickering specks, but no force, not even a fast one.
+//! a high gain or flickering specks, but not even a fast force.
 
 use super::misfit::Misfit;
 use crate::force::forward::{Column, Estimate, residual, square};

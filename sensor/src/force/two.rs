@@ -1,4 +1,5 @@
-//! Tells two contacts in a frame that one does not explain, and follows them from frame to frame.
+//! Resolves two contacts in a frame that one does not explain, and follows them from frame to
+//! frame.
 
 use super::explained::{Resting, of_vector, rounded};
 use super::{Force, FrameNoise, trust};

@@ -1,12 +1,12 @@
-//! Looks at the film beside a marker: what shows through it there, on one side, shifts the marker.
+//! Compares the film on both sides of a marker: light through the film on one side shifts the
+//! marker.
 //!
-//! The weights of a marker's soft edge assume one film all around. Behind a film that lets light
-//! through, a fingertip or a red thing gives the film beside the marker weight of its own, and
-//! another brightness: pixels that the marker covers in part then weigh more or less than that
-//! part. So each pixel beside a blob has a *pull*: how far it moves the edge of a marker, up to a
-//! constant. A difference of pull between two sides shifts the centroid by what
-//! [`Beside::shift_px2`] tells. It does not know of what surrounds a marker evenly, which shifts
-//! nothing.
+//! The weights of a marker's soft edge assume an even film around it. Behind a film that lets light
+//! through, a fingertip or a red thing changes redness and brightness of the film next to the
+//! marker: pixels that the marker covers in part then weigh more or less than that part. So each
+//! pixel next to a blob has a *pull*: how far it moves the edge of a marker, up to a constant. A
+//! difference of pull between two sides shifts the centroid ([`Beside::shift_px2`]). An even
+//! surrounding shifts nothing.
 
 use crate::markers::runs::Run;
 

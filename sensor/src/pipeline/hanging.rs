@@ -1,4 +1,4 @@
-//! Adapts to the way the sensor is held: the film hangs by its own weight.
+//! Adapts to the way the sensor is held, which changes the film's sag by its own weight.
 
 use super::Sensor;
 use crate::force::forward::{Gravity, Turned};

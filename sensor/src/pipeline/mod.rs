@@ -101,7 +101,7 @@ struct Prepared {
     finder: Finder,
     /// `None` without a rest position to compare with.
     trust: Option<Trust>,
-    /// `None` without a film run forwards.
+    /// `None` without a forward model.
     resting: Option<Resting>,
     /// The status bits that every frame has, whatever it shows.
     standing: Status,

@@ -1,9 +1,9 @@
 //! Measures a film with another layout than the square of four dots.
 //!
-//! The rest position tells which marker is which, and the film run forwards explains them all.
-//! Five markers and more are more than a contact needs. So one or two may be lost: without an image
-//! of their own, or left out because no contact explains them with the others. The force goes on
-//! from the others ([`Status::MARKER_LOST`]), with its own uncertainty.
+//! The rest position identifies each marker, and the forward model explains them all. Five or more
+//! markers are redundant, so one or two may be lost: without an image of their own, or left out
+//! because no contact explains them with the others. The force then comes from the others
+//! ([`Status::MARKER_LOST`]), with its own uncertainty.
 
 use super::again::BLUR;
 use super::{Look, Measurement, Prepared, Sensor, at_the_middle, is_a_press};

@@ -1,7 +1,7 @@
-//! Tells two contacts in a frame that one does not explain.
+//! Resolves two contacts in a frame that one does not explain.
 //!
-//! To find them takes many times as long as a force. A device does it in parts: it looks for them
-//! over some frames, and then follows them with one step a frame.
+//! Finding them takes many times as long as a force. A device does it in parts, over some frames,
+//! and then follows them with one step a frame.
 
 use super::again::Look;
 use super::{Measurement, Prepared, Sensor};

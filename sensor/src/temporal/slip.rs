@@ -12,12 +12,11 @@
 //!
 //! with the smaller |F| of the two frames, ΔF the vector between their forces, and σ the place's
 //! stated uncertainty. The places of a frame whose markers change their motion are less certain
-//! than those of the steady frames beside it: for either frame, that difference of σ is added.
-//! It must also have moved by three times the noise of the frames between: the
-//! mean length of the place's second differences, which are 0 in a steady motion. A slip begins
-//! with the second such frame in a row: when a force begins to change, a rolling shutter gives one
-//! frame whose markers do not move as before. While it slips, three fifths of the distance are
-//! enough.
+//! than those of its steady neighbours: for either frame, that difference of σ is added. It must
+//! also have moved by three times the noise of the frames between: the mean length of the place's
+//! second differences, which are 0 in a steady motion. A slip begins with the second such frame in
+//! a row: when a force begins to change, a rolling shutter gives one frame whose markers do not
+//! move as before. While it slips, three fifths of the distance are enough.
 
 use super::SlipLimits;
 use crate::force::Force;

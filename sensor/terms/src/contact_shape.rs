@@ -1,4 +1,4 @@
-//! Defines the shape of what presses the film, as far as it is known.
+//! Defines the shape of what presses the film, as far as known.
 
 use crate::units::Micrometres;
 

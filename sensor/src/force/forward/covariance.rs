@@ -1,6 +1,6 @@
-//! Describes what a model does not know about the images' motion, as a covariance of their
-//! coordinates. It interpolates between sizes and places of the load, and whitens: in white
-//! coordinates the covariance is the unit matrix.
+//! The covariance of the images' coordinates by which a model may be wrong. It interpolates between
+//! sizes and places of the load, and whitens: in white coordinates the covariance is the unit
+//! matrix.
 
 use super::pose::{Pose, limited};
 use super::solve::{Column, MOST_EQUATIONS, square};

@@ -1,4 +1,5 @@
-//! Steps downhill to the load that explains the markers best, each by the linearized film.
+//! Takes steps of falling residual to the load that explains the markers best, by the linearized
+//! film.
 
 use super::Forward;
 use super::covariance::{Covariance, Unknown, Whitening};

@@ -1,5 +1,5 @@
-//! Finds the force and its place that explain the markers' positions: a model of the film run
-//! forwards, and Gauss–Newton steps on it.
+//! Finds the force and its place that explain the markers' positions, by Gauss–Newton steps on a
+//! forward model of the film.
 //!
 //! N markers have 2·N coordinates, a contact has five unknowns. The network's answer is the first
 //! guess. Each step evaluates the film and its slopes there, and solves the linearized problem. The
@@ -17,12 +17,12 @@
 //! | `predict` | the positions of all images, with slopes |
 //! | `mounting` | where this unit's markers are glued, and how its camera sees them |
 //! | `solve` | 2·N equations, five unknowns |
-//! | `descent` | steps downhill from a guess |
-//! | `residual` | how large the residual of honest frames is |
-//! | `covariance` | what is unknown of the unit, in addition to the noise |
+//! | `descent` | steps of falling residual from a guess |
+//! | `residual` | how large the residual of undisturbed frames is |
+//! | `covariance` | uncertainty of the unit, in addition to the noise |
 //! | `weight` | the effect of the film's own weight |
-//! | `shapes` | the effect of the shape of what presses, of four markers |
-//! | `widths` | the effect of how wide the contact is, which more markers tell |
+//! | `shapes` | the effect of the contact's shape on four markers |
+//! | `widths` | the effect of the contact's width, which more markers show |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 //! | `three` | the same while a marker is lost |
 //! | `pair` | two contacts, where one does not explain the markers |
@@ -73,7 +73,7 @@ pub const MOST_STEPS: u8 = 3;
 /// Number of sizes at which the uncertainty of other units' strength is given.
 pub const RELATIVE: usize = 5;
 
-/// A film run forwards, borrowed from a model file.
+/// A forward model, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forward<'a> {
     /// Gauss–Newton steps from the network's guess, 0 to [`MOST_STEPS`]. With 0 the network's

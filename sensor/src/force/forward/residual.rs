@@ -1,5 +1,5 @@
 //! Limits of the residual: χ² with as many degrees of freedom as there are coordinates beyond the
-//! five unknowns. Few frames with nothing wrong exceed them.
+//! five unknowns. Few undisturbed frames exceed them.
 
 use super::solve::UNKNOWNS;
 

@@ -4,7 +4,7 @@
 //! A wide contact moves the images as a slightly larger force does, and off the middle to one side.
 //! A table holds this motion at knots of size and place: its mean over all shapes, its covariance
 //! over them, and its dependence on the radius of a round or flat contact. Film and markers are
-//! symmetric, so that places along +x and +y tell all others.
+//! symmetric, so places along +x and +y give all others.
 
 use super::Column;
 use super::covariance::{Covariance, CovarianceGrid, add_square};

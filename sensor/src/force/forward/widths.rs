@@ -1,11 +1,11 @@
-//! Knows how a contact of some width moves the images, compared with the tables' tip under the same
-//! force at the same centre of pressure. Its width is an unknown of the equations.
+//! Predicts how a contact of some width moves the images, compared with the tables' tip under the
+//! same force at the same centre of pressure. Its width is an unknown of the equations.
 //!
-//! Enough markers tell how wide a contact is. A soft disc's radius is the measure: a rigid face of
-//! 0.6 times that radius moves the images alike. A table holds the motions at knots of the place:
-//! polynomials in size and width, and, as standard deviations, what a contact that is longer than
-//! wide, leans, or presses with its rim moves in addition. Film and markers are symmetric, so that
-//! places along +x and +y tell all others.
+//! Enough markers show how wide a contact is. Width is given as a soft disc's radius; a rigid face
+//! of 0.6 times that radius moves the images alike. A table holds the motions at knots of the
+//! place: polynomials in size and width, and standard deviations of the additional motion by
+//! contacts that are longer than wide, lean, or press with their rim. Film and markers are
+//! symmetric, so places along +x and +y give all others.
 
 use super::Column;
 use super::covariance::{Covariance, add_square, between};

@@ -1,7 +1,7 @@
 //! Implements kernels for Cortex-M4 and M7 in assembly, scheduled for the M7's two issues a cycle.
 //!
-//! All of them but that of two contacts lie in sections `.itcm.*`, which a linker script can put
-//! into the memory nearest to the core. Cycles are those of LLVM's model of the core (`llvm-mca
+//! All except that of two contacts lie in sections `.itcm.*`, which a linker script can put into
+//! the memory nearest to the core. Cycles are those of LLVM's model of the core (`llvm-mca
 //! -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7`, the block between a label and the branch back
 //! to it), with weights and inputs in memory without wait states.
 //!

@@ -16,7 +16,7 @@ use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_terms::threshold::PixelFormat;
 
-/// Offset of the film run forwards in models with a network: after the places.
+/// Offset of the forward model in models with a network: after the places.
 pub const FORWARD_OFFSET: usize = 456;
 
 /// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
@@ -28,9 +28,9 @@ pub struct ModelSpec {
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// Its layers, first to last: 1 to 8, or none for a film run forwards without a network.
+    /// Its layers, first to last: 1 to 8, or none for a forward model without a network.
     pub layers: Vec<LayerSpec>,
-    /// The film run forwards.
+    /// The forward model.
     pub forward: Option<ForwardSpec>,
     /// What the outputs are.
     pub output: OutputKind,

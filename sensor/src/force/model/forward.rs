@@ -1,4 +1,4 @@
-//! Reads and writes the model file's section on the film run forwards.
+//! Reads and writes the model file's section on the forward model.
 
 use super::{ModelError, reader::Reader};
 use crate::force::forward::{
@@ -256,7 +256,7 @@ fn float(
     })
 }
 
-/// A film run forwards, to be written. The fields mean what [`Forward`]'s do.
+/// A forward model, to be written. The fields are those of [`Forward`].
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForwardSpec {

@@ -1,4 +1,4 @@
-//! Holds the model file: a quantized network with its input scaling, the film run forwards, and the
+//! Holds the model file: a quantized network with its input scaling, the forward model, and the
 //! conditions that they were made for.
 //!
 //! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves
@@ -64,7 +64,7 @@ pub struct Model<'a> {
     pub range: CalibratedRange,
     /// How uncertain its forces are.
     pub uncertainty: Uncertainty,
-    /// The film run forwards, which improves the network's answer.
+    /// The forward model, which improves the network's answer.
     pub forward: Option<Forward<'a>>,
     crc: u32,
     layers: [Layer<'a>; MAX_LAYERS],

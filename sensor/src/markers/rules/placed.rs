@@ -1,9 +1,9 @@
-//! Finds the markers of any layout by where they rest.
+//! Finds the markers of any layout by their rest places.
 //!
 //! Each marker is nearest to its own rest place: loads within ±6 mm of the middle, up to 200 mN,
 //! move no marker half the way to another one's. An image that is not whole, or shares its rest
-//! place with another, is no marker. What is left of the rules for four markers: the film that
-//! explains more markers than it must exposes one that lies.
+//! place with another, is no marker. The other rules for four markers are not needed: the residual
+//! of the redundant markers exposes a false one.
 
 use super::pattern::{distance, larger};
 use super::shape::Shape;

@@ -1,7 +1,7 @@
-//! Knows how two contacts differ from the mean of single ones, as a small network.
+//! Predicts how two contacts differ from the mean of single ones, by a small network.
 //!
-//! Each single contact has the size of both together, and counts by its part of the force. The
-//! mean is exact if both contacts are at one place, or one has no force. What is left is the
+//! Each single contact has the size of both together, and is weighted by its part of the force. The
+//! mean is exact if both contacts are at one place, or one has no force. The difference is the
 //! network's output times a factor that vanishes there.
 
 use super::film::Both;

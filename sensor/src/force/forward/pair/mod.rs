@@ -1,15 +1,15 @@
 //! Finds the two contacts that explain the markers, where one does not.
 //!
 //! Two contacts have ten unknowns, eight markers sixteen coordinates. The motion under both is a
-//! mean of two single ones, and what a small network adds to it (`interaction`). This is for
-//! needles: a wide contact is not two.
+//! mean of two single ones, plus a small network's correction (`interaction`). It is valid for
+//! needles only.
 //!
 //! | file | subject |
 //! |---|---|
-//! | `interaction` | what a network adds to the mean of single contacts |
+//! | `interaction` | a network's correction of the mean of single contacts |
 //! | `network` | the network |
 //! | `film` | the positions of all images, with slopes |
-//! | `descent` | steps downhill from a start |
+//! | `descent` | steps of falling residual from a start |
 //! | `search` | where steps begin; both in parts, for a device with little time |
 
 mod descent;

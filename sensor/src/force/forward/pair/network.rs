@@ -1,9 +1,9 @@
 //! The network for two contacts: layers of channels, each with a value for every image of a pair.
 //!
-//! A layout that looks the same if mirrored along x or y moves likewise, and contacts have no
-//! order: a pair has eight images. A channel has a value for each. Sums of these with the signs of
-//! a parity change at most their sign from image to image, as inputs and outputs do. So between the
-//! layers each parity has weights of its own: an eighth of those that all values would have.
+//! A layout that is symmetric about x and y moves symmetrically, and contacts have no order: a pair
+//! has eight images. A channel has a value for each. Sums of these with the signs of a parity
+//! change at most their sign from image to image, as inputs and outputs do. So between the layers
+//! each parity has weights of its own: an eighth of those that all values would have.
 
 use crate::force::kernels::{APART, Number, products};
 
