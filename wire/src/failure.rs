@@ -1,4 +1,4 @@
-//! Defines what a device tells about the failure that last ended its program.
+//! Defines a device's report of the failure that last ended its program.
 
 use heapless::String;
 use postcard_schema::Schema;

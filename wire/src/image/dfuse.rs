@@ -1,4 +1,4 @@
-//! Files for other tools that write by the chip's loader: ST's DfuSe format (UM0391).
+//! Writes firmware files for other tools that use the chip's loader: ST's DfuSe format (UM0391).
 
 use super::Image;
 use crate::image::{FIRST_STAGE, PROGRAM};

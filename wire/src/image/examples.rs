@@ -1,4 +1,4 @@
-//! Images for tests of what reads, sends or writes them.
+//! Images for tests.
 
 use crate::image::header::{CRC_AT, Header, Mark, UNSEALED};
 use crate::image::{FIRST_STAGE, HEADER_AT, Image, MARK_AT, PROGRAM};

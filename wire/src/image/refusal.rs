@@ -1,4 +1,4 @@
-//! Why a file is not written.
+//! Reasons why a firmware file is refused.
 
 use crate::image::header::{CHIP, LAYOUT};
 use std::fmt;
