@@ -1,18 +1,16 @@
-//! Keeps what ended the program, so that the next start can tell the host.
+//! Records what ended the program, so that the next start can report it to the host.
 //!
-//! # Design
-//! The record is at the end of DTCM (`memory.x`). A reset leaves it, only power-on does not, after
-//! which it is not read. The core writes DTCM past the caches, so that the record is in memory when
-//! the reset comes. It needs no clock and no key, as the backup domain would, which a small battery
-//! or capacitor also keeps through a short power cut. Each of its words is one of its error
-//! correction.
+//! # Design The record is at the end of DTCM (`memory.x`). It survives a reset, but not power-on,
+//! after which it is not read. The core writes DTCM past the caches, so the record is in memory
+//! when the reset comes. The backup domain would need a clock and a key, and a small battery or
+//! capacitor keeps it through a short power cut. Each word of the record is one word of DTCM's
+//! error correction.
 //!
 //! `hard_fault.s` enters [`hard_fault`] with a stack of its own, as the program's may be used up.
 //! Nothing here can panic.
 //!
-//! # Limitations
-//! Where thread mode stood before the watchdog's reset is unknown: this microcontroller's watchdog
-//! has no interrupt.
+//! # Limitations The program counter before a watchdog's reset is unknown: this microcontroller's
+//! watchdog has no interrupt.
 
 use crate::HEADER;
 use core::panic::PanicInfo;

@@ -8,8 +8,8 @@
 //!                                         └→ memory → flash
 //! ```
 //!
-//! Which task may interrupt which: [`priorities`]. Their shared state: `docs/firmware.md`. Memory
-//! layout: `memory.x`, [`caches`]. Nothing is allocated after boot.
+//! Which task may interrupt which: [`priorities`]. Their shared state: `docs/shared-state.md`.
+//! Memory layout: `memory.x`, [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Sends the samples over a UART, too: to a robot's controller without USB, or a second reader.
+//! Also sends the samples over a UART, for a robot's controller without USB, or a second reader.
 //!
 //! # Design
 //! It is always on and only sends, so it needs neither a host nor a setting. The messages and

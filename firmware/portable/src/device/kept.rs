@@ -1,4 +1,4 @@
-//! The settings in use against the kept ones.
+//! Compares the settings in use with the kept ones.
 
 use crate::device::settings::{InUse, drift};
 use hivtac_wire::kept::Record;

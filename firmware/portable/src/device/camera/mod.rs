@@ -1,5 +1,5 @@
-//! The facts of each camera on which forces and answers depend. The firmware's drivers have the
-//! registers that bring them about.
+//! The properties of each camera on which forces and answers depend. The firmware's drivers set its
+//! registers accordingly.
 
 pub mod mt9v034;
 pub mod ov5640;

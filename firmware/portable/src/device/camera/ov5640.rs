@@ -1,7 +1,7 @@
 //! OmniVision OV5640: 320 × 240, RGB565 or YUV422, rows exposed one after the other.
 //!
-//! Frames and model are those of the OV7725: with a lens of 1.8 mm, the window makes a radian as
-//! many pixels.
+//! Frames and model are those of the OV7725: with a lens of 1.8 mm, the window has as many pixels a
+//! radian.
 
 use super::{Facts, Rolling};
 use hivtac_sensor::motion::Motion;
