@@ -1,4 +1,4 @@
-//! Says what ended a device's program in an earlier run, and how to find the source line.
+//! Formats what ended a device's program in an earlier run, and how to find the source line.
 
 use hivtac_host::shown::shown;
 use hivtac_wire::failure::{Failure, FailureKind};

@@ -1,4 +1,4 @@
-//! What the sensing found in a picture, as text and as JSON.
+//! Formats the sensing's result for a picture as text and as JSON.
 
 use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};

@@ -1,4 +1,4 @@
-//! The sensing of one picture, which nothing came before.
+//! The sensing of a single picture, without earlier frames.
 
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::blob::Blob;

@@ -1,4 +1,4 @@
-//! `hivtac replay`: answers as the recorded device would, from a recording.
+//! `hivtac replay`: answers as the recorded device did.
 
 use crate::output::{Reader, note, print};
 use clap::Args;

@@ -1,5 +1,5 @@
-//! A conversation with a device. While anything waits, the interpreter's lock is free, and so is
-//! the connection's own: one thread may take samples while another waits for a picture.
+//! A conversation with a device. A wait holds neither the interpreter's lock nor the connection's
+//! own: one thread may take samples while another waits for a picture.
 
 use crate::convert::{self, MarkerNumbers, RestNumbers, SampleNumbers, TareNumbers};
 use crate::error::{Error, raised};

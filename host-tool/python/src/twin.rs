@@ -1,5 +1,5 @@
-//! The simulated sensor in a program's own time: it is pressed as the program says, and gives the
-//! samples of the frames that are whole by then.
+//! The simulated sensor in a program's own time: the program presses it, and gets the samples of
+//! finished frames.
 
 use crate::convert::{self, SampleNumbers};
 use crate::error::{Error, raised};

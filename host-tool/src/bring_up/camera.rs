@@ -1,4 +1,4 @@
-//! Checks board and camera: their identities, and whether the camera holds what was written to it.
+//! Checks board and camera: their identities, and whether registers read back as written.
 
 use super::complaints::hear;
 use super::device::reason;

@@ -1,4 +1,4 @@
-//! Checks with a finger's presses that right is right and below is below.
+//! Checks the camera's orientation with a finger's presses.
 
 use super::report::Step;
 use crate::output::note;

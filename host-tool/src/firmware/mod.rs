@@ -1,5 +1,5 @@
 //! `hivtac update firmware`: checks an image, starts the device's own loader, writes the image by
-//! it, and looks which version came back.
+//! it, and reports the new version.
 
 mod carried;
 mod dfuse;

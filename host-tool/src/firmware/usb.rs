@@ -1,4 +1,4 @@
-//! The USB of a microcontroller's own loader: found, opened, and its control transfers.
+//! The USB of a microcontroller's own loader: finds and opens it, and makes its control transfers.
 
 use super::dfuse::{Loader, Trouble};
 use dfu_core::functional_descriptor::FunctionalDescriptor;

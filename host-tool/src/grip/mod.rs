@@ -7,7 +7,7 @@
 //! - common wrench: F₁ + F₂ and c₁ × F₁ + c₂ × F₂, what the object does to both fingers. An object
 //!   that is held still shows its weight;
 //! - friction margin: the smaller one of μ N − T, of a finger pressed with N along its film's z and
-//!   pulled with T across: how much more may pull before the object slips.
+//!   pulled with T across: the pull that is left before the object slips.
 //!
 //! Standard uncertainties come from those of both forces and places, to first order.
 

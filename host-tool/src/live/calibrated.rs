@@ -1,9 +1,8 @@
 //! The simulated sensor as a calibrated unit: its dots move as the unit's own model has it.
 //!
-//! A unit's model holds its film as it was mounted, stretched or not, and its camera: how the image
-//! of each dot moves under any press. The simulated camera shows dots that rest and move there. So
-//! its samples are what that unit says of a press, with noise. They do not show how well the model
-//! knows the unit: what it is wrong by is not in it.
+//! A unit's model holds its film as mounted, stretched or not, and its camera: how the image of
+//! each dot moves under any press. The simulated camera shows dots that rest and move there. So its
+//! samples are that unit's answers to a press, with noise. They lack the model's own errors.
 
 use super::camera::Kind;
 use super::hand::MOST_N;

@@ -1,4 +1,4 @@
-//! What the camera sees: the scene, its disturbances, and what presses it.
+//! Renders the camera's picture: the scene, its disturbances, and what presses it.
 
 use super::calibrated::CalibratedFilm;
 use super::camera::{Camera, Kind};

@@ -1,9 +1,9 @@
 //! The film under two needles, as the sensing's own model has it.
 //!
-//! The film's tables have one contact. Under two it moves by the mean of two single motions, and
-//! the dots by what the network of `hivtac_sensor::force::forward::pair` adds. So the live twin
-//! shows what the sensing knows of two contacts, and not how well it knows that: for its errors
-//! `docs/results/touches.md` has finite elements.
+//! The film's tables have one contact. Under two, film and dots move by the mean of two single
+//! motions, and the dots also by the network of `hivtac_sensor::force::forward::pair`. So the live
+//! twin has the sensing's own model of two contacts, without its errors; `docs/results/touches.md`
+//! has those, by finite elements.
 
 use super::hand::{MOST_N, Press};
 use hivtac_sensor::force::forward::pair::{Both, Interaction};

@@ -1,7 +1,7 @@
 //! Reads the records of an MCAP file, past damaged parts.
 //!
-//! A chunk begins with a header whose lengths must agree, and has a checksum. Where records cannot
-//! be followed, the next such header is looked for.
+//! A chunk begins with a header whose lengths must agree, and has a checksum. After damaged records
+//! it searches for the next such header.
 
 use std::fmt::{self, Display, Formatter};
 use std::io::{self, Read, Seek, SeekFrom};

@@ -1,5 +1,5 @@
-//! Tests an update of the firmware as far as it goes without USB: what is refused before the device
-//! is asked, and a loader that does not appear. `src/firmware/tests.rs` has the rest.
+//! Tests a firmware update without USB: files that are refused at once, and a loader that does not
+//! appear. `src/firmware/tests.rs` has the rest.
 
 use crate::fake::*;
 use crate::run::*;
