@@ -1,7 +1,7 @@
-//! Measures what the sensor's model leaves of pairs that it has not seen, for the network's file:
-//! `cargo run --release -p hivtac-calibration --example pairs_left -- unseen.csv
-//! sensor/data/pairs-8v.bin`. The pairs are those of `pairs -- unseen.csv 600 unseen`. What is left
-//! has the errors of the network, of the tables and of a coarser mesh.
+//! Measures the errors of the sensor's model on unseen pairs, for the network's file: `cargo run
+//! --release -p hivtac-calibration --example pairs_left -- unseen.csv sensor/data/pairs-8v.bin`.
+//! The pairs are those of `pairs -- unseen.csv 600 unseen`. The errors are those of the network, of
+//! the tables and of a coarser mesh.
 
 use std::fs;
 

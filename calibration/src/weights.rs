@@ -33,7 +33,7 @@ pub struct Weights {
     pub uncertainty: Uncertainty,
     /// How it was trained, for the reader.
     pub training: Training,
-    /// The film run forwards, which improves the network's answer.
+    /// The forward model, which improves the network's answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmModel>,
     /// The network; none for other layouts than the square of four dots.

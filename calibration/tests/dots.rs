@@ -1,5 +1,5 @@
-//! Measures what frames of a film with eight dots tell: by area and force, and by what befalls a
-//! dot. These are tables of `docs/results/dots.md`.
+//! Measures forces from frames of a film with eight dots, by area and force, and by faults of a
+//! dot: tables of `docs/results/dots.md`.
 
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::status::Status;

@@ -1,5 +1,5 @@
 //! Tests frames of a film with eight dots through the sensor's own code: identities by the rest
-//! position, a force with an honest uncertainty, also without a dot, and clear refusals.
+//! position, a force with a correct uncertainty, also without a dot, and clear refusals.
 
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::forward::{self, layout_model, layout_scene, layout_weights};

@@ -1,6 +1,6 @@
 //! Tests training, import and export at extreme numbers (`docs/numerics.md`). Tests that measure
 //! print a row of that document's table: `cargo test --release -p hivtac-calibration --test
-//! numerics -- --nocapture`.
+//! calibration -- numerics --nocapture`.
 
 use std::collections::HashMap;
 

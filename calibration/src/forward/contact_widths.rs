@@ -1,9 +1,9 @@
 //! Computes how the width of a contact moves the images of a layout's dots, compared with the
 //! nominal tip.
 //!
-//! What a wide contact changes depends on where it is from a dot, and hardly on where it is on the
-//! film. So the film is pressed at a few places, and what it does at a distance from there is
-//! interpolated between them.
+//! The effect of a wide contact depends on its distance from a dot, and hardly on its place on the
+//! film. So the film is pressed at a few places, and its motion at a distance is interpolated
+//! between them.
 
 use crate::parallel;
 use std::f64::consts::{FRAC_PI_2, TAU};

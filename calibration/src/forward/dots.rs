@@ -1,5 +1,5 @@
-//! The film run forwards for any layout of dots: its tables come from those of the whole film, so
-//! that a layout needs no new finite elements.
+//! The forward model of any layout of dots: its tables come from those of the whole film, so a
+//! layout needs no new finite elements.
 
 use crate::parallel;
 use anyhow::{Result, anyhow};

@@ -1,5 +1,4 @@
-//! The model file of a layout of dots on the nominal film: the film run forwards, without a
-//! network.
+//! The model file of a layout of dots on the nominal film: a forward model without a network.
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use hivtac_sensor::force::forward::{Markers, Noise};

@@ -1,5 +1,5 @@
-//! The film run forwards, from the known numbers of a unit: a few numbers in a weights file, tables
-//! in a model file.
+//! The forward model, from the known numbers of a unit: a few numbers in a weights file, tables in
+//! a model file.
 
 mod contact_shapes;
 mod contact_widths;

@@ -1,4 +1,4 @@
-//! Explains in words what a fit's χ² says of its loads, and what to do about it.
+//! Explains a fit's χ² in words: what it says of the loads, and what to do.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! Computes what gravity does to a unit's film when it is turned, by finite elements.
+//! Computes the effect of gravity on a unit's film when it is turned, by finite elements.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::forward::Stiffness;

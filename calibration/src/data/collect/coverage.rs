@@ -1,5 +1,5 @@
-//! What presses anywhere cover: places on the film by ranges of force, and what is still missing.
-//! Both as text and maps for a person.
+//! The coverage of presses anywhere: which places and ranges of force are covered or missing, as
+//! text and maps.
 
 use std::fmt;
 
