@@ -1,6 +1,6 @@
-//! A sensor whose pixels see one colour each. Its picture has twice the resolution of a frame: of
-//! four pixels of one colour that are nearest to each other it makes the mean, and from these means
-//! all colours of each pixel of the frame.
+//! A sensor whose pixels see one colour each. Its picture has twice the resolution of a frame. It
+//! averages the nearest four pixels of one colour, and interpolates all colours of the frame's
+//! pixels from these means.
 
 use crate::exposure::Image;
 use crate::light::Channel;

@@ -1,4 +1,4 @@
-//! The film's answer to a load, complete or simplified: it shows what each part is worth.
+//! The film's answer to a load, complete or simplified, to measure the effect of each part.
 
 use crate::film::DiscMotion;
 use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};

@@ -1,4 +1,4 @@
-//! What a power-on leaves in the memories: nothing that a program may rely on.
+//! The memories after a power-on: contents on which no program may rely.
 
 use rigless::emulator::Memory;
 use rigless::soc::Width;

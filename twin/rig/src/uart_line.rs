@@ -1,4 +1,4 @@
-//! What hangs on the UART for samples: it keeps what the device sends, and when.
+//! Records bytes and times of the UART for samples.
 
 use rigless::chip::Timeline;
 use rigless::chip::uart::Peer;

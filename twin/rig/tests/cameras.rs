@@ -1,5 +1,5 @@
 //! Tests that the other cameras have the properties of the first one: the second board's MT9V034,
-//! and an OV5640 in the first board's socket. What is one camera's own is in its file.
+//! and an OV5640 in the first board's socket. Tests of a single camera are in its file.
 
 use crate::common::{Bug, Run, Setup, other};
 use crate::{openmv, ov5640};

@@ -1,5 +1,5 @@
-//! Tests of what a device tells of the failure that ended its program, with firmware that has
-//! seeded bugs, and of starts that fail again and again.
+//! Tests of the report of a failure that ended the program, with firmware that has seeded bugs, and
+//! of starts that fail repeatedly.
 
 use crate::common::{Bug, Run, Setup, command, elf, firmware, hello, other};
 use hivtac_rig::report::Report;

@@ -1,4 +1,4 @@
-//! Tests of the UART for samples: it has what USB has, without a host, and at its rate.
+//! Tests of the UART for samples: it sends USB's samples without a host, at its rate.
 
 use crate::common::{Run, Setup, firmware, openmv};
 use hivtac_rig::script::Action;

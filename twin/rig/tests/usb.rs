@@ -1,5 +1,5 @@
 //! Tests of control transfers of any kind: the device answers, stalls unknown ones, and goes on.
-//! `usb_dead.rs` has what may end USB.
+//! `usb_dead.rs` has faults that may stop USB.
 
 use crate::common::{Run, Setup, firmware};
 use hivtac_rig::script::Action;

@@ -1,4 +1,4 @@
-//! Tests of what may make USB dead: transfers that are cut, packets that nobody fetches, hosts that
+//! Tests of faults that may stop USB: cut transfers, packets that no host fetches, hosts that
 //! pause. Without a camera the core sleeps, and virtual time costs little.
 
 use crate::common::{Run, Setup, command, firmware, hello};

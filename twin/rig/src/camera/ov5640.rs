@@ -1,10 +1,10 @@
 //! The OV5640: turns a scene into its output by its registers.
 //!
 //! The picture is that of the window for which the sensor's lens is meant, 2352 × 1764 of the
-//! array, at 320 × 240; outside it is black. Of the PLL's tree only what feeds lines and PCLK is
-//! simulated. After a reset the pins are no outputs, so nothing is sent. Not simulated: banding,
-//! night mode, lens correction, sharpening and smoothing, automatic white balance (a captured frame
-//! with it breaks a rule), the microcontroller, the focus motor.
+//! array, at 320 × 240; outside it is black. Of the PLL's tree only the branches to lines and PCLK
+//! are simulated. After a reset the pins are no outputs, so nothing is sent. Not simulated:
+//! banding, night mode, lens correction, sharpening and smoothing, automatic white balance (a
+//! captured frame with it breaks a rule), the microcontroller, the focus motor.
 
 use super::colour::Colour;
 use super::output::{Format, Output, Window};

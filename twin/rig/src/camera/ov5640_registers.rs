@@ -1,8 +1,8 @@
 //! The OV5640's register file: addresses, values after a reset, and the registers that only the
 //! sensor writes.
 //!
-//! Sources: the drivers of Linux, OpenMV, esp32-camera and GreenWaves, which also tell the meaning
-//! of bits. Values after a reset are known for some registers only; all others count as zero, and a
+//! Sources: the drivers of Linux, OpenMV, esp32-camera and GreenWaves, also for the meaning of
+//! bits. Values after a reset are known for some registers only; all others count as zero, and a
 //! picture must not depend on them ([`RECOMMENDED`]).
 
 /// System control: reset (bit 7), standby (bit 6).

@@ -1,5 +1,5 @@
-//! What programs on this machine use: here the serial port, as a TCP port, a pseudo-terminal, or
-//! both; one client at a time. [`crate::usbip`] has the device itself.
+//! The device's serial port for programs on this machine: a TCP port, a pseudo-terminal, or both;
+//! one client at a time. [`crate::usbip`] has the device itself.
 
 mod pty;
 mod tcp;

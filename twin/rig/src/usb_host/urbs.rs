@@ -1,5 +1,5 @@
-//! The transfers of a host that is another program: it decides what is asked, the rig's host makes
-//! the transactions.
+//! The transfers of another program as host: it decides on them, and the rig's host makes the
+//! transactions.
 //!
 //! Endpoints take turns, one transaction each; a transfer of an endpoint waits for those before it.
 //! A transfer that the device does not acknowledge waits on.

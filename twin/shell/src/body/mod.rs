@@ -6,8 +6,9 @@
 //! stiffness is large enough not to matter.
 //!
 //! The contact sticks as a whole. The body moves along x and y as the mean of the points that bear
-//! it, weighted by their pressure. What the normal pressure does not bear of the force along x and
-//! y is spread over them in proportion to it, on the middle surface. The body does not turn.
+//! it, weighted by their pressure. The rest of the force along x and y, which the normal pressure
+//! does not bear, is spread over them in proportion to it, on the middle surface. The body does not
+//! turn.
 
 mod newton;
 mod points;

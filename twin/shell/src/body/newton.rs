@@ -3,7 +3,7 @@
 //! Unknowns are the film's and the height of the body's foot. Along x and y the foot goes with the
 //! film: it keeps its distance from the mean place of the points that bear it (`shares`). A force
 //! on the body along x and y therefore acts on the film by these shares, less what the contact's
-//! normal pressure already bears. All of that is one energy, U(u) + E(u, foot) − F · foot.
+//! normal pressure already bears. Together these are one energy, U(u) + E(u, foot) − F · foot.
 
 use crate::ShellError;
 use crate::body::points::{Bearing, First, Points};

@@ -1,4 +1,4 @@
-//! What a film's own differences, and another tip, add to the motion of the whole film.
+//! The motion that a film's own differences, and another tip, add to the whole film.
 
 use std::sync::LazyLock;
 
