@@ -1,5 +1,4 @@
-//! Measures how near the sensor's errors come to the least that four markers allow, anywhere on the
-//! film.
+//! Compares the sensor's errors anywhere on the film with the Cramér–Rao bound of four markers.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

@@ -1,4 +1,4 @@
-//! Presses by objects that are no needles, by the full solver, and what the sensing makes of them.
+//! The sensing's answers to presses by objects other than needles, solved by finite elements.
 
 mod objects;
 mod reading;

@@ -1,4 +1,4 @@
-//! Draws objects that press the film, and solves what they do to it, with the truth.
+//! Draws objects that press the film, and solves the film under them, with the truth.
 
 use anyhow::{Context, Result};
 use hivtac_shell::{Body, Ends, Equilibrium, Film, Patch, Shape};

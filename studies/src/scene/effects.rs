@@ -1,5 +1,5 @@
-//! `scene effects`: what a film that lets light through, LEDs that mirror themselves, and the
-//! pixels of a colour camera cost.
+//! `scene effects`: the errors by a film that lets light through, by mirrored LEDs, and by the
+//! pixels of a colour camera.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;

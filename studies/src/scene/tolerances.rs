@@ -1,4 +1,4 @@
-//! `scene tolerances`: what each dimension of the kit costs when it is off by its tolerance.
+//! `scene tolerances`: the errors by each dimension of the kit at its tolerance.
 
 use std::fmt::Write;
 use std::path::PathBuf;

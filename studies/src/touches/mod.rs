@@ -1,4 +1,4 @@
-//! Two contacts at once on a layout of more dots, and what is neither one nor two.
+//! The sensing's answers to two contacts at once on a layout of more dots, and to other presses.
 
 mod presses;
 mod row;
@@ -63,7 +63,7 @@ pub struct Touches {
     json: bool,
 }
 
-/// The sensor's film run forwards, with centroids in place of frames.
+/// The sensor's forward model, with centroids in place of frames.
 struct Bench<'a> {
     forward: Forward<'a>,
     mounting: Mounting,

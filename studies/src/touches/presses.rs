@@ -1,4 +1,4 @@
-//! The presses: one, two and three needles, and what is no needle.
+//! The presses: one, two and three needles, and other objects.
 
 use std::f64::consts::TAU;
 use std::fmt;

@@ -1,4 +1,4 @@
-//! What becomes of the frames of a kind of press.
+//! Sums up the answers to the frames of a kind of press.
 
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::forward::Strength;
