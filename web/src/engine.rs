@@ -1,4 +1,4 @@
-//! One sensor at a time, simulated or connected, and what the page asks of it.
+//! One sensor at a time, simulated or connected, and the page's requests to it.
 
 use crate::conversation::{Conversation, Heard, Job, PATIENCE, Ticket};
 use crate::recorder::{Recorded, Recorder};

@@ -1,5 +1,5 @@
-//! What the page's scripts call. Bytes go in and out through one buffer each: the scripts write
-//! into [`reserve`]'s memory before a call, and read [`taken`]'s after it.
+//! Functions that the page's scripts call. Bytes go in and out through one buffer each: the scripts
+//! write into [`reserve`]'s memory before a call, and read [`taken`]'s after it.
 
 use crate::engine::Engine;
 use crate::firmware::Firmware;

@@ -1,4 +1,4 @@
-//! New firmware for a device, of a file that the user chose: checked, and divided into what the
+//! New firmware for a device, from the user's file: checked, and divided into blocks that the
 //! page's script writes by the device's loader.
 
 use hivtac_wire::image::{FIRST_LOOK, Image, PROGRAM};
