@@ -1,6 +1,6 @@
 //! Linux itself as the USB host of the rig: a Debian kernel in QEMU attaches the emulated device by
-//! USB/IP, and does to its port what Linux can do. Forces come back, and the kernel warns of
-//! nothing.
+//! USB/IP, and resets, suspends and unplugs its port. Forces must continue, and the kernel must not
+//! warn.
 
 use std::path::Path;
 use std::process::Command;

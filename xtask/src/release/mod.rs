@@ -1,5 +1,5 @@
-//! `cargo xtask release`: makes and checks the files of a release. The scripts beside this file do
-//! what only runs other programs; `.github/workflows/release.yml` runs one of them, too.
+//! `cargo xtask release`: makes and checks the files of a release. The scripts in this folder only
+//! run other programs; `.github/workflows/release.yml` also runs one of them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
