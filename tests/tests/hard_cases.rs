@@ -1,4 +1,4 @@
-//! Tests of the scene's hard cases: each is correct or rejected, never silently wrong. Honest
+//! Tests of the scene's hard cases: each is correct or rejected, never silently wrong. Undisturbed
 //! frames must not be refused for that.
 
 use std::fmt::Debug;

@@ -1,5 +1,5 @@
 //! Tests of the scene's hard cases under contacts anywhere, with the committed model that gives
-//! places. Each is right or refused, never silently wrong, and honest frames are not refused.
+//! places. Each is right or refused, never silently wrong, and undisturbed frames are not refused.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,5 +1,5 @@
-//! Tests of the marker rules on rendered frames: every honest frame passes, and no false one has an
-//! error beyond a bound.
+//! Tests of the marker rules on rendered frames: every undisturbed frame passes, and no false one
+//! has an error beyond a bound.
 
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::PixelFormat;

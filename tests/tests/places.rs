@@ -1,5 +1,5 @@
-//! Tests that honest contacts anywhere get a force from a model that gives places, and that few of
-//! them get one from a model that does not.
+//! Tests that contacts anywhere get a force from a model that gives places, and that few of them
+//! get one from a model that does not.
 
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::Contacts;

@@ -1,4 +1,4 @@
-//! Tests of tares: a tare of bad markers is refused, or harmless; honest units are tared.
+//! Tests of tares: a tare of bad markers is refused, or harmless; faultless units are tared.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;

@@ -1,4 +1,5 @@
-//! Tests `hivtac view --twin` in a real browser: a press by pointer events, read beside the truth.
+//! Tests `hivtac view --twin` in a real browser: a press by pointer events, compared with the
+//! truth.
 
 use std::env;
 use std::path::PathBuf;

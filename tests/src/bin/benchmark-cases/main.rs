@@ -1,6 +1,6 @@
 //! `benchmark-cases FOLDER`: writes the scripts that `cargo xtask bench` runs, one file each, and
-//! prints what they are, one JSON object a line: `{"name":…,"file":…}`. What a board's program can
-//! measure of them it writes as `board.rs`, too, for `firmware/examples/benchmark`.
+//! lists them, one JSON object a line: `{"name":…,"file":…}`. Those that a board can measure it
+//! also writes as `board.rs`, for `firmware/examples/benchmark`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
