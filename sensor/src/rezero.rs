@@ -40,7 +40,7 @@ const LONGEST_GAP_US: u64 = 100_000;
 /// Most frames of a mean: 65 s of frames of a millisecond. Sums are below 2⁴⁸.
 const MOST_FRAMES: u32 = 1 << 16;
 
-/// What a frame shows about the rest position.
+/// A frame's evidence about the rest position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RestChange {
     /// No result: no second of the untouched film ends with this frame.
@@ -380,8 +380,8 @@ mod tests {
         assert_eq!(film.right(), 0.0);
     }
 
-    /// A second of frames shows how far the film rests from the rest position, whether or not that
-    /// moves. A followed drift is no longer a drift.
+    /// A second of frames gives the film's distance from the rest position, even if that does not
+    /// follow. A followed drift is no longer a drift.
     #[test]
     fn how_far_the_film_was_seen_from_there_stays_until_it_is_seen_again() {
         let mut film = Followed::new();

@@ -17,7 +17,7 @@ use hivtac_terms::units::{
     MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
-/// Where a unit's markers rest, and what follows from that before the first frame.
+/// A unit's rest position, with the values derived from it before the first frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resting {
     pub(super) mounting: Mounting,
@@ -41,7 +41,7 @@ const UNEXPLAINED_BLURRED: f32 = 5.0;
 const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// A contact of unknown or wide shape this near to a marker, mm, moves it in ways that the tables
 /// of shapes do not have: by these factors the uncertainties of direction, |F| and place are too
-/// small. Chosen on presses beside markers (`hivtac-studies contacts --near-dots --seed 11`).
+/// small. Chosen on presses near markers (`hivtac-studies contacts --near-dots --seed 11`).
 const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
 /// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on
@@ -294,8 +294,8 @@ impl Resting {
     }
 
     /// Returns whether a force that one contact explains badly may be given. The contact must not
-    /// be known to be a needle: what a needle leaves over is a fault. And the uncertainties,
-    /// widened by what is left over, must be of use.
+    /// be known to be a needle, whose residual shows a fault. And the uncertainties, widened by the
+    /// residual, must be of use.
     fn may_be_loose(&self, force: &Force) -> bool {
         let (direction, magnitude, place) = OF_USE;
         self.shape != ContactShape::Needle

@@ -24,10 +24,10 @@ const LASTING_SCATTER: f32 = 0.15;
 /// A shift of a marker, px, that noise may seem to make (seen: 0.008). It is less than the noise of
 /// a marker's place.
 const EVEN_PX: f32 = 0.01;
-/// The shift is known to a factor of this: it depends on colours that were not looked at, and on
-/// how sharp the marker's edge is.
+/// The shift is uncertain by this factor: it depends on unknown colours and on the sharpness of the
+/// marker's edge.
 const UNKNOWN_COLOUR: f32 = 1.25;
-/// What shows through the film and makes a marker this uncertain, 0.03 px, disturbs a frame.
+/// A frame is disturbed if light through the film makes a marker this uncertain, 0.03 px.
 const DISTURBED: Px = Px(1_966);
 /// Largest variance that is accepted, relative to the modelled one. Beyond it the residual no
 /// longer separates good frames from bad. A camera with 4 times the noise reaches 7.
@@ -42,7 +42,7 @@ pub struct FrameNoise {
     pub blur: Px,
     /// Another one, of markers whose motion changes (`Motion::unsteadiness`).
     pub motion: Px,
-    /// Another one, of markers beside which something shows through the film.
+    /// Another one, of markers next to which something shows through the film.
     pub beside: Px,
 }
 
@@ -55,7 +55,7 @@ impl FrameNoise {
         beside: Px(0),
     };
 
-    /// Whether what shows through the film is more than noise.
+    /// Whether light through the film disturbs it.
     pub fn is_disturbed(&self) -> bool {
         self.beside >= DISTURBED
     }
@@ -75,9 +75,9 @@ pub struct NoiseLevel {
     lasting: f32,
     /// Uncertainty of the current frame's markers by their motion.
     motion: Px,
-    /// And by what shows through the film beside them.
+    /// And by light through the film next to them.
     beside: Px,
-    /// What stays for as long as the markers do.
+    /// Errors that last as long as the markers rest.
     misfit: Misfit,
 }
 
@@ -109,8 +109,8 @@ impl NoiseLevel {
         self.motion = motion;
     }
 
-    /// Sets the square of the largest shift of a marker of the current frame, px², by what shows
-    /// through the film beside it. Not inlined, so that it stays out of the near memory.
+    /// Sets the square of the largest shift of a marker of the current frame, px², by light through
+    /// the film next to it. Not inlined, so that it stays out of the near memory.
     #[inline(never)]
     pub fn set_beside(&mut self, shift_px2: f32) {
         let more = shift_px2 - EVEN_PX * EVEN_PX;
@@ -134,8 +134,8 @@ impl NoiseLevel {
         variance.clamp(1.0, LARGEST)
     }
 
-    /// Call before the blobs of a frame are measured. What was [seen](Self::saw) of the same frame
-    /// before more blobs came is forgotten.
+    /// Call before the blobs of a frame are measured. Discards what was [seen](Self::saw) of the
+    /// same frame before more blobs came.
     pub fn begin_measurement(&mut self) {
         self.now = None;
         self.misfit.begin();
@@ -149,7 +149,7 @@ impl NoiseLevel {
     }
 
     /// Takes a press of a frame with this expected `noise`, which explains the markers. While their
-    /// motion changes, the press says nothing of what stays.
+    /// motion changes, the press does not show lasting errors.
     pub fn saw_press(&mut self, noise: FrameNoise, estimate: &Estimate, markers: &[Marker]) {
         if noise.motion == Px(0) && noise.beside == Px(0) {
             self.misfit.saw(noise.times, estimate, markers);

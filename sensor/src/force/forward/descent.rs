@@ -35,7 +35,7 @@ pub struct Descent<'a> {
     here: &'a mut Point,
     /// The load of the next step.
     there: &'a mut Point,
-    /// By the covariance, at the load here, of noise and of what is unknown of the unit.
+    /// By the covariance of noise and of the unit's uncertainty, at the load here.
     whitening: &'a mut Whitening,
     /// The equations in coordinates in which that covariance is the unit matrix; `None` if it is
     /// singular or not finite.
@@ -50,7 +50,7 @@ pub struct Descent<'a> {
     looks: u8,
 }
 
-/// What the markers of a frame show, how they are mounted, and what is unknown of the unit.
+/// The markers of a frame, their mounting, and the unit's uncertainty.
 struct Markers<'a> {
     observed: &'a Observed<'a>,
     mounting: &'a Mounting,
@@ -338,8 +338,7 @@ impl Point {
         self.pose = pose;
     }
 
-    /// Puts the covariance, at this load, of noise and of what is unknown of the unit into
-    /// `covariance`.
+    /// Puts the covariance of noise and of the unit's uncertainty at this load into `covariance`.
     fn put_covariance(
         &self,
         forward: &Forward<'_>,

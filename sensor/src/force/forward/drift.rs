@@ -5,7 +5,7 @@ use super::covariance::{Covariance, add_square};
 use super::mounting::{Mounting, about_middle, radius};
 use super::predict::Markers;
 
-/// What may have happened to a rest position since it was taken.
+/// The possible change of a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
     /// Standard uncertainties of drift that no frame has shown, relative to the pattern's radius:

@@ -15,14 +15,14 @@ use super::{Forward, Strength};
 use crate::markers::lost::Lost;
 use hivtac_terms::list::List;
 
-/// Most steps of a frame. It exceeds what the model asks for: more steps follow while the load does
-/// not explain the markers. Little-known units begin far from the result.
+/// Most steps of a frame, more than the model's number: steps go on while the load does not explain
+/// the markers. Little-known units begin far from the result.
 pub const STEPS_AT_MOST: u8 = 8;
 
 /// Where steps without a guess begin, as a fraction of the largest size.
 const HALF: f32 = 0.5;
-/// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
-/// nothing.
+/// Variance of a lost marker's coordinates, focal lengths squared: so large that the marker has no
+/// weight.
 const LOST: f32 = 1e6;
 
 /// Where steps begin.
@@ -47,15 +47,15 @@ pub struct Observed<'a> {
     pub moved: Column,
     /// The noise of each marker: covariances xx, xy, yy, focal lengths squared; xx and yy > 0.
     pub noise: List<[f32; 3], MOST_DOTS>,
-    /// Markers that are not seen: they count for nothing.
+    /// Markers that are not seen; they have no weight.
     pub lost: Lost,
     /// How far the film may rest from the rest position, px; `None` if that is 0.
     pub drift: Option<(&'a Drift, &'a Markers)>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     pub hanging: Option<&'a Hanging>,
-    /// What presses; `None` for the tables' tip.
+    /// The contact's shape; `None` for the tables' tip.
     pub pressing: Option<Pressing<'a>>,
-    /// What presses, if its width is an unknown; otherwise `None`.
+    /// The contact's shape, if its width is an unknown; otherwise `None`.
     pub wide: Option<Wide<'a>>,
 }
 
@@ -103,8 +103,7 @@ impl Observed<'_> {
 pub struct Estimate {
     /// The load.
     pub pose: Pose,
-    /// The squared residual, relative to its covariance by noise and by what is unknown of the
-    /// unit.
+    /// The squared residual, relative to its covariance by noise and the unit's uncertainty.
     pub unexplained: f32,
     /// The residual that no load near this one explains, in units of noise alone. Its change from
     /// frame to frame is noise, whatever is unknown of the unit.

@@ -95,7 +95,7 @@ pub struct Forward<'a> {
     /// The covariance that the tables leave on the model's own unit; `None` if it is negligible
     /// compared with noise.
     pub own: Option<CovarianceGrid<'a>>,
-    /// What is known of any other unit with a rest picture; `None` if the file has no such section.
+    /// Properties of any other unit with a rest picture; `None` if the file has no such section.
     pub other: Option<Others<'a>>,
     /// The effect of the film's own weight; `None` if the file has no such section.
     pub weight: Option<Weight<'a>>,
@@ -105,7 +105,7 @@ pub struct Forward<'a> {
     pub widths: Option<Widths<'a>>,
 }
 
-/// What is known of units other than the one that a model was made on.
+/// Properties of units other than the one that a model was made on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Others<'a> {
     /// The force of each size on a unit without stretch.
@@ -147,7 +147,7 @@ impl Strength {
 }
 
 impl<'a> Forward<'a> {
-    /// What is unknown of the model's own unit (`is_own`), or of any other.
+    /// The uncertainty about the model's own unit (`is_own`), or about any other.
     pub fn unknown(&self, is_own: bool) -> Unknown<'a> {
         match (is_own, self.own, self.other) {
             (true, None, _) => Unknown::Nothing,

@@ -77,8 +77,8 @@ unsafe extern "C" {
         end: *const i32,
     );
 
-    /// As [`hivtac_dot16`] for up to 12 columns (the features are 11), laid out as 16, the last
-    /// four of which it leaves out.
+    /// As [`hivtac_dot16`] for up to 12 columns (the features are 11), laid out as 16, without the
+    /// last four.
     ///
     /// *Contract.* As [`hivtac_dot16`]; it reads no more than the weights and 12 inputs.
     ///

@@ -19,10 +19,10 @@ use hivtac_terms::threshold::PixelFormat;
 /// Offset of the forward model in models with a network: after the places.
 pub const FORWARD_OFFSET: usize = 456;
 
-/// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
+/// The contents of a model file, to be written. The fields are those of [`Model`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelSpec {
-    /// What it was made for.
+    /// The frames that it was made for.
     pub conditions: Conditions,
     /// The rest position of the sensor it was made on.
     pub rest: Rest,
@@ -32,7 +32,7 @@ pub struct ModelSpec {
     pub layers: Vec<LayerSpec>,
     /// The forward model.
     pub forward: Option<ForwardSpec>,
-    /// What the outputs are.
+    /// The kind of outputs.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
     pub range: CalibratedRange,

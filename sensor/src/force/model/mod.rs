@@ -52,7 +52,7 @@ pub const PLACE_OUTPUTS: usize = 2;
 /// A model, borrowed from the bytes of its file and proven sound.
 #[derive(Clone, Copy, Debug)]
 pub struct Model<'a> {
-    /// What it was made for; a frame made under other conditions has no force.
+    /// The conditions that it was made for; a frame made under others has no force.
     pub conditions: Conditions,
     /// The rest position of the sensor it was made on.
     pub rest: Rest,

@@ -101,7 +101,7 @@ impl Found {
     }
 }
 
-/// By what a blob is no marker's image.
+/// The reason why a blob is no marker's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unlike {
     /// It has fewer pixels than this.
@@ -229,7 +229,7 @@ impl Finder {
         found.ok_or(reason)
     }
 
-    /// Returns by what a blob is no marker's image; `None` if it could be one.
+    /// Returns why a blob is no marker's image; `None` if it could be one.
     pub fn unlike(&self, blob: &Blob) -> Option<Unlike> {
         self.candidate(blob).err()
     }

@@ -135,7 +135,7 @@ impl Placed {
         lost <= MOST_LOST && lost + FEWEST <= self.markers.len()
     }
 
-    /// The markers that count for nothing: those that are lost, and this one.
+    /// The markers without weight: those that are lost, and this one.
     pub fn without(&self, left_out: Option<usize>) -> Lost {
         left_out.map_or(self.lost, |identity| self.lost.and(identity))
     }

@@ -18,7 +18,7 @@
 
 use hivtac_terms::conditions::ContactReading;
 
-/// A taper beyond which a tip presses hard beside a dot and bends it.
+/// A taper beyond which a tip presses hard near a dot and bends it.
 pub const STEEP_TAPER: f32 = 0.08;
 
 /// Limits of one kind of contact. A shift is relative to the half side at rest.

@@ -131,7 +131,7 @@ impl<'a> Interaction<'a> {
         }
     }
 
-    /// Adds what the network leaves to a covariance.
+    /// Adds the network's error to a covariance.
     pub fn add_uncertainty(&self, both: &Both, covariance: &mut Covariance) {
         let left = both.left();
         let row = |nth: usize| self.left.get(triangle(nth)..triangle(nth + 1));
