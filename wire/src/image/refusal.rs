@@ -3,7 +3,7 @@
 use crate::image::header::{CHIP, LAYOUT};
 use std::fmt;
 
-/// Why a file is no image for the device: what is wrong, where, and what to do.
+/// Why a file is no image for the device: the fault, its place, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// It has no mark of the sensor's firmware.
