@@ -22,7 +22,7 @@ use hivtac_wire::failure::{Failure, FailureKind, PLACE_BYTES};
 
 core::arch::global_asm!(include_str!("hard_fault.s"));
 
-/// What the record's words are; a panic's path follows.
+/// Indices of the record's words; a panic's path follows.
 const KIND: usize = 0;
 const STARTS: usize = 1;
 const COUNT: usize = 2;
@@ -67,7 +67,7 @@ struct Kept {
 type Words = [u32; WORDS];
 
 impl Kept {
-    /// The record; `None` if there is none.
+    /// The record, if any.
     fn read(&self) -> Option<Words> {
         let mut words = [0; WORDS];
         for (word, kept) in words.iter_mut().zip(&self.words) {
@@ -99,7 +99,7 @@ fn check(words: &Words) -> u32 {
     words.iter().fold(CHECK_START, sum)
 }
 
-/// What tells this program from others: its checksum, as an update writes it.
+/// This program's identity: its checksum, as an update writes it.
 fn program() -> u32 {
     // SAFETY: a constant in flash; volatile as an image has another value there than the compiler
     // knows.

@@ -81,8 +81,8 @@ use static_cell::{ConstStaticCell, StaticCell};
 core::arch::global_asm!(include_str!("first_stage.s"));
 core::arch::global_asm!(include_str!("start.s"));
 
-/// By this mark and the next an update knows what the image is for, at places that `memory.x`
-/// fixes.
+/// This mark and the next identify the image's chip and board to an update, at places that
+/// `memory.x` fixes.
 #[used]
 #[unsafe(link_section = ".first_stage.mark")]
 static FIRST_STAGE: Mark = Mark::of_first_stage(board::NAME);

@@ -41,8 +41,8 @@ pub fn fill<T>(slot: u8, fill: impl FnOnce(&mut [u8; MODEL_BYTES]) -> T) -> Opti
     if lent.load(Ordering::Acquire) {
         return None;
     }
-    // SAFETY: the slot exists. It is not lent, so that there is no other reference to it: those of
-    // `fill` end with it, and none runs beside another.
+    // SAFETY: the slot exists. It is not lent, so there is no other reference to it: those of
+    // `fill` end with it, and no two run at once.
     let file = unsafe { &mut *file(slot)? };
     Some(fill(file))
 }

@@ -49,7 +49,7 @@ bind_interrupts!(struct Irqs {
 pub fn offer(sample: Sample) {
     let number = UART_SEQUENCE.load(Ordering::Relaxed).wrapping_add(1);
     UART_SEQUENCE.store(number, Ordering::Relaxed);
-    // Without space it is dropped, which its number tells.
+    // Without space it is dropped; the gap in numbers shows it.
     let _ = UART_SAMPLES.try_send(Sample {
         sequence: number,
         markers: MarkerList::default(),

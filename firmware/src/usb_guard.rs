@@ -142,7 +142,7 @@ fn endpoint_of(setup: &[u8; 8]) -> Option<EndpointAddress> {
 }
 
 impl<P: ControlPipe> GuardedPipe<P> {
-    /// Waits for a SETUP, and takes away what an earlier transfer left.
+    /// Waits for a SETUP, and clears the data of an earlier transfer.
     async fn next_setup(&mut self) -> [u8; 8] {
         loop {
             let counted = with_timeout(MISSED, usb_watch::another_setup(self.served)).await;

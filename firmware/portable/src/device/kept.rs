@@ -42,7 +42,7 @@ pub fn keep(record: &mut Record, selection: Selection, used: InUse, camera: &Cam
     }
 }
 
-/// The state of what keeps a record.
+/// The state of the record's storage.
 pub struct Keeper {
     /// Its content at the start.
     pub found: Found,

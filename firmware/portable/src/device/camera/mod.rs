@@ -9,7 +9,7 @@ use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, Rate, RateLimits};
 use hivtac_terms::units::Microseconds;
 
-/// What a camera's settings and its frames' times depend on.
+/// The properties of a camera on which its settings and its frames' times depend.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// Name in the device's hello.

@@ -19,7 +19,7 @@ pub const PRESET: Preset = Preset::Ov7725;
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
-/// What it can send; the first one if no other is requested.
+/// Its pixel formats; the first is the default.
 pub const PIXELS: &[PixelFormat] = &[PixelFormat::Rgb565, PixelFormat::Yuv422];
 
 /// Clock that the board supplies, Hz.
