@@ -46,7 +46,7 @@ fn millimetres(radius: &Micrometres) -> f64 {
     f64::from(radius.0) / 1e3
 }
 
-/// Text for a person about the shape of what presses.
+/// Text for a person about the contact's shape.
 pub fn text(shape: ContactShape) -> String {
     match shape {
         ContactShape::Needle => "needle, a tip like the model's".to_owned(),

@@ -82,7 +82,7 @@ impl BlobJson {
     }
 }
 
-/// By what a blob is no marker, and what helps if it should be one.
+/// Why a blob is no marker, and the remedy if it should be one.
 fn unlike(why: Unlike) -> String {
     match why {
         Unlike::Small(least) => format!("fewer than {least} pixels, or another --preset"),

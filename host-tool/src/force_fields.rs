@@ -5,7 +5,7 @@ use Quantity::{Angle, Length, Newtons};
 use hivtac_terms::force::{Force, MOST_CONTACTS, Place};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// What a field measures. The wire counts it in thousandths of a degree, in µN or in µm.
+/// The quantity of a field. The wire counts it in thousandths of a degree, in µN or in µm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Degrees.
@@ -153,7 +153,7 @@ pub fn place_si(force: &Force) -> [f64; 3] {
 }
 
 /// Returns the torque about the film's middle, N·m, of a force at its place, or of the two contacts
-/// whose sum it is. What has no place adds nothing.
+/// whose sum it is. A force without a place adds nothing.
 pub fn torque_nm(force: &Force, contacts: &[Force]) -> [f64; 3] {
     let parts = match contacts {
         [_, _] => contacts,

@@ -187,7 +187,7 @@ pub fn run(command: &GripCommand) -> Result<(), Failure> {
     result.and_then(|()| stop::check())
 }
 
-/// What is shown of two fingers.
+/// The lines and counts shown for two fingers.
 struct Shown {
     paired: Paired,
     clocks: [Clock; 2],

@@ -22,7 +22,7 @@ pub enum Format {
 
 /// A sample and, when it is compared with a simulation, its true force (`Some(None)`: not found).
 pub struct Row<'a> {
-    /// What the device sent.
+    /// The sample that the device sent.
     pub sample: &'a Sample,
     /// The true force, from the simulation.
     pub truth: Option<Option<Truth>>,
@@ -112,7 +112,7 @@ fn human_row(row: &Row) -> String {
     format!("{line}  {status}{}", human_parts(row.sample))
 }
 
-/// The sizes and places of two contacts; empty unless they are told apart.
+/// The sizes and places of two contacts; empty unless they are resolved.
 fn human_parts(sample: &Sample) -> String {
     let part = |force: &Force| {
         let size = FORCE[2].shown(force);

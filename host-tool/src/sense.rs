@@ -197,7 +197,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Reads a picture in the format of the model's camera, without what is not looked at.
+    /// Reads the visible part of a picture, in the format of the model's camera.
     fn picture(&self, path: &str) -> Result<Picture, Failure> {
         let mut picture = Picture::load(path, self.model.conditions.threshold.format())?;
         let size = [picture.width, picture.height];
@@ -290,7 +290,7 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Why a tare's picture was refused, and what to do.
+/// Why a tare's picture was refused, and the remedy.
 fn complaint(refusal: Refusal) -> String {
     match refusal {
         Refusal::Touched(force) => {

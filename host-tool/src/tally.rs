@@ -66,7 +66,7 @@ impl Tally {
         self.device.count(stats);
     }
 
-    /// Adds what the decoder of a connection rejected; call it once, when the connection ends.
+    /// Adds the rejects of a connection's decoder; call it once, when the connection ends.
     pub fn rejected(&mut self, of_connection: Rejected) {
         let sum = &mut self.rejected;
         sum.overlong = sum.overlong.saturating_add(of_connection.overlong);

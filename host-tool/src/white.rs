@@ -125,8 +125,7 @@ fn refuse(middle: &Middle, what: &str) -> Failure {
 
 /// The gains to try next; `None` if those in use make the card white.
 ///
-/// # Errors
-/// What is seen instead of a white card.
+/// # Errors The text describes the picture instead of a white card.
 fn next(middle: &Middle, white: White) -> Result<Option<White>, String> {
     let [red, green, blue] = middle.mean.map(|level| level.max(1.0));
     let [least, most] = BRIGHTNESS;

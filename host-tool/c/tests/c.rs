@@ -161,7 +161,7 @@ fn a_sensor_of_ros2_control_has_true_states() {
     check(&printed);
 }
 
-/// The package as its users build it; without ROS 2 nothing is tried.
+/// The package as its users build it; skipped without ROS 2.
 #[test]
 #[ignore = "needs CMake, and ROS 2 with ros2_control"]
 fn the_sensor_of_ros2_control_builds_where_ros_2_is_sourced() {

@@ -44,7 +44,7 @@ pub fn step(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     Ok(judge(right, below))
 }
 
-/// The mean place of the next press; `None` if there is none in time. A press that has begun before
+/// The mean place of the next press; `None` if none comes in time. A press that has begun before
 /// does not count.
 fn press(link: &mut Link) -> Result<Option<Place>, Failure> {
     let end = Instant::now() + PATIENCE;

@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 use usb::Found;
 use write::Progress;
 
-/// An ELF has much more than what is loaded, as its lines for a debugger.
+/// An ELF has much more than the loaded bytes, such as its lines for a debugger.
 const MOST_BYTES: u64 = 64 << 20;
 /// Time between two searches for the device.
 const LOOK_EVERY: Duration = Duration::from_millis(500);

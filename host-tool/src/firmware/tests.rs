@@ -170,8 +170,8 @@ fn a_device_that_goes_at_any_request_is_lost_and_written_by_the_next_attempt() {
     assert!(ends > 20, "{ends}");
 }
 
-/// The first stage starts what is whole: the old program before the first erase, the new one after
-/// the last write, and the loader between them.
+/// The first stage starts a whole program: the old program before the first erase, the new one
+/// after the last write, and the loader between them.
 #[test]
 fn a_power_cut_at_any_operation_leaves_a_program_that_starts_or_the_loader() {
     let (mut old, mut none) = (0, 0);

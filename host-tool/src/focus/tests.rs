@@ -199,7 +199,7 @@ fn a_person_sees_a_table_with_the_limits() {
     assert!(lines[8].starts_with("  wrong    rim of marker"), "{text}");
 }
 
-/// LEDs of the camera's own board, on the markers and beside them.
+/// LEDs of the camera's own board, on the markers and next to them.
 #[test]
 fn leds_that_the_film_mirrors_are_told() {
     for board_mm in [5.0, 7.0, 9.0, 12.0, 18.0] {

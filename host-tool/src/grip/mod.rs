@@ -59,7 +59,7 @@ pub struct Reading {
     pub came_ns: u64,
     /// Its status.
     pub status: Status,
-    /// Its force; `None` if there is none.
+    /// Its force, if any.
     pub felt: Option<Felt>,
 }
 
@@ -84,7 +84,7 @@ pub enum Cause {
     Silent(usize),
 }
 
-/// What two fingers feel at one time.
+/// The grip of two fingers at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// When, ns: the exposure of the first finger's frame.
@@ -93,7 +93,7 @@ pub struct Grip {
     pub came_ns: u64,
     /// The status of each finger.
     pub status: [Status; 2],
-    /// What they feel, or why it is not known.
+    /// The grip, or why it is unknown.
     pub held: Result<Held, Cause>,
 }
 
@@ -126,7 +126,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// What two fingers feel with these forces.
+    /// The grip of two fingers with these forces.
     pub fn of(geometry: &Geometry, felt: [&Felt; 2]) -> Held {
         let [first, second] = [0, 1].map(|finger| {
             let sign = if finger == 0 { -0.5 } else { 0.5 };

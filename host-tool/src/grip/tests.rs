@@ -26,10 +26,10 @@ fn all_near(found: Vector, wanted: Vector) {
     );
 }
 
-/// An object of 30 mN hangs, squeezed with 100 mN, 2 mm beside both films' middles along y. Down is
-/// y of the grip and of the first film, −y of the second. By hand: each film is pulled down by
-/// 15 mN, and the torques about x cancel but for nothing: −z₁ F_y − z₂ F_y = 0; about z there is
-/// none, as x is 0 everywhere; y F_z of one cancels that of the other.
+/// An object of 30 mN hangs, squeezed with 100 mN, 2 mm off both films' middles along y. Down is y
+/// of the grip and of the first film, −y of the second. By hand: each film is pulled down by 15 mN,
+/// and the torques about x cancel but for nothing: −z₁ F_y − z₂ F_y = 0; about z there is none, as
+/// x is 0 everywhere; y F_z of one cancels that of the other.
 #[test]
 fn a_hanging_object_shows_its_weight_and_what_squeezes_it() {
     let geometry = Geometry::default();
@@ -116,7 +116,7 @@ fn any_force() -> impl Strategy<Value = Felt> {
 }
 
 proptest! {
-    /// Both fingers turned together: what has a direction turns with them, the rest stays.
+    /// Both fingers turned together: vectors turn with them, numbers stay.
     #[test]
     fn a_common_turn_turns_vectors_alone(
         first in any_force(), second in any_force(),

@@ -111,7 +111,7 @@ impl Calibrated {
     }
 }
 
-/// The shift of a point along the film, mm, that moves its image by so many px.
+/// The shift of a point along the film, mm, that moves its image by `px`.
 fn on_film(camera: &Camera, [x, y, z]: [f64; 3], px: [f64; 2]) -> [f64; 2] {
     let at = |[right, down]: [f64; 2]| camera.project([x + right, y + down, z]);
     step(at([0.0; 2]), at, px)
@@ -209,7 +209,7 @@ mod tests {
         angles_deg: [4.0, -3.0],
     };
 
-    /// The built-in model, of a film that is so many times as stiff, as a stretched one is.
+    /// The built-in model, of a film that is `times` as stiff, as a stretched one is.
     fn stiffer(times: f32) -> &'static [u8] {
         let mut file = KIND.model(Layout::default()).to_vec();
         let stiffness = Model::parse(&file).unwrap().forward.unwrap().stiffness;

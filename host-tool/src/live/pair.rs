@@ -18,7 +18,7 @@ const STEP_MM: f64 = 0.01;
 /// Corrections of a dot's shift, each from the slopes where the last one led.
 const CORRECTIONS: usize = 2;
 
-/// What two contacts on a film with these dots do together.
+/// The film with these dots under two contacts.
 #[derive(Clone, Debug)]
 pub struct PairFilm {
     forward: Forward<'static>,
@@ -128,8 +128,8 @@ impl PairFilm {
     }
 }
 
-/// The shift along the film, mm, that moves an image by so many px, from the slopes of `at`: where
-/// the image is after a shift, `here` without one.
+/// The shift along the film, mm, that moves an image by `px`, from the slopes of `at`, the image's
+/// place after a shift; `here` is its place without one.
 pub(super) fn step(here: [f64; 2], at: impl Fn([f64; 2]) -> [f64; 2], px: [f64; 2]) -> [f64; 2] {
     let slope = |there: [f64; 2]| [0, 1].map(|axis| (there[axis] - here[axis]) / STEP_MM);
     let [a, c] = slope(at([STEP_MM, 0.0]));
@@ -148,7 +148,7 @@ fn load(touch: Press) -> Option<Load> {
     load.with_offset_mm(touch.place_mm).ok()
 }
 
-/// The sum of two touches as one load in their middle, for the truth; no load if there is none.
+/// The sum of two touches as one load in their middle, for the truth; no load without any.
 pub fn sum(touches: [Press; 2]) -> Load {
     let sum = || {
         let [first, second] = touches.map(|touch| load(touch).map(|load| load.vector_n()));

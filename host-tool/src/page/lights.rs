@@ -26,7 +26,7 @@ pub struct Light {
     pub level: Level,
     /// Its meaning.
     pub meaning: &'static str,
-    /// What to do; empty if nothing is necessary.
+    /// The remedy; empty if nothing is necessary.
     pub advice: &'static str,
 }
 

@@ -27,9 +27,9 @@ pub struct State {
     /// The device's newest counters.
     pub stats: Option<Stats>,
     lines: VecDeque<String>,
-    /// The shape of what presses; `None` until the device sent its settings.
+    /// The contact's shape; `None` until the device sent its settings.
     pub contact_shape: Option<ContactShape>,
-    /// What this sensor and another feel together, for a person; `None` without a grip.
+    /// The grip of this sensor and another, for a person; `None` without one.
     pub grip: Option<String>,
 }
 

@@ -160,7 +160,7 @@ impl Sensor {
         unit_number(&self.hello.device_id)
     }
 
-    /// Prints what was recorded of it, with its name if there are several sensors.
+    /// Prints its counts, with its name if there are several sensors.
     fn tell(&self, of: usize) {
         if of > 1 {
             note(&format!("{} {}:", self.unit(), shown(&self.hello.name)));
@@ -232,7 +232,7 @@ impl Recording {
         })
     }
 
-    /// Also keeps what the first two devices feel together.
+    /// Also records the grip of the first two devices.
     fn add_grip(&mut self, paired: Option<Paired>) -> Result<(), Failure> {
         let (Sink::Bag(bag), Some(Paired { pair, names })) = (&mut self.sink, paired) else {
             return Ok(());
@@ -343,8 +343,7 @@ impl Recording {
         if let Err(failure) = &result
             && failure.kind == Kind::Input
         {
-            // The disk is full or gone, and nothing more can be written. What was flushed can be
-            // read.
+            // The disk is full or gone, and nothing more can be written. Flushed data can be read.
             drop(sink);
             tell_counts();
             return result;

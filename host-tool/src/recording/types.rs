@@ -25,7 +25,7 @@ pub fn ours() -> String {
 pub struct Types(Value);
 
 impl Types {
-    /// Reads what [`ours`] wrote in any release; `None` if it is something else.
+    /// Reads the text that [`ours`] wrote in any release; `None` for any other.
     pub fn parse(text: &str) -> Option<Types> {
         serde_json::from_str(text).ok().map(Types)
     }

@@ -24,7 +24,7 @@ pub fn diagnose(state: &State, since: Option<Status>, not_published: u64) -> Dia
     }
 }
 
-/// The worst severity, and what to do.
+/// The worst severity, and its remedy.
 fn verdict(trouble: Option<&str>, since: Option<Status>) -> (Level, String) {
     if let Some(trouble) = trouble {
         return (Level::Error, shown(trouble));

@@ -243,7 +243,7 @@ fn a_full_disk_is_called_full() {
     assert!(said.contains(&words), "{said}");
 }
 
-/// Files may have a few thousand bytes here: what was flushed before is whole.
+/// Files may have a few thousand bytes here: data flushed before are whole.
 #[test]
 fn a_full_disk_ends_a_recording_with_what_fits() {
     let folder = Folder::new();

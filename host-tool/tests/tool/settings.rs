@@ -345,7 +345,7 @@ fn a_re_zeroed_rest_position_is_told() {
     assert!(shown.contains(&line), "{shown}");
 }
 
-/// These commands print what `docs/using.md` shows.
+/// These commands print the lines of `docs/using.md`.
 #[test]
 fn the_guide_shows_what_setting_prints() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -489,8 +489,8 @@ fn down_changed(arguments: &[&str]) -> String {
     run.stdout
 }
 
-/// The shape of what presses that a device received, and the tool's output. It is kept only when
-/// asked for.
+/// The contact's shape that a device received, and the tool's output. It is kept only when asked
+/// for.
 fn shape_set(arguments: &[&str]) -> (ContactShape, String) {
     let (commands, text) = sent(arguments);
     let [Request::SetContactShape(shape), kept @ ..] = &commands[..] else {

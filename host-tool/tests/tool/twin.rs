@@ -65,7 +65,7 @@ impl Twin {
         run(&[arguments, &["--port", &self.port, "--timeout", "10"]].concat())
     }
 
-    /// Runs a command that must succeed; returns what it prints.
+    /// Runs a command that must succeed; returns its output.
     fn done(&self, arguments: &[&str]) -> String {
         let run = self.run(arguments);
         assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
@@ -318,7 +318,7 @@ fn disturbances_are_seen() {
     );
 }
 
-/// Another unit has its own number, and a rest position beside the model's.
+/// Another unit has its own number, and another rest position than the model's.
 #[test]
 fn units_are_drawn_by_their_number() {
     let place = |unit: &str| {
@@ -469,8 +469,8 @@ fn a_twin_has_no_loader() {
     assert_eq!(twin.json(&["info"])["board"], "twin + ov7725");
 }
 
-/// Two fingers press an object from both sides as `PRESSED` says: what squeezes is the force
-/// straight in, and what pulls both is the part along x; the second finger's y is turned over.
+/// Two fingers press an object from both sides as `PRESSED` says: the force straight in squeezes,
+/// and the part along x pulls both; the second finger's y is turned over.
 #[test]
 fn two_twins_are_a_grip() {
     let (thumb, _) = Twin::pressed(&[]);
@@ -522,7 +522,7 @@ fn two_twins_are_a_grip() {
     assert!(shown.stderr.contains("latency: p50"), "{}", shown.stderr);
 }
 
-/// The first finger's page says what both feel together.
+/// The first finger's page shows the grip of both.
 #[test]
 fn two_twins_are_a_grip_on_the_page() {
     let [(thumb, _), (index, _)] = [Twin::pressed(&[]), Twin::pressed(&[])];
@@ -577,7 +577,7 @@ fn a_grip_is_recorded_beside_its_sensors() {
     assert!(recorded_forces.len() > 20, "{}", recorded_forces.len());
     let units = [&twin, &other].map(|it| it.json(&["info"])["device_id"].clone());
     let forces = forces_of_both(&recorded, &units.map(|it| it.as_str().unwrap().to_owned()));
-    // By their bits: what is not known is NaN.
+    // By their bits: unknown numbers are NaN.
     let bits = |forces: Vec<f64>| forces.into_iter().map(f64::to_bits).collect::<Vec<_>>();
     assert_eq!(bits(forces), bits(recorded_forces));
 }
@@ -594,7 +594,7 @@ fn numbers_of(file: &str, topic: &str) -> Vec<f64> {
     of_topic.map(|message| number(message).unwrap()).collect()
 }
 
-/// The grip forces that come of what a file has of two sensors.
+/// The grip forces by a file's samples of two sensors.
 fn forces_of_both(file: &str, units: &[String; 2]) -> Vec<f64> {
     let mut all = Vec::new();
     for (finger, unit) in units.iter().enumerate() {

@@ -34,7 +34,7 @@ const ALONE: Duration = Duration::from_secs(10);
 /// Why an entity of the node could not be made, or a message not be sent.
 type Trouble = Box<dyn std::error::Error + Send + Sync>;
 
-/// What carries a node's messages. Names of topics and services are absolute; types are such as
+/// The carrier of a node's messages. Names of topics and services are absolute; types are such as
 /// `std_msgs/msg/Bool`.
 trait Middleware: Sized {
     type Publisher;
@@ -70,7 +70,7 @@ trait Middleware: Sized {
     /// Whether another node of this node's name is seen.
     fn has_namesake(&self) -> bool;
 
-    /// What to check when no other program is seen.
+    /// Advice when no other program is seen.
     fn advice(&self) -> String;
 }
 
@@ -112,11 +112,10 @@ struct Node<M: Middleware> {
 }
 
 /// Joins a domain as a node with this name, with the devices' topics and services below it, and the
-/// topics of a grip if there is one.
+/// topics of a grip, if any.
 ///
-/// # Errors
-/// When there is no network to join, not even this computer's own, or the environment has settings
-/// of Zenoh that are none.
+/// # Errors When there is no network to join, not even this computer's own, or the environment has
+/// invalid settings of Zenoh.
 pub fn open(
     name: &str,
     domain: u16,

@@ -19,7 +19,7 @@ use zenoh::{Config, Session, Wait};
 /// The environment variables with a file of the session's configuration, and with single settings.
 const CONFIGURATION: &str = "ZENOH_SESSION_CONFIG_URI";
 const OVERRIDE: &str = "ZENOH_CONFIG_OVERRIDE";
-/// What to check when a session cannot be opened.
+/// Advice when a session cannot be opened.
 pub(super) const SETTINGS: &str =
     "are ZENOH_SESSION_CONFIG_URI and ZENOH_CONFIG_OVERRIDE as rmw_zenoh_cpp wants them?";
 /// A session without such a file: it finds others through the router of this computer, and listens
@@ -59,7 +59,7 @@ pub(super) struct Zenoh {
 /// The keys of the tokens that are alive.
 type Tokens = Arc<Mutex<BTreeSet<String>>>;
 
-/// What an endpoint is, as tokens have it.
+/// The role of an endpoint, as in its token.
 #[derive(Clone, Copy)]
 enum Role {
     Publisher,
@@ -225,7 +225,7 @@ fn dds_name(type_name: &str) -> String {
     }
 }
 
-/// What goes with a message: its number, when it was sent, ns since 1970, and by whom, in the
+/// A message's attachment: its number, its time, ns since 1970, and its sender, in the
 /// serialization of Zenoh's libraries.
 fn attachment(number: i64, gid: [u8; GID]) -> Vec<u8> {
     let sent_ns = i64::try_from(now_ns()).unwrap_or(i64::MAX);
