@@ -53,7 +53,7 @@ fn main() -> Result<()> {
     Ok(fs::write(path, bytes)?)
 }
 
-/// What the model leaves of a pair's motion, focal lengths, and how the variance of that grows.
+/// The model's error of a pair's motion, focal lengths, and the growth of its variance.
 fn left(
     numbers: &[f64],
     forward: &Forward<'_>,

@@ -131,8 +131,7 @@ impl Weights {
 
     /// The network.
     ///
-    /// # Errors
-    /// When there is none, as for other layouts than the square of four dots.
+    /// # Errors When the file has none, as for other layouts than the square of four dots.
     pub fn network(&self) -> Result<&Network> {
         let network = self.network.as_ref();
         network.context("these weights have no network, as their film has other dots than four")

@@ -34,7 +34,7 @@ impl Presses {
     }
 }
 
-/// What frames tell.
+/// The measurements of frames.
 #[derive(Default)]
 struct Told {
     frames: u32,
@@ -125,7 +125,7 @@ fn needles_within_8_mm() {
     }
 }
 
-/// What befalls a dot after the tare.
+/// Applies a fault to a dot after the tare.
 fn befall(options: &mut Options, fault: &str, dot: usize) {
     let moved = |times: f64| {
         let mut glued_mm = Dots::defaults(8);

@@ -31,7 +31,7 @@ impl Evaluation {
         ]
     }
 
-    /// Describes what the evaluation shows, and what it does not.
+    /// Describes the evaluation's scope.
     pub fn sentence(&self) -> String {
         if self.measured {
             return format!(

@@ -132,8 +132,8 @@ fn random_pose(number: u64, last_mm: f64) -> Pose {
     }
 }
 
-/// What a chip's tables leave of the motion under a load, by coordinate, focal lengths; `None` for
-/// dots that the camera does not see.
+/// The error of a chip's tables under a load, by coordinate, focal lengths; `None` for dots that
+/// the camera does not see.
 fn left(
     chip: &Forward<'_>,
     setup: &UnitSetup<'_>,

@@ -81,7 +81,7 @@ pub fn layout_model(layout: Layout, steps: u8) -> Result<ModelSpec> {
     seen_at_rest(spec, &scene)
 }
 
-/// The weights file of a layout's model: what `unit` begins with. It has no network.
+/// The weights file of a layout's model, with which `unit` begins. It has no network.
 pub fn layout_weights(spec: &ModelSpec) -> Result<Weights> {
     let forward = spec.forward.as_ref().context("the model has no film")?;
     let double = |pair: [f32; 2]| pair.map(f64::from);

@@ -46,7 +46,7 @@ pub use tables::{Dot, UnitSetup, tables};
 pub use unit::Known;
 pub use weight::{Pressed, Weighed, everywhere, weight};
 
-/// What is known of a unit's film and camera.
+/// A unit's film and camera, as far as known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilmModel {
@@ -193,7 +193,7 @@ impl FilmModel {
     }
 }
 
-/// What all files of the nominal film under the nominal tip share; computed once.
+/// The part that all files of the nominal film under the nominal tip share; computed once.
 #[derive(Clone)]
 struct Nominal {
     stiffness: Stiffness,
@@ -413,8 +413,8 @@ mod tests {
         [(sum / count).sqrt(), worst]
     }
 
-    /// Error of the chip's prediction of what weight does under loads of these sizes, N, from the
-    /// film hanging at rest. In px at 320×240: root mean square and largest.
+    /// Error of the chip's prediction of the weight's effect under loads of these sizes, N, from
+    /// the film hanging at rest. In px at 320×240: root mean square and largest.
     fn weight_off_px(sizes_n: [f64; 2]) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
         let setup = UnitSetup {

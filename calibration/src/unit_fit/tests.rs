@@ -265,8 +265,8 @@ fn predicts(fit: &Fit, chip: &Forward<'_>, truth: &Truth) {
 }
 
 /// The chip knows how a fitted film moves and, with gravity known under the loads, how it moves
-/// when it is turned. It agrees with full solutions of the true film to a part of what turning
-/// does.
+/// when it is turned. It agrees with full solutions of the true film to a part of the effect of
+/// turning.
 #[test]
 #[ignore = "slow"]
 fn a_mounted_film_is_known_turned() {

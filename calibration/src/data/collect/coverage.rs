@@ -168,7 +168,7 @@ impl Coverage {
         }
     }
 
-    /// What to do next, in a sentence; `None` when all is covered.
+    /// The next action, in a sentence; `None` when all is covered.
     pub fn advice(&self) -> Option<String> {
         self.gaps().first().map(Gap::to_string)
     }

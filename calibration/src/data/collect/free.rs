@@ -93,7 +93,7 @@ impl FreeTake {
         self.left_s() == 0.0 || lasted_s >= LEAST_S && self.coverage.is_complete()
     }
 
-    /// Shows the coverage and what is missing: a map on a terminal, a line elsewhere.
+    /// Shows the coverage: a map on a terminal, a line elsewhere.
     pub fn show(&mut self, sample: &Sample) {
         let mut terminal = std::io::stderr();
         if !terminal.is_terminal() {

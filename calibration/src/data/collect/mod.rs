@@ -94,8 +94,7 @@ pub fn direction_deg(text: &str) -> Result<f64, String> {
 impl CollectCommand {
     /// Runs it.
     ///
-    /// # Errors
-    /// What failed, and what to do.
+    /// # Errors The failure and the remedy.
     pub fn run(self) -> Result<()> {
         match self {
             CollectCommand::Record(args) => record::record(&args),
