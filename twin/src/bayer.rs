@@ -79,7 +79,7 @@ fn pixel(picture: &[[Channel; 3]], size: [usize; 2], [x, y]: [usize; 2]) -> [Cha
     std::array::from_fn(|c| Channel::from_bits((sums[c] + counts[c] / 2).div_euclid(counts[c])))
 }
 
-/// Returns the place `step` − 1 beside another one, of `count`. Beyond the border the picture is
+/// Returns the place `step` − 1 away from another one, of `count`. Beyond the border the picture is
 /// mirrored, so that colours alternate on.
 fn beside(at: usize, step: usize, count: usize) -> usize {
     match (at + step).checked_sub(1) {

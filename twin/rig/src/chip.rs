@@ -271,7 +271,7 @@ impl Chip {
         &self.output.0
     }
 
-    /// Returns what came over the UART for samples.
+    /// Returns the bytes of the UART for samples.
     pub fn uart_heard(&self) -> &[Heard] {
         let peer = self.part.usart[board::UART].peer();
         let listener = peer.and_then(|peer| (peer as &dyn Any).downcast_ref::<Listener>());

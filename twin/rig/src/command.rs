@@ -234,7 +234,7 @@ impl Arguments {
         Ok((program, Some(port)))
     }
 
-    /// Opens what the client uses; by default a TCP port with the serial port.
+    /// Opens the client's ports; by default a TCP port with the serial port.
     fn open(&self) -> anyhow::Result<(Box<dyn Plug>, Port)> {
         if let Some(wanted) = self.usbip {
             let server = Server::listen(wanted)?;

@@ -18,7 +18,7 @@ struct Part {
     lasts: [u64; 4],
     /// Faults: the camera is silent, and a frame is short.
     faults: [&'static str; 2],
-    /// What is said while it is absent.
+    /// The message while it is absent.
     absent: &'static str,
 }
 

@@ -132,7 +132,7 @@ fn a_short_frame_costs_itself_and_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
-/// Before the first sample there is none since which a frame could be missing.
+/// No frame can be missing before the first sample.
 #[test]
 fn frames_lost_before_the_first_sample_are_not_told() {
     let run = Setup::new(firmware(), 300).fault("frame-short@0-230").run();

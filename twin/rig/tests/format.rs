@@ -92,7 +92,7 @@ fn the_way_back_leads_to_the_same_forces() {
     for sample in back.iter().filter(|sample| sample.force.is_some()) {
         let others = undisturbed.samples();
         let same = others.iter().find(|it| it.frame == sample.frame);
-        // Uncertainties include what the film may remember of each run's own forces, and are left
+        // Uncertainties include the film's possible creep by each run's own forces, and are left
         // out.
         let told = |sample: &Sample| {
             let force = sample.force.unwrap();

@@ -190,7 +190,7 @@ fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     assert_eq!(run.missing_frames(), [0; 0], "forces go on");
 }
 
-/// A radius out of range is refused, and what was set before stays.
+/// A radius out of range is refused, and the earlier setting stays.
 #[test]
 fn what_presses_is_set_reported_kept_and_reset() {
     let Device { flash, kept, .. } = &Device::new();
@@ -387,8 +387,8 @@ fn a_rest_position_that_is_none_is_refused_and_nothing_changes() {
     assert!(last.contains(Status::TARE_MISSING), "{last:?}");
 }
 
-/// What is written while the supply falls may be torn: it is refused. A sector whose word was
-/// refused is erased before the next one.
+/// A write while the supply falls may be torn: it is refused. A sector whose word was refused is
+/// erased before the next one.
 #[test]
 fn nothing_is_written_while_the_supply_is_low() {
     let directory = tempfile::tempdir().unwrap();

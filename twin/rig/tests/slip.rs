@@ -26,8 +26,8 @@ fn setup() -> Setup {
     }
 }
 
-/// A status, and a force's components, µN. Uncertainties are left out: they include what the film
-/// may remember, which a sample that is followed again would include twice.
+/// A status, and a force's components, µN. Uncertainties are left out: they include the film's
+/// possible creep, which a sample that is followed again would include twice.
 type Reported = (Status, Option<[MicroNewtons; 3]>);
 
 /// Returns a sample of another run with only the values of its own frame.

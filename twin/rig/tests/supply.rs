@@ -13,7 +13,7 @@ const BACK_MS: u64 = 500;
 
 /// A new chip whose owner has chosen some options: IO_HSLV, and the watchdog stops in Stop mode.
 const CHOSEN: u32 = (FACTORY_OPTIONS | 1 << 29) & !(1 << 17);
-/// What firmware makes of it.
+/// The options that firmware sets.
 const SET: Operation = Operation::Options {
     options: CHOSEN | LEVEL,
 };

@@ -56,7 +56,7 @@ fn requests_about_endpoints_that_do_not_exist_are_stalled() {
 }
 
 /// A device without high speed stalls a request for its qualifier (USB 2.0, section 9.6.2); Linux
-/// warns of a slow port otherwise. What precedes a stall is not part of the next transfer: 64 bytes
+/// warns of a slow port otherwise. Data before a stall are not part of the next transfer: 64 bytes
 /// of a request that is too long are not the line coding.
 #[test]
 fn a_refused_request_leaves_nothing_behind() {

@@ -6,7 +6,7 @@ use crate::shell::{Hold, Shell};
 use crate::{Design, Equilibrium, Film, ShellError};
 
 /// Steps of finite differences, mm: of the tip's place and radius, of the posts' places, and of
-/// what moves cells with them.
+/// changes that move cells with them.
 const TIP_STEP_MM: f64 = 1e-3;
 const POST_STEP_MM: f64 = 2e-2;
 const MORPH_STEP_MM: f64 = 1e-3;

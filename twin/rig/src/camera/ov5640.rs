@@ -68,7 +68,7 @@ pub struct Ov5640 {
     hesitant: bool,
 }
 
-/// What the PLL gives.
+/// The PLL's clocks.
 struct Clocks {
     lines_hz: u64,
     pixels_hz: u64,
@@ -149,7 +149,7 @@ impl Ov5640 {
         })
     }
 
-    /// Returns how many columns and rows are read, first ones and sizes of what is shown of them in
+    /// Returns how many columns and rows are read, and first ones and sizes of the shown part, in
     /// the array's.
     fn read_out(&self) -> [[u32; 2]; 3] {
         let wide = |address| self.registers.wide(address);

@@ -37,7 +37,7 @@ pub const BLUE: u16 = 0x3404;
 pub const MANUAL_WHITE: u16 = 0x3406;
 /// Exposure, 20 bits in three registers, in sixteenths of a line.
 pub const EXPOSURE: u16 = 0x3500;
-/// What is not automatic: gain (bit 1), exposure (bit 0).
+/// Manual control of gain (bit 1) and exposure (bit 0).
 pub const MANUAL: u16 = 0x3503;
 /// Gain, ten bits in two registers, in sixteenths.
 pub const GAIN: u16 = 0x350A;
@@ -47,7 +47,7 @@ pub const WINDOW: u16 = 0x3800;
 pub const OUTPUT: u16 = 0x3808;
 /// Clocks of a line, then lines of a frame.
 pub const TOTAL: u16 = 0x380C;
-/// Columns and rows that are left out at each edge of what is read.
+/// Columns and rows that are left out at each edge of the read part.
 pub const OFFSET: u16 = 0x3810;
 /// Steps from column to column: odd (bits 7:4), even (bits 3:0).
 pub const COLUMN_STEPS: u16 = 0x3814;

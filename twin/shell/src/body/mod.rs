@@ -247,7 +247,7 @@ impl Film {
     }
 }
 
-/// What the bearing points say of a contact.
+/// A contact by its bearing points.
 struct Contact {
     patch: Patch,
     area_mm2: f64,

@@ -55,7 +55,7 @@ struct Balance {
     film: Vec<f64>,
     /// On the body along z, N.
     body: f64,
-    /// What the film holds of the body along x and y, N.
+    /// The force along x and y by which the film holds the body, N.
     held: [f64; 2],
 }
 
@@ -108,8 +108,7 @@ impl Pressing<'_> {
     /// Finds the equilibrium from a state, but for this much unbalanced force, N. Returns it with
     /// the number of steps.
     ///
-    /// # Errors
-    /// If there is none within reach.
+    /// # Errors If no equilibrium is within reach.
     pub fn solve(&self, mut state: State, tolerance_n: f64) -> Result<(State, usize), ShellError> {
         state.foot = self.foot(&state.unknowns, state.foot[2]);
         let mut at = self.balance(&state);
