@@ -130,7 +130,7 @@ fn rows_of<'a>(
     Ok(rows)
 }
 
-/// What the sensor is told of what presses.
+/// The sensor's setting of the contact's shape.
 #[derive(Clone, Copy)]
 enum Setting {
     /// Nothing.

@@ -13,7 +13,7 @@ use serde::Serialize;
 use super::objects::Press;
 use crate::press::{Judged, judged};
 
-/// What the sensor made of the frames of a kind of presses.
+/// The sensor's answers to the frames of a kind of presses.
 #[derive(Debug, Default, Serialize)]
 pub struct Row {
     kind: String,

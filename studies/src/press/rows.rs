@@ -23,7 +23,7 @@ pub struct Errors {
     within: [u32; 3],
 }
 
-/// What a force states of its direction (degrees), |F| (mN) and place (µm).
+/// A force's stated uncertainties of direction (degrees), |F| (mN) and place (µm).
 pub struct Judged {
     /// Errors; that of |F| is positive if it is too large.
     pub errors: [f64; 3],

@@ -57,7 +57,7 @@ struct Built {
     jig: Jig,
 }
 
-/// A dimension: its name, how far it is off, and a unit with it so.
+/// A dimension: its name, its error, and a unit with that error.
 type Dimension = (&'static str, &'static str, fn(&mut Built));
 
 /// The dimensions of units with the film of the simulated sensor's tables, and none.
