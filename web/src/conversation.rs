@@ -25,11 +25,11 @@ pub struct Job {
     pub ticket: Option<Ticket>,
     /// The commands, each with the longest wait for its reply.
     pub commands: VecDeque<(Request, Duration)>,
-    /// What is said when all are done.
+    /// The message when all are done.
     pub done: String,
 }
 
-/// What a conversation tells.
+/// An event of a conversation.
 pub enum Heard {
     /// The first hello.
     Hello(DeviceHello),
@@ -99,12 +99,12 @@ impl Conversation {
         std::mem::take(&mut self.out)
     }
 
-    /// Takes the next that it tells; `None` if there is nothing more.
+    /// Takes its next event, if any.
     pub fn heard(&mut self) -> Option<Heard> {
         self.heard.pop_front()
     }
 
-    /// What the decoder rejected since the device's hello.
+    /// The decoder's rejects since the device's hello.
     pub fn rejected(&self) -> Rejected {
         self.decoder.rejected()
     }
@@ -117,11 +117,11 @@ impl Conversation {
                 (Received::Message(message), Phase::Open) => self.message(message, now_us),
                 (Received::Message(DeviceMessage::Hello(hello)), Phase::Greets(..)) => {
                     self.phase = Phase::Open;
-                    // What it rejected before its hello does not count.
+                    // Rejects before its hello do not count.
                     self.decoder.reset();
                     self.heard.push_back(Heard::Hello(hello));
                 }
-                // What is left over from an earlier conversation.
+                // The rest of an earlier conversation.
                 (Received::Message(_), Phase::Greets(..)) => {}
                 (Received::ForeignHello(prefix), _) => {
                     let failure = foreign(&self.name, prefix);
@@ -212,7 +212,7 @@ impl Conversation {
         self.heard.push_back(Heard::Lost(failure));
     }
 
-    /// Sends what is due, and gives up what took too long.
+    /// Sends due messages, and gives up commands that took too long.
     pub fn turn(&mut self, now_us: u64) {
         match self.phase {
             Phase::Greets(begun_us, next_us) => self.greet(begun_us, next_us, now_us),

@@ -161,7 +161,7 @@ impl Engine {
         }
     }
 
-    /// The port is gone; `why` says what the browser said.
+    /// The port is gone; `why` is the browser's message.
     pub fn lost(&mut self, why: &str, now_us: u64) {
         let message = format!(
             "connection to {} lost: {why}; cable pulled or device reset? Connect it again",
@@ -309,7 +309,7 @@ impl Engine {
                         commands: commands.into(),
                         done: command.done,
                     });
-                    // A device that does not tell its settings has obeyed all the same.
+                    // A device that does not send its settings has obeyed all the same.
                     self.ask(None, Request::GetSettings);
                 }
                 Ok(None) => self.answer(ticket, false, "there is no such order"),

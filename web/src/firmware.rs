@@ -27,8 +27,8 @@ impl Firmware {
         }
     }
 
-    /// What is written into a device whose flash begins with `found`: `parts`, address and length
-    /// of each, and all their bytes; or `why` not.
+    /// The parts to write into a device whose flash begins with `found`: `parts`, address and
+    /// length of each, and all their bytes; or `why` not.
     pub fn parts(&self, found: &[u8]) -> (Value, Vec<u8>) {
         let Some(image) = &self.0 else {
             return (json!({ "why": "no firmware was chosen" }), Vec::new());
