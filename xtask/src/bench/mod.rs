@@ -76,7 +76,7 @@ impl Bench {
 /// One script, as described by `benchmark-cases` (in `tests`).
 #[derive(Deserialize)]
 struct Case {
-    /// What it measures, with its frame's size and format. A whole frame begins with `frame full`.
+    /// The item, with its frame's size and format. A whole frame begins with `frame full`.
     name: String,
     file: PathBuf,
 }
