@@ -20,7 +20,7 @@ const PRESSES: Contacts = Contacts {
     place_mm: 4.0,
 };
 
-/// Presses on honest frames.
+/// Presses on undisturbed frames.
 const HONEST: Contacts = Contacts {
     force_n: [0.002, 0.2],
     ratio: 0.8,
@@ -82,8 +82,8 @@ impl Outcome {
 }
 
 /// Moving cases are left out: they are about one frame's time, and their force itself moves. At
-/// most `most` faults are allowed: what some presses leave unexplained widens the uncertainties,
-/// and with them what passes.
+/// most `most` faults are allowed: the residuals of some presses widen the uncertainties, and with
+/// them the limits.
 fn hold(presses: Range<u64>, most: usize) {
     let mut sensor = sensor();
     let mut wrong = Vec::new();
@@ -132,8 +132,8 @@ fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
     hold(60..150, 4);
 }
 
-/// Checks honest frames in which no marker reaches the picture's border: at most one in a thousand
-/// is refused, and none is wrong.
+/// Checks undisturbed frames in which no marker reaches the picture's border: at most one in a
+/// thousand is refused, and none is wrong.
 fn hardly_any_is_refused(frames: Range<u64>) {
     let mut sensor = sensor();
     let scene = hivtac_twin::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();

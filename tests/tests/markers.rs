@@ -110,8 +110,7 @@ fn every_honest_press_is_trusted() {
     }
 }
 
-/// Iterates over options with light, everywhere or on one side, below what the value threshold
-/// needs.
+/// Iterates over options with light, everywhere or on one side, below the value threshold's need.
 fn dim() -> impl Iterator<Item = Options> {
     let gains = [0.6, 0.45, 0.36, 0.32, 0.3, 0.28, 0.24];
     let gradients = [0.15, 0.4, 0.9];

@@ -66,7 +66,7 @@ fn compare(views: [View; 2], frames: u64) {
         // wide.
         assert!(anywhere.cut * 10 < frames, "{view:?}: {anywhere:?}");
         assert!(anywhere.refused * 200 <= frames, "{view:?}: {anywhere:?}");
-        // For most of these frames, a model of presses in the middle has no honest answer.
+        // For most of these frames, a model of presses in the middle has no valid answer.
         assert!(middle.refused * 3 > frames, "{view:?}: {middle:?}");
     }
 }

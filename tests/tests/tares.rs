@@ -177,8 +177,8 @@ fn painted_tares(seed: u64, tares: u64) -> (usize, Vec<String>) {
     (taken, wrong)
 }
 
-/// Paint on less than a tenth of a millimetre can be too small to show in a marker's shape. What it
-/// leaves unexplained is then taken for the unit's own, and widens the uncertainties.
+/// Paint on less than a tenth of a millimetre can be too small to show in a marker's shape. Its
+/// residual is then taken for the unit's own, and widens the uncertainties.
 fn few_do_harm(seed: u64, tares: u64) {
     let (taken, wrong) = painted_tares(seed, tares);
     let forces = taken * 2 * PRESSED;
@@ -324,7 +324,7 @@ fn first_tares(units: u64, force_n: f64) -> (u64, usize, Vec<String>) {
     (refused, told, wrong)
 }
 
-/// The limits follow from what gluing, lens and camera allow to be seen.
+/// The limits follow from the scatter of gluing, lens and camera.
 #[test]
 fn a_first_tare_of_a_pressed_film_is_refused_or_within_what_is_stated() {
     for (force_n, least) in [(0.002, 0), (0.005, 30), (0.01, 54)] {
