@@ -36,7 +36,7 @@ mod tests {
     use anyhow::anyhow;
 
     #[test]
-    fn parts_are_in_their_order_and_the_first_error_is_told() {
+    fn parts_are_in_their_order_and_the_first_error_is_reported() {
         assert_eq!(
             map(1000, |part| 3 * part),
             (0..1000).map(|part| 3 * part).collect::<Vec<_>>()

@@ -114,7 +114,7 @@ impl Weights {
                 self.network
                     .as_ref()
                     .is_none_or(|it| it.meaning.tells_place()),
-                "film: only a network that tells places can have one"
+                "film: only a network with places can have one"
             );
             ensure!(
                 film.rest_px.len() == markers,

@@ -224,7 +224,7 @@ fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
 /// bounds, give or take 1.5. Of |F|, more do: its uncertainty also covers the film's brightness
 /// next to the dots, which these frames do not vary.
 #[test]
-fn its_uncertainties_are_honest() {
+fn its_uncertainties_hold() {
     let evaluation = presses(2_000, 1);
     let parts = coverage(&evaluation.judged);
     assert_eq!(parts.len(), 10);

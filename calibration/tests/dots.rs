@@ -36,7 +36,7 @@ impl Presses {
 
 /// The measurements of frames.
 #[derive(Default)]
-struct Told {
+struct Measured {
     frames: u32,
     /// Frames in which all dots are wholly seen.
     whole: u32,
@@ -48,7 +48,7 @@ struct Told {
     within: [u32; 3],
 }
 
-impl Told {
+impl Measured {
     fn add(&mut self, sensor: &mut Sensor<'_>, scene: &Scene, load: &Load, number: u64) {
         let frame = scene.render_load(load, number).unwrap();
         sensor.forget_frame();
@@ -113,20 +113,24 @@ fn needles_within_8_mm() {
                 force_mn: [force_mn; 2],
             };
             let mut random = ChaCha8Rng::seed_from_u64(within_mm as u64);
-            let mut told = Told::default();
+            let mut measured = Measured::default();
             for number in 0..400 {
                 let load = presses.draw(&mut random);
-                told.add(&mut sensor, &scene, &load, number);
+                measured.add(&mut sensor, &scene, &load, number);
             }
-            told.print(&format!("±{within_mm} mm | {force_mn} mN"));
-            let is_right = told.rms().iter().zip(wanted).all(|(rms, most)| *rms < most);
-            assert!(force_mn != 100.0 || is_right, "{:?}", told.rms());
+            measured.print(&format!("±{within_mm} mm | {force_mn} mN"));
+            let is_right = measured
+                .rms()
+                .iter()
+                .zip(wanted)
+                .all(|(rms, most)| *rms < most);
+            assert!(force_mn != 100.0 || is_right, "{:?}", measured.rms());
         }
     }
 }
 
 /// Applies a fault to a dot after the tare.
-fn befall(options: &mut Options, fault: &str, dot: usize) {
+fn apply(options: &mut Options, fault: &str, dot: usize) {
     let moved = |times: f64| {
         let mut glued_mm = Dots::defaults(8);
         glued_mm[dot] = [0.6, 0.8].map(|part| times * TENTH_OF_A_PX_MM * part);
@@ -153,7 +157,7 @@ fn befall(options: &mut Options, fault: &str, dot: usize) {
 /// A dot that is lost or lies, each in turn.
 #[test]
 #[ignore = "slow: 4,000 frames"]
-fn what_befalls_a_dot() {
+fn faults_of_a_dot() {
     let presses = Presses {
         within_mm: 4.0,
         force_mn: [50.0, 200.0],
@@ -166,22 +170,22 @@ fn what_befalls_a_dot() {
         "a dot moved by 0.1 px",
         "a dot moved by 0.5 px",
     ] {
-        let mut told = Told::default();
+        let mut measured = Measured::default();
         for dot in 0..8 {
             let mut sensor = tared(&nominal());
-            let scene = scene(|options| befall(options, fault, dot));
+            let scene = scene(|options| apply(options, fault, dot));
             let mut random = ChaCha8Rng::seed_from_u64(dot as u64);
             for number in 0..100 {
                 let load = presses.draw(&mut random);
-                told.add(&mut sensor, &scene, &load, 1_000 * dot as u64 + number);
+                measured.add(&mut sensor, &scene, &load, 1_000 * dot as u64 + number);
             }
         }
-        told.print(fault);
-        assert!(told.percent(told.forces) > 94.0, "{fault}");
+        measured.print(fault);
+        assert!(measured.percent(measured.forces) > 94.0, "{fault}");
         match fault {
-            "none" => of_none = told.rms(),
+            "none" => of_none = measured.rms(),
             // Little more is known less well.
-            _ => assert!(told.rms()[0] < 1.6 * of_none[0], "{fault}"),
+            _ => assert!(measured.rms()[0] < 1.6 * of_none[0], "{fault}"),
         }
     }
 }

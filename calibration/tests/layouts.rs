@@ -131,7 +131,7 @@ fn judged(sensor: &mut Sensor<'_>, scene: &Scene) -> (u32, [u32; 3], Vec<Lost>) 
 }
 
 #[test]
-fn eight_dots_give_a_force_with_an_honest_uncertainty() {
+fn eight_dots_give_a_force_with_a_correct_uncertainty() {
     let scene = nominal();
     let (shown, within, _) = judged(&mut tared(&scene), &scene);
     assert!(shown >= 38, "{shown} of 40");

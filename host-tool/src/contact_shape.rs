@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_told_in_words() {
+    fn it_is_reported_in_words() {
         let flat = text(ContactShape::Flat(Micrometres(2_500)));
         assert_eq!(flat, "flat, a rigid face of 2.5 mm radius");
         let round = text(ContactShape::Round(Micrometres(250)));

@@ -3,7 +3,7 @@
 
 use crate::device::seconds;
 use crate::output::{self, Reader, note, print};
-use crate::record::{Heard, listen_to_all};
+use crate::record::{Arrival, listen_to_all};
 use clap::Args;
 use hivtac_host::clock::{Clock, now_ns};
 use hivtac_host::failure::{Failure, Kind};
@@ -180,8 +180,8 @@ pub fn run(command: &GripCommand) -> Result<(), Failure> {
     if !command.json {
         print(&lines::header())?;
     }
-    let result = listen_to_all(&mut links, command.timeout, command.seconds, |heard| {
-        shown.all(heard)
+    let result = listen_to_all(&mut links, command.timeout, command.seconds, |arrivals| {
+        shown.all(arrivals)
     });
     note(&shown.lateness.summary());
     result.and_then(|()| stop::check())
@@ -201,12 +201,12 @@ struct Shown {
 
 impl Shown {
     /// Shows all grips until both fingers are over.
-    fn all(&mut self, heard: &Receiver<Heard>) -> Result<(), Failure> {
-        for Heard {
+    fn all(&mut self, arrivals: &Receiver<Arrival>) -> Result<(), Failure> {
+        for Arrival {
             sensor,
             at,
             message,
-        } in heard
+        } in arrivals
         {
             match message {
                 DeviceMessage::Stats(stats) => self.clocks[sensor].latency(stats.latency_us),

@@ -367,13 +367,13 @@ mod tests {
     }
 
     #[test]
-    fn a_person_is_told_that_there_is_no_force_though_nothing_says_why() {
+    fn a_person_is_reported_that_there_is_no_force_though_nothing_says_why() {
         let line = row(Format::Human, &sample(None, Status::default()), None);
         assert!(line.ends_with("        –  no force"), "{line}");
     }
 
     #[test]
-    fn a_person_is_told_of_a_contact_once() {
+    fn a_person_is_reported_of_a_contact_once() {
         let pressed = sample(Some(force(None)), Status::CONTACT);
         let line = row(Format::Human, &pressed, None);
         assert!(line.ends_with("      yes  ok"), "{line}");
@@ -422,7 +422,7 @@ mod tests {
 
     /// The force is the sum; the line has the contacts, too.
     #[test]
-    fn two_contacts_are_told_each() {
+    fn two_contacts_are_reported_each() {
         let mut two = with_place();
         two.status |= Status::TWO_CONTACTS;
         let one = force(Some(PLACE));

@@ -285,7 +285,7 @@ impl Link {
     ) -> Result<bool, Failure> {
         let end = Instant::now() + patience;
         if self.only_sends {
-            return self.hears(end, other);
+            return self.is_status(end, other);
         }
         let id = self.command(Request::GetInfo)?;
         while let Some(message) = self.receive(end)? {
@@ -307,20 +307,20 @@ impl Link {
     }
 
     /// Whether a line that only sends carries a hello or statistics, rather than samples.
-    fn hears(
+    fn is_status(
         &mut self,
         end: Instant,
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<bool, Failure> {
         while let Some(message) = self.receive(end)? {
-            let tells = match message {
+            let is_status = match message {
                 DeviceMessage::Hello(_) | DeviceMessage::Stats(_) => Some(true),
                 DeviceMessage::Sample(_) => Some(false),
                 _ => None,
             };
             other(message);
-            if let Some(tells) = tells {
-                return Ok(tells);
+            if let Some(is_status) = is_status {
+                return Ok(is_status);
             }
         }
         Err(self.lost("the device sends nothing"))

@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn addresses_are_told_apart() {
+    fn addresses_are_distinguished() {
         assert_eq!(
             Address::parse("tcp:localhost:7"),
             Address::Tcp("localhost:7".into())

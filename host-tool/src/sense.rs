@@ -296,8 +296,8 @@ fn complaint(refusal: Refusal) -> String {
         Refusal::Touched(force) => {
             let millinewtons = f64::from(force.0) * 1e-3;
             return format!(
-                "shows a film that looks touched, by {millinewtons:.1} mN, beside where the unit \
-                 rested when it was calibrated, or as sensors are built: use a picture without a \
+                "shows a film that looks touched, by {millinewtons:.1} mN, compared with the \
+                 unit at its calibration, or with sensors as built: use a picture without a \
                  press, or calibrate anew"
             );
         }

@@ -398,7 +398,7 @@ mod tests {
     };
 
     #[test]
-    fn gaps_are_told_apart() {
+    fn gaps_are_distinguished() {
         let mut gaps = Gaps::default();
         assert_eq!(
             gaps.count(u32::MAX - 1, 10),

@@ -321,10 +321,10 @@ mod tests {
             for _ in 0..ms * 1_000 / FRAME_US {
                 self.time_us += FRAME_US;
                 let before = self.tare;
-                let told = self.tare.follow(Some(limits), self.time_us, features);
+                let reported = self.tare.follow(Some(limits), self.time_us, features);
                 let has_moved = before.rest != self.tare.rest;
-                assert_eq!(has_moved, told == RestChange::Moved);
-                assert!(told != RestChange::Nothing || before.drift == self.tare.drift);
+                assert_eq!(has_moved, reported == RestChange::Moved);
+                assert!(reported != RestChange::Nothing || before.drift == self.tare.drift);
             }
         }
 

@@ -133,7 +133,7 @@ class Logged(unittest.TestCase):
         self.assertEqual(set(content.by_frame("/thumb/force", "scalars")), {sample.frame})
         self.assertEqual(set(content.by_frame("/thumb/picture", "buffer")), {picture.frame})
 
-    def test_failures_are_told(self):
+    def test_failures_are_reported(self):
         with self.assertRaisesRegex(AssertionError, "hivtac: .*no-such"):
             log("no-such.mcap")
         with self.assertRaisesRegex(AssertionError, "not both"):

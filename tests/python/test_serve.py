@@ -151,7 +151,7 @@ def pressed(messages):
 
 
 class OnTheRig(unittest.TestCase):
-    def test_forces_are_those_of_the_scene_and_a_pulled_cable_is_told(self):
+    def test_forces_are_those_of_the_scene_and_a_pulled_cable_is_reported(self):
         node = Node()
         wrenches = [
             node.reader("rt/hivtac/wrench", WrenchStamped, reliability)
@@ -262,7 +262,7 @@ class OfARecording(unittest.TestCase):
         self.assertGreater(len(received), len(kept) // 2)
         self.assertEqual(received, kept[-len(received) :])
 
-    def test_a_second_one_of_its_name_and_of_its_port_is_told(self):
+    def test_a_second_one_of_its_name_and_of_its_port_is_reported(self):
         with Replay(self.file) as one, Replay(self.file) as other:
             with Serve(*ROS2, *FOXGLOVE, *one.port) as first:
                 taken = ["--listen", first.ready["foxglove"].removeprefix("ws://")]
@@ -289,7 +289,7 @@ class OfARecording(unittest.TestCase):
                         wrench.header.frame_id, f"hivtac_unit_{unit}_film"
                     )
 
-    def test_nobody_there_is_told(self):
+    def test_nobody_there_is_reported(self):
         alone = ["--ros2", "--domain", "231"]
         with Replay(self.file) as replay, Serve(*alone, *replay.port) as serve:
             until(lambda: "nothing else of ROS 2 is in domain 231" in serve.errors())

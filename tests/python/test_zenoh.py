@@ -175,7 +175,7 @@ class OnZenoh(unittest.TestCase):
         client.close()
         gravity.close()
 
-    def test_a_second_one_of_its_name_is_told(self):
+    def test_a_second_one_of_its_name_is_reported(self):
         words = f"another node in domain {DOMAIN} is called /hivtac, too"
         with Twin() as twin, serving(self.twin) as first, serving(twin) as second:
             until(lambda: words in first.errors() and words in second.errors())

@@ -138,7 +138,7 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8], motion:
 /// the device adds the film's possible creep by earlier frames.
 fn follows(said: &Value, measured: &Value) -> Result<(), String> {
     const SIGMAS: [usize; 3] = [6, 7, 10];
-    let told = |value: &Value| {
+    let reported = |value: &Value| {
         let mut value = value.clone();
         let mut sigmas = Vec::new();
         if let Some(force) = value["force"].as_array_mut() {
@@ -146,7 +146,7 @@ fn follows(said: &Value, measured: &Value) -> Result<(), String> {
         }
         (value, sigmas)
     };
-    let ((said_rest, said_sigmas), (rest, sigmas)) = (told(said), told(measured));
+    let ((said_rest, said_sigmas), (rest, sigmas)) = (reported(said), reported(measured));
     let as_certain = said_sigmas.iter().zip(&sigmas).all(|(a, b)| a >= b);
     match said_rest == rest && as_certain {
         true => Ok(()),

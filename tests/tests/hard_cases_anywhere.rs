@@ -21,7 +21,7 @@ const PRESSES: Contacts = Contacts {
 };
 
 /// Presses on undisturbed frames.
-const HONEST: Contacts = Contacts {
+const UNDISTURBED: Contacts = Contacts {
     force_n: [0.002, 0.2],
     ratio: 0.8,
     place_mm: 4.0,
@@ -140,7 +140,7 @@ fn hardly_any_is_refused(frames: Range<u64>) {
     let mut random = Random::new(23);
     let (mut refused, mut reasons) = (0, BTreeMap::new());
     for number in 0..frames.end {
-        let load = HONEST.draw(&mut random).unwrap();
+        let load = UNDISTURBED.draw(&mut random).unwrap();
         if !frames.contains(&number) {
             continue;
         }
@@ -164,12 +164,12 @@ fn hardly_any_is_refused(frames: Range<u64>) {
 }
 
 #[test]
-fn honest_frames_anywhere_are_accepted() {
+fn undisturbed_frames_anywhere_are_accepted() {
     hardly_any_is_refused(0..2_000);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn of_thousands_of_honest_frames_anywhere_at_most_one_in_a_thousand_is_refused() {
+fn of_thousands_of_undisturbed_frames_anywhere_at_most_one_in_a_thousand_is_refused() {
     hardly_any_is_refused(2_000..10_000);
 }

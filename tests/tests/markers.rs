@@ -84,7 +84,7 @@ fn around(count: u32) -> impl Iterator<Item = (f64, f64)> {
 }
 
 #[test]
-fn every_honest_press_is_trusted() {
+fn every_undisturbed_press_is_trusted() {
     for views in views(Contact::Force, &[[320, 240]]) {
         let mut sensors = views.map(|view| (view, view.sensor().unwrap()));
         let scene = scene(views[0].preset, Options::default());

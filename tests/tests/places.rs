@@ -72,7 +72,7 @@ fn compare(views: [View; 2], frames: u64) {
 }
 
 #[test]
-fn honest_contacts_anywhere_have_a_force_at_qvga() {
+fn undisturbed_contacts_anywhere_have_a_force_at_qvga() {
     for views in views(Contact::Force, &[[320, 240]]) {
         compare(views, 2_400);
     }
@@ -80,7 +80,7 @@ fn honest_contacts_anywhere_have_a_force_at_qvga() {
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn honest_contacts_anywhere_have_a_force_at_800_by_600() {
+fn undisturbed_contacts_anywhere_have_a_force_at_800_by_600() {
     for views in views(Contact::Force, &[[800, 600]]) {
         compare(views, 800);
     }

@@ -387,10 +387,10 @@ fn two_needles_are_two_contacts_on_the_flashed_program() {
     let (samples, rig, _folder) = samples_of(&moved_by_two(), SAMPLES_OF_TWO);
     let steps = samples.windows(2).map(|pair| pair[1].frame - pair[0].frame);
     let steps: Vec<u32> = steps.collect();
-    let told = |sample: &Sample| sample.status.contains(Status::TWO_CONTACTS);
-    let first = samples.iter().position(told).expect("two contacts");
+    let reported = |sample: &Sample| sample.status.contains(Status::TWO_CONTACTS);
+    let first = samples.iter().position(reported).expect("two contacts");
     assert!((20..190).contains(&first), "{first}");
-    assert!(samples[first..].iter().all(told), "{samples:?}");
+    assert!(samples[first..].iter().all(reported), "{samples:?}");
     assert!(steps[FIRST..].iter().all(|step| *step == 1), "{steps:?}");
     let last = samples.last().unwrap();
     let mut each = last.each_contact().to_vec();
@@ -442,8 +442,8 @@ fn health_and_stats(rig: &Rig) -> (Health, Stats) {
     let (mut health, mut stats) = (None, None);
     for request in [Request::GetHealth, Request::GetInfo] {
         let ask = link.request(request, PATIENCE, |message| match message {
-            DeviceMessage::Health(told) => health = Some(told),
-            DeviceMessage::Stats(told) => stats = Some(told),
+            DeviceMessage::Health(reported) => health = Some(reported),
+            DeviceMessage::Stats(reported) => stats = Some(reported),
             _ => {}
         });
         ask.unwrap();

@@ -115,9 +115,9 @@ fn a_picture_of_ones_own_is_sensed_as_by_native_code() {
         .collect();
     let native = photograph::sense(&with_opacity, 320, 240);
     let mut lines = native.split(|&byte| byte == b'\n');
-    let [sample, told] =
+    let [sample, reported] =
         [(); 2].map(|()| -> Value { serde_json::from_slice(lines.next().unwrap()).unwrap() });
-    assert_eq!(shown["markers"], told["markers"]);
+    assert_eq!(shown["markers"], reported["markers"]);
     assert_eq!(shown["markers"].as_array().unwrap().len(), 4);
     let size = sample["sample"][4][3].as_f64().unwrap() / 1e3;
     assert!((shown["force"]["magnitude"].as_f64().unwrap() - size).abs() < 1e-9);

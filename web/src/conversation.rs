@@ -30,7 +30,7 @@ pub struct Job {
 }
 
 /// An event of a conversation.
-pub enum Heard {
+pub enum ConversationEvent {
     /// The first hello.
     Hello(DeviceHello),
     /// Any other message.
@@ -71,7 +71,7 @@ pub struct Conversation {
     jobs: VecDeque<Job>,
     sent: Option<Sent>,
     last_id: u16,
-    heard: VecDeque<Heard>,
+    events: VecDeque<ConversationEvent>,
 }
 
 impl Conversation {
@@ -85,7 +85,7 @@ impl Conversation {
             jobs: VecDeque::new(),
             sent: None,
             last_id: 0,
-            heard: VecDeque::new(),
+            events: VecDeque::new(),
         }
     }
 
@@ -100,8 +100,8 @@ impl Conversation {
     }
 
     /// Takes its next event, if any.
-    pub fn heard(&mut self) -> Option<Heard> {
-        self.heard.pop_front()
+    pub fn next_event(&mut self) -> Option<ConversationEvent> {
+        self.events.pop_front()
     }
 
     /// The decoder's rejects since the device's hello.
@@ -119,7 +119,7 @@ impl Conversation {
                     self.phase = Phase::Open;
                     // Rejects before its hello do not count.
                     self.decoder.reset();
-                    self.heard.push_back(Heard::Hello(hello));
+                    self.events.push_back(ConversationEvent::Hello(hello));
                 }
                 // The rest of an earlier conversation.
                 (Received::Message(_), Phase::Greets(..)) => {}
@@ -134,7 +134,7 @@ impl Conversation {
 
     fn message(&mut self, message: DeviceMessage, now_us: u64) {
         let Some(sent) = &mut self.sent else {
-            self.heard.push_back(Heard::Message(message));
+            self.events.push_back(ConversationEvent::Message(message));
             return;
         };
         match (&message, &mut sent.collected) {
@@ -153,7 +153,7 @@ impl Conversation {
             (DeviceMessage::Sample(sample), Some(collected)) => collected.remember(sample.clone()),
             _ => {}
         }
-        self.heard.push_back(Heard::Message(message));
+        self.events.push_back(ConversationEvent::Message(message));
     }
 
     fn replied(&mut self, outcome: Outcome) {
@@ -176,8 +176,8 @@ impl Conversation {
     fn snapshot(&mut self, taken: Result<Taken, Failure>) {
         self.sent = None;
         if let Some(job) = self.jobs.pop_front() {
-            self.heard
-                .push_back(Heard::Snapshot(job.ticket, taken.map(Box::new)));
+            self.events
+                .push_back(ConversationEvent::Snapshot(job.ticket, taken.map(Box::new)));
         }
     }
 
@@ -190,14 +190,16 @@ impl Conversation {
         if job.commands.is_empty()
             && let Some(job) = self.jobs.pop_front()
         {
-            self.heard.push_back(Heard::Ended(job.ticket, Ok(job.done)));
+            self.events
+                .push_back(ConversationEvent::Ended(job.ticket, Ok(job.done)));
         }
     }
 
     fn give_up(&mut self, failure: Failure) {
         self.sent = None;
         if let Some(job) = self.jobs.pop_front() {
-            self.heard.push_back(Heard::Ended(job.ticket, Err(failure)));
+            self.events
+                .push_back(ConversationEvent::Ended(job.ticket, Err(failure)));
         }
     }
 
@@ -207,9 +209,10 @@ impl Conversation {
         self.sent = None;
         for job in self.jobs.drain(..) {
             let failure = Failure::new(Kind::Lost, failure.to_string());
-            self.heard.push_back(Heard::Ended(job.ticket, Err(failure)));
+            self.events
+                .push_back(ConversationEvent::Ended(job.ticket, Err(failure)));
         }
-        self.heard.push_back(Heard::Lost(failure));
+        self.events.push_back(ConversationEvent::Lost(failure));
     }
 
     /// Sends due messages, and gives up commands that took too long.

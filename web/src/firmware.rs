@@ -58,13 +58,13 @@ mod tests {
         let mut firmware = Firmware::default();
         assert_eq!(firmware.parts(&[]).0["why"], "no firmware was chosen");
         let image = examples::image("board", "1.2.3", 150_000, 7);
-        let told = firmware.choose(image.bytes(), None);
-        assert_eq!(told["version"], image.version());
-        let (told, bytes) = firmware.parts(&image.bytes()[..FIRST_LOOK]);
-        assert_eq!(told["parts"][0][0], PROGRAM);
+        let reported = firmware.choose(image.bytes(), None);
+        assert_eq!(reported["version"], image.version());
+        let (reported, bytes) = firmware.parts(&image.bytes()[..FIRST_LOOK]);
+        assert_eq!(reported["parts"][0][0], PROGRAM);
         assert_eq!(bytes, image.program());
-        let (told, bytes) = firmware.parts(&[0xFF; FIRST_LOOK]);
-        assert_eq!(told["parts"][0][0], FIRST_STAGE);
+        let (reported, bytes) = firmware.parts(&[0xFF; FIRST_LOOK]);
+        assert_eq!(reported["parts"][0][0], FIRST_STAGE);
         assert_eq!(
             bytes.len(),
             image.first_stage().len() + image.program().len()

@@ -66,7 +66,7 @@ impl Weights {
 fn least_scales(weights: &Weights, dataset: &Dataset) -> Result<Vec<LeastScale>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-    let forward = model.forward.context("the network tells no place")?;
+    let forward = model.forward.context("the network gives no place")?;
     let mut chip = Chip::new(model, &dataset.rest()?)?;
     let mut all = Vec::new();
     for sample in dataset.samples() {

@@ -448,16 +448,16 @@ mod tests {
                 now: down.map(|part| part as f32),
             };
             let hanging = forward.hanging(turned, true).unwrap();
-            let mut told = forward::Prediction::zeros(OF_FOUR);
+            let mut reported = forward::Prediction::zeros(OF_FOUR);
             let chip = forward::Pose {
                 size: pose.size as f32,
                 tilt: pose.tilt.map(|part| part as f32),
                 place_mm: pose.place_mm.map(|part| part as f32),
                 width: 0.0,
             };
-            hanging.add_to(&chip, &forward, &mut told);
+            hanging.add_to(&chip, &forward, &mut reported);
             for c in 0..8 {
-                let moved = f64::from(told.moved[c]);
+                let moved = f64::from(reported.moved[c]);
                 let off = camera.focal_px() * (moved - (with[c] - without[c]));
                 sum += off * off;
                 worst = worst.max(off.abs());

@@ -327,7 +327,7 @@ mod tests {
 
     /// Frames of the simulated camera: one needle is one contact, two are two, three are neither.
     #[test]
-    fn two_needles_are_told_from_one_and_from_three() {
+    fn two_needles_are_distinguished_from_one_and_from_three() {
         let model = Model::parse(MODEL).unwrap();
         let mut bench = Bench::new(&model);
         let (status, two) = bench.seen(&[LEFT]);

@@ -127,8 +127,8 @@ impl FakeSensor {
         std::thread::spawn(move || {
             let mut counts = [0, 0];
             while let Ok((stream, _)) = listener.accept() {
-                let told = (*answered.lock().unwrap(), *of_model.lock().unwrap());
-                talk(stream, &mut film, told, &mut counts, after);
+                let reported = (*answered.lock().unwrap(), *of_model.lock().unwrap());
+                talk(stream, &mut film, reported, &mut counts, after);
             }
         });
         Self {
@@ -143,7 +143,7 @@ impl FakeSensor {
 fn talk(
     mut stream: TcpStream,
     film: &mut Film,
-    told: (Outcome, Option<u8>),
+    reported: (Outcome, Option<u8>),
     [frame, start]: &mut [u32; 2],
     after: usize,
 ) {
@@ -163,7 +163,7 @@ fn talk(
                         return;
                     };
                     let was = streaming;
-                    answer(&mut stream, message, told, &mut streaming);
+                    answer(&mut stream, message, reported, &mut streaming);
                     *start += u32::from(streaming && !was);
                 }
             }

@@ -129,7 +129,7 @@ fn the_example_prints_true_forces_with_either_library() {
 }
 
 #[test]
-fn what_cannot_be_is_told_and_nothing_crashes() {
+fn what_cannot_be_is_reported_and_nothing_crashes() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("edges");
     let archive = libraries().join("libhivtac.a");

@@ -27,11 +27,11 @@ pub fn step(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     link.request(Request::Start, patience, |_| ())?;
     let side = |name: &str| {
         format!(
-            "→ Look from behind the camera the way it looks. Press the film beside its middle, \
-             {name}, for half a second, and let go."
+            "→ Look along with the camera, from behind it. Press the film {name} its middle for \
+             half a second, and let go."
         )
     };
-    note(&side("on the right"));
+    note(&side("right of"));
     let right = press(link)?;
     let below = match right {
         Some(_) => {

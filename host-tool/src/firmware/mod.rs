@@ -178,11 +178,11 @@ fn report(
 ) -> Result<(), Failure> {
     let now = shown(&after.firmware);
     let was = before.map(|hello| shown(&hello.firmware));
-    let told = match &was {
+    let reported = match &was {
         Some(was) => format!("firmware {now}, was {was}"),
         None => format!("firmware {now}"),
     };
-    tell(json, &told, &json!({ "firmware": now, "was": was }))?;
+    tell(json, &reported, &json!({ "firmware": now, "was": was }))?;
     match now.ends_with(&format!(" {}", image.version())) {
         true => Ok(()),
         false => {
@@ -205,7 +205,7 @@ fn come_back(
     wait: Duration,
 ) -> Result<DeviceHello, Failure> {
     let end = Instant::now() + wait;
-    let mut told = false;
+    let mut reported = false;
     let is_same = |hello: &DeviceHello| before.is_none_or(|it| it.device_id == hello.device_id);
     while Instant::now() < end {
         stop::check()?;
@@ -214,7 +214,7 @@ fn come_back(
             Ok((_, hello)) if is_same(&hello) => return Ok(hello),
             Err(failure) if failure.kind == Kind::Version => return Err(failure),
             Err(failure) if failure.kind == Kind::Interrupted => return Err(failure),
-            Ok(_) if !std::mem::replace(&mut told, true) => {
+            Ok(_) if !std::mem::replace(&mut reported, true) => {
                 note("hivtac: another device is there; waiting for the one that was updated");
             }
             _ => {}

@@ -205,7 +205,7 @@ fn frames_of_two_cameras_are_compared_at_one_time() {
 #[test]
 fn a_finger_that_refuses_or_is_silent_is_the_cause() {
     let names = ["thumb".to_owned(), "index".to_owned()];
-    let told = |grips: &[Grip]| {
+    let reported = |grips: &[Grip]| {
         let grip = grips.last().expect("a grip");
         assert_eq!(grip.contact(), None);
         assert!(lines::json(grip, &names).contains(r#""grip":null,"#));
@@ -215,10 +215,10 @@ fn a_finger_that_refuses_or_is_silent_is_the_cause() {
     assert_eq!(pair.push(1, reading(FRAME_NS)), []);
     assert_eq!(pair.push(1, reading(2 * FRAME_NS)), []);
     let first = pair.push(0, refused(FRAME_NS + 1));
-    assert_eq!(told(&first), "thumb: markers_missing");
+    assert_eq!(reported(&first), "thumb: markers_missing");
     pair.push(1, refused(3 * FRAME_NS));
     let second = pair.push(0, reading(2 * FRAME_NS + 1));
-    assert_eq!(told(&second), "index: markers_missing");
+    assert_eq!(reported(&second), "index: markers_missing");
     let both = second[0].status;
     assert!(both[0].contains(Status::CONTACT) && both[1].contains(Status::NOT_CALIBRATED));
     // The second finger says no more: after 0.1 s that is the cause.
@@ -226,12 +226,12 @@ fn a_finger_that_refuses_or_is_silent_is_the_cause() {
         .flat_map(|frame| pair.push(0, reading(frame * FRAME_NS + 1)))
         .collect();
     assert!(!silent.is_empty() && silent.len() < 27, "{}", silent.len());
-    assert_eq!(told(&silent), "index: no samples");
+    assert_eq!(reported(&silent), "index: no samples");
     // It is back, and the first one is gone.
     let back: Vec<Grip> = (30..60)
         .flat_map(|frame| pair.push(1, reading(frame * FRAME_NS)))
         .collect();
-    assert_eq!(told(&back), "thumb: no samples");
+    assert_eq!(reported(&back), "thumb: no samples");
     assert!(
         back.iter()
             .rev()

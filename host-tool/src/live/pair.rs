@@ -214,10 +214,10 @@ mod tests {
     #[test]
     fn two_fingers_are_two_contacts() {
         let samples = samples(200);
-        let told = |sample: &&Sample| sample.status.contains(Status::TWO_CONTACTS);
-        let first = samples.iter().position(|sample| told(&sample)).unwrap();
+        let reported = |sample: &&Sample| sample.status.contains(Status::TWO_CONTACTS);
+        let first = samples.iter().position(|sample| reported(&sample)).unwrap();
         assert!((20..180).contains(&first), "{first}");
-        assert!(samples[first..].iter().all(|sample| told(&sample)));
+        assert!(samples[first..].iter().all(|sample| reported(&sample)));
         let last = samples.last().unwrap();
         let mut contacts = last.each_contact().to_vec();
         contacts.sort_by_key(|contact| contact.place.unwrap().x);

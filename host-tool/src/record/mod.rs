@@ -3,7 +3,7 @@
 mod listen;
 mod table;
 
-pub use listen::{Heard, listen_to_all};
+pub use listen::{Arrival, listen_to_all};
 
 use crate::device::{Devices, seconds};
 use crate::grip_command::{GripArguments, Paired};
@@ -244,17 +244,17 @@ impl Recording {
     /// Keeps all messages until the end; a failure of one device ends the recording.
     fn follow(&mut self, links: &mut [Link], arguments: &RecordArguments) -> Result<(), Failure> {
         let patience = arguments.devices.timeout;
-        listen_to_all(links, patience, arguments.seconds, |heard| {
-            self.keep_all(heard)
+        listen_to_all(links, patience, arguments.seconds, |arrivals| {
+            self.keep_all(arrivals)
         })
     }
 
     /// Keeps the messages until all senders are gone.
-    fn keep_all(&mut self, heard: &Receiver<Heard>) -> Result<(), Failure> {
+    fn keep_all(&mut self, arrivals: &Receiver<Arrival>) -> Result<(), Failure> {
         let mut flushed = Instant::now();
         loop {
-            match heard.recv_timeout(FLUSH_EVERY.saturating_sub(flushed.elapsed())) {
-                Ok(heard) => self.keep(&heard)?,
+            match arrivals.recv_timeout(FLUSH_EVERY.saturating_sub(flushed.elapsed())) {
+                Ok(arrival) => self.keep(&arrival)?,
                 Err(RecvTimeoutError::Timeout) => (),
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
@@ -270,12 +270,12 @@ impl Recording {
     ///
     /// # Errors
     /// When the disk is full or gone.
-    pub fn keep(&mut self, heard: &Heard) -> Result<(), Failure> {
-        let Heard {
+    pub fn keep(&mut self, arrival: &Arrival) -> Result<(), Failure> {
+        let Arrival {
             sensor,
             at,
             message,
-        } = heard;
+        } = arrival;
         let tally = &mut self.sensors[*sensor].tally;
         match message {
             DeviceMessage::Sample(sample) => drop(tally.sample(sample)),

@@ -124,13 +124,13 @@ fn every_finding_of_a_self_test_is_named_with_its_code() {
         let mut cells = table
             .lines()
             .filter(|line| line.starts_with(&format!("| {code} |")));
-        let told = cells
+        let reported = cells
             .next()
             .unwrap_or_else(|| panic!("the page lacks {line}"));
         let name = rest.split(':').next().unwrap();
         assert!(
-            told.starts_with(&format!("| {code} | `{name}` |")),
-            "{told}: {line}"
+            reported.starts_with(&format!("| {code} | `{name}` |")),
+            "{reported}: {line}"
         );
         codes.push(code.to_owned());
     }
@@ -140,7 +140,7 @@ fn every_finding_of_a_self_test_is_named_with_its_code() {
 /// `hivtac info` shows each kind of failure of the page, and no other; also a low supply that
 /// resets nothing.
 #[test]
-fn every_kind_of_failure_is_told_by_its_name() {
+fn every_kind_of_failure_is_reported_by_its_name() {
     let page = page();
     let table = first_cells(section(&page, "What `hivtac info` shows of a failure"));
     let mut named: Vec<_> = table.iter().flat_map(|cell| cell.split(", ")).collect();
@@ -270,8 +270,8 @@ const PATTERNS: [(&str, &str); 6] = [
 #[test]
 fn every_pattern_of_the_led_is_seen_in_the_rig() {
     let page = page();
-    let told = first_cells(section(&page, "The LED"));
-    assert_eq!(told, PATTERNS.map(|(pattern, _)| pattern));
+    let reported = first_cells(section(&page, "The LED"));
+    assert_eq!(reported, PATTERNS.map(|(pattern, _)| pattern));
     let tests = root_file("twin/rig/tests/led.rs");
     for (pattern, expected) in PATTERNS {
         assert!(tests.contains(expected), "no test expects {pattern}");

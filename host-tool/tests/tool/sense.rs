@@ -355,7 +355,7 @@ fn a_white_picture_is_not_called_dark() {
 
 /// Four things that each could be a marker, but do not lie as markers do.
 #[test]
-fn the_rule_is_told_by_which_blobs_are_no_markers() {
+fn the_rule_is_reported_by_which_blobs_are_no_markers() {
     let folder = Folder::new();
     let mut image = RgbImage::from_pixel(320, 240, Rgb([128; 3]));
     for [left, top] in [[40, 60], [70, 60], [200, 150], [230, 60]] {

@@ -138,7 +138,7 @@ fn a_twin_answers_as_a_device_does() {
 }
 
 #[test]
-fn a_twin_keeps_what_it_is_told_to_keep() {
+fn a_twin_keeps_what_it_is_reported_to_keep() {
     let twin = Twin::of(&["--scene", "rest"]);
     twin.done(&["tare", "--keep"]);
     let settings = twin.done(&["settings", "get"]);
@@ -369,7 +369,7 @@ fn a_recorded_course_is_pressed_again() {
 
 /// A course with both of two contacts, as `monitor --csv` writes them, presses with both.
 #[test]
-fn a_course_of_two_contacts_is_told_as_two() {
+fn a_course_of_two_contacts_is_reported_as_two() {
     let folder = tempfile::tempdir().unwrap();
     let course = text(&folder, "course.csv");
     let of = |number: u32| {
@@ -533,10 +533,10 @@ fn two_twins_are_a_grip_on_the_page() {
     let squeezed = "grip of thumb and index: 1";
     let says = |state: &Value| state["grip"].as_str().map(str::to_owned);
     let is_known = |state: &Value| says(state).is_some_and(|it| it.starts_with(squeezed));
-    let told = says(&view.events().state(0, is_known)).unwrap();
+    let reported = says(&view.events().state(0, is_known)).unwrap();
     assert!(
-        told.contains(" mN; margin ") && told.contains(" mN; together "),
-        "{told}"
+        reported.contains(" mN; margin ") && reported.contains(" mN; together "),
+        "{reported}"
     );
     assert_eq!(view.events().state(1, |_| true)["grip"], Value::Null);
 }

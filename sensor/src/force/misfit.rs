@@ -109,15 +109,15 @@ mod tests {
     }
 
     #[test]
-    fn honest_presses_leave_the_variance_as_modelled() {
+    fn undisturbed_presses_leave_the_variance_as_modelled() {
         assert_eq!(after(0, 2.0, 1.0), 1.0);
         assert_eq!(after(100, 2.0, 0.7), 1.0);
     }
 
     #[test]
     fn what_presses_leave_is_known_after_a_few_and_limited() {
-        let told = after(8, 2.0, 2.4);
-        assert!((2.0..3.0).contains(&told), "{told}");
+        let reported = after(8, 2.0, 2.4);
+        assert!((2.0..3.0).contains(&reported), "{reported}");
         assert_eq!(after(1_000, 2.0, f32::MAX), LARGEST);
     }
 

@@ -236,9 +236,9 @@ mod tests {
         for times in [1.8f32, 3.0] {
             let (mut level, mut state) = (NoiseLevel::AS_MODELLED, 2);
             for k in 0..FOLLOWING {
-                let told = pushed(&mut level, &left(&mut state, times, 3.0));
-                let is_near = (0.6 * times..1.5 * times).contains(&told);
-                assert!(k < 32 || is_near, "{k}: {told} for {times}");
+                let reported = pushed(&mut level, &left(&mut state, times, 3.0));
+                let is_near = (0.6 * times..1.5 * times).contains(&reported);
+                assert!(k < 32 || is_near, "{k}: {reported} for {times}");
             }
             for _ in 0..64 {
                 pushed(&mut level, &left(&mut state, 1.0, 3.0));
@@ -253,8 +253,8 @@ mod tests {
     fn noise_a_little_larger_is_known_after_a_while() {
         let (mut level, mut state) = (NoiseLevel::AS_MODELLED, 4);
         for k in 0..FOLLOWING {
-            let told = pushed(&mut level, &left(&mut state, 1.4, 3.0));
-            assert!(k < 512 || told > 1.25, "{k}: {told}");
+            let reported = pushed(&mut level, &left(&mut state, 1.4, 3.0));
+            assert!(k < 512 || reported > 1.25, "{k}: {reported}");
         }
     }
 
@@ -266,8 +266,8 @@ mod tests {
             pushed(&mut level, &left(&mut state, 1.0, 0.0));
         }
         for jump in [8.0, 500.0] {
-            let told = pushed(&mut level, &left(&mut state, 1.0, jump));
-            assert!(told < 1.3, "{told}");
+            let reported = pushed(&mut level, &left(&mut state, 1.0, jump));
+            assert!(reported < 1.3, "{reported}");
         }
         // The frame after a pause has no predecessor to compare with.
         level.forget_frame();
@@ -284,8 +284,8 @@ mod tests {
         ) {
             let mut level = NoiseLevel::AS_MODELLED;
             for left in frames {
-                let told = pushed(&mut level, &Column::of(left));
-                prop_assert!((1.0..=LARGEST.sqrt()).contains(&told), "{told}");
+                let reported = pushed(&mut level, &Column::of(left));
+                prop_assert!((1.0..=LARGEST.sqrt()).contains(&reported), "{reported}");
             }
         }
     }

@@ -587,11 +587,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);
                 }
-                let told = resting.force_and_status(forward, &model.range, noise, &estimate);
-                if !is_again && is_a_press(told.1) {
+                let reported = resting.force_and_status(forward, &model.range, noise, &estimate);
+                if !is_again && is_a_press(reported.1) {
                     self.noise.saw_press(noise, &estimate, markers);
                 }
-                told
+                reported
             }
             None => force::of_outputs(model, &output),
         };

@@ -178,7 +178,7 @@ impl Error {
 
 impl PairRow {
     /// The head of the table.
-    pub const HEAD: &str = "| forces | apart | missed | a dot left out | refused | told apart | \
+    pub const HEAD: &str = "| forces | apart | missed | a dot left out | refused | resolved | \
                             direction of each (90 %) | \\|F\\| of each | place of each | \
                             sum: direction, \\|F\\| | within the stated 95 %: each; sum |\n\
                             |--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
@@ -281,7 +281,7 @@ impl PairRow {
 impl OtherRow {
     /// The head of the table.
     pub const HEAD: &str = "| press | frames | one contact | a dot left out | two contacts | \
-                            told as two | refused |\n|---|--:|--:|--:|--:|--:|--:|\n";
+                            reported as two | refused |\n|---|--:|--:|--:|--:|--:|--:|\n";
 
     /// The results of a kind.
     pub fn of(kind: Kind, outcomes: &[Outcome]) -> OtherRow {

@@ -281,7 +281,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_port_is_told_in_one_line() {
+    fn a_port_is_reported_in_one_line() {
         let tcp = Port {
             tcp: Some(4000),
             ..Port::default()

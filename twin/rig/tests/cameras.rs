@@ -87,9 +87,9 @@ fn a_silent_camera_is_restarted() {
         let stats = run.stats();
         let restarted = stats.camera_timeouts >= 1 && stats.camera_restarts >= 1;
         assert!(restarted, "{stats:?}");
-        let told = |status: Status| status.contains(Status::CAMERA_RESTARTED);
+        let reported = |status: Status| status.contains(Status::CAMERA_RESTARTED);
         let samples = run.samples();
-        let restarted = samples.iter().find(|sample| told(sample.status));
+        let restarted = samples.iter().find(|sample| reported(sample.status));
         let restarted = restarted.expect("a sample says so").frame;
         assert!(samples.iter().any(|sample| sample.frame > restarted + 3));
         run.assert_times();

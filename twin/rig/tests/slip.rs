@@ -62,8 +62,8 @@ fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<Re
 
 fn reported(run: &Run) -> Vec<Reported> {
     let samples = run.samples();
-    let told = |s: &&Sample| (s.status, s.force.map(|force| force.cartesian));
-    samples.iter().map(told).collect()
+    let stated = |s: &&Sample| (s.status, s.force.map(|force| force.cartesian));
+    samples.iter().map(stated).collect()
 }
 
 /// Returns the truth of each frame: whether the tip presses, and the distance that its contact has

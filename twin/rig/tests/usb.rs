@@ -71,7 +71,7 @@ fn a_refused_request_leaves_nothing_behind() {
 }
 
 #[test]
-fn the_status_of_an_endpoint_that_exists_is_told() {
+fn the_status_of_an_endpoint_that_exists_is_reported() {
     let setups = [
         [0x82, 0, 0, 0, 0x00, 0, 2, 0],
         [0x82, 0, 0, 0, 0x80, 0, 2, 0],

@@ -540,7 +540,7 @@ mod tests {
 
     #[test]
     fn what_it_cannot_do_gives_no_rows_and_the_register() {
-        for (also, told) in [
+        for (also, reported) in [
             ((reg::PLL_MULTIPLIER, 100), "0x3036"),
             ((reg::PLL_MULTIPLIER, 210), "84 MHz"),
             ((reg::CLOCK_SOURCE, 0x01), "0x3103"),
@@ -554,7 +554,10 @@ mod tests {
         ] {
             let output = set(&[also]).output(XCLK_HZ).unwrap();
             assert_eq!(output.rows, 0);
-            assert!(output.fault.as_ref().unwrap().contains(told), "{output:?}");
+            assert!(
+                output.fault.as_ref().unwrap().contains(reported),
+                "{output:?}"
+            );
         }
     }
 

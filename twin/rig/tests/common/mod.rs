@@ -480,7 +480,7 @@ impl Run {
             DeviceMessage::Health(health) => Some(health),
             _ => None,
         });
-        health.expect("it tells")
+        health.expect("it answers")
     }
 
     /// Returns the last counters.
@@ -530,11 +530,11 @@ impl Run {
 
     /// Returns the frames whose samples report that a frame before them was lost.
     pub fn frames_after_a_loss(&self) -> Vec<u32> {
-        let told = |sample: &&&Sample| sample.status.contains(Status::FRAME_DROPPED);
+        let reported = |sample: &&&Sample| sample.status.contains(Status::FRAME_DROPPED);
         let samples = self.samples();
         samples
             .iter()
-            .filter(told)
+            .filter(reported)
             .map(|sample| sample.frame)
             .collect()
     }

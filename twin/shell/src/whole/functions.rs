@@ -237,8 +237,8 @@ mod tests {
         let parts = Parts::of(found.coefficients());
         for (column, _) in &columns {
             let whole = dot(column, &LoadFunctions::terms().exact(&pose));
-            let told = dot(&parts.in_motion(column), &found.values(&pose));
-            assert!((whole - told).abs() < 1e-6, "{whole} {told}");
+            let reported = dot(&parts.in_motion(column), &found.values(&pose));
+            assert!((whole - reported).abs() < 1e-6, "{whole} {reported}");
         }
     }
 }
