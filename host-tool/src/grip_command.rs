@@ -133,7 +133,7 @@ fn geometry(poses: Option<&PathBuf>) -> Result<Geometry, Failure> {
     Ok(read.unwrap_or_default())
 }
 
-/// Show what two fingers feel together: grip force, common wrench, friction margin
+/// Show the grip of two fingers: grip force, common wrench, friction margin
 ///
 /// A line for each frame of the first finger, and at the end how late they came. `serve`, `record`
 /// and `view` have the same by `--grip`.

@@ -53,16 +53,16 @@ pub struct SenseArguments {
     /// Model file; the firmware's own when not given
     #[arg(long, value_name = "FILE")]
     model: Option<String>,
-    /// Columns and rows that are looked at, of all pictures; the rest counts as empty
+    /// Columns and rows to search, in all pictures; the rest counts as empty
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = region)]
     region: Option<Region>,
-    /// Picture of the same size that is white where pictures are looked at, and black elsewhere
+    /// Picture of the same size, white where to search and black elsewhere
     #[arg(long, value_name = "IMAGE")]
     mask: Option<String>,
     /// Picture of the untouched film, to measure displacements from
     #[arg(long, value_name = "IMAGE")]
     tare: Option<String>,
-    /// The shape of what presses, as in `hivtac settings set contact`
+    /// The contact's shape, as in `hivtac settings set contact`
     #[arg(long, value_name = "SHAPE", default_value = "unknown",
           value_parser = contact_shape::parse)]
     contact: ContactShape,

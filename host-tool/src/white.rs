@@ -35,8 +35,8 @@ const MOST_UNEVEN: f64 = 0.1;
 
 /// Make white white: fit the camera's gains of red and blue to a white card, and keep them
 ///
-/// Hold a white card where the film is; the picture's middle counts. A camera without colours, and
-/// what is no white card, are refused, and the settings stay as they were. Afterwards put the
+/// Hold a white card where the film is; the picture's middle counts. A camera without colours and
+/// anything but a white card are refused, and the settings stay as they were. Afterwards put the
 /// film back.
 ///
 /// Example: hivtac white

@@ -23,7 +23,7 @@ pub const WEIGHTS: &str = "calibration/models/default.weights";
 /// bound.
 #[derive(Args)]
 pub struct Anywhere {
-    /// A weights file of a network that tells places, with its film.
+    /// A weights file of a network with places, with its film.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Presses of each force.

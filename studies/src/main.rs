@@ -13,7 +13,7 @@ mod units;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
-/// What only proves or compares.
+/// Studies that prove or compare.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {

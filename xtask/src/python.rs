@@ -168,7 +168,7 @@ pub struct Kit {
     /// Folder to write to.
     #[arg(default_value = "target/kit")]
     out: PathBuf,
-    /// What bought parts measure: `--pupil-mm 1.6 --lens-front-mm 21`; `--help` after `--` lists
+    /// Measures of bought parts: `--pupil-mm 1.6 --lens-front-mm 21`; `--help` after `--` lists
     /// all.
     #[arg(last = true)]
     bought: Vec<String>,

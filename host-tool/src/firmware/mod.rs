@@ -43,8 +43,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub struct FirmwareArguments {
     #[command(flatten)]
     device: Device,
-    /// The .bin of a release, or the ELF that cargo builds; what this program came with when not
-    /// given
+    /// The .bin of a release, or the ELF that cargo builds; by default the firmware that came with
+    /// this program
     #[arg(value_name = "FILE")]
     file: Option<String>,
     /// Longest wait for the device's loader, and for the device to come back, s

@@ -32,7 +32,7 @@ use table::Table;
 /// Time between two flushes and between two lines of progress.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
-/// Record everything that one or several devices say, with both clocks, until Ctrl-C
+/// Record every message of one or several devices, with both clocks, until Ctrl-C
 ///
 /// FILE.mcap has ROS 2's profile: `ros2 bag play`, Foxglove and PlotJuggler read it, and
 /// `hivtac replay`. FILE.csv has a row a sample, with units in its header. Until its end it is
@@ -51,7 +51,7 @@ pub struct RecordArguments {
     /// End after this number of seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<Duration>,
-    /// At the end, what became of it as one JSON object
+    /// At the end, the counts as one JSON object
     #[arg(long)]
     json: bool,
 }

@@ -32,7 +32,7 @@ const TIP_MM: f64 = 0.5;
 /// Arguments of `scene tolerances`.
 #[derive(Args)]
 pub struct Tolerances {
-    /// A weights file of a network that tells places, with its film.
+    /// A weights file of a network with places, with its film.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Presses on each unit.

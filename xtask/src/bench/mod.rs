@@ -18,7 +18,7 @@ const BASELINE: &str = "xtask/baseline.json";
 /// Options of `cargo xtask bench`.
 #[derive(Args, Default)]
 pub struct Bench {
-    /// Make what is measured now the baseline that later counts are held to.
+    /// Make this measurement the baseline for later counts.
     #[arg(long)]
     write_baseline: bool,
     /// Count on a Cortex-M55 instead, for which there is no baseline.

@@ -60,8 +60,8 @@ pub struct FreeArgs {
     #[arg(long, value_name = "α,β", value_parser = axis, default_value = "0,0")]
     #[arg(allow_hyphen_values = true, requires = "free")]
     pub axis: Pose,
-    /// Show what such presses cover on a live page, too, as `hivtac view` shows a sensor; the
-    /// address is said.
+    /// Also show the coverage of such presses on a live page, as `hivtac view` shows a sensor; the
+    /// address is printed.
     #[arg(long, requires = "free")]
     pub view: bool,
 }
