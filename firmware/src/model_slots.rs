@@ -1,11 +1,10 @@
 //! Provides two places in SRAM for models that a host sends: one is in use while the other is
 //! filled.
 //!
-//! # Design
-//! A model runs from SRAM and not from the flash that keeps it: a core that reads a flash bank
-//! waits while that bank is erased, for a second. A slot is filled, then *lent*, as a file that
-//! does not change until it is given back. The memory task gives it back if the model is refused,
-//! the pipeline when a different model is in use.
+//! # Design A model runs from SRAM, not from the flash that keeps it: a core that reads a flash
+//! bank waits up to a second while that bank is erased. A slot is filled, then *lent*, as a file
+//! that does not change until it is given back. The memory task gives it back if the model is
+//! refused, the pipeline when a different model is in use.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use hivtac_wire::message::MODEL_BYTES;

@@ -2,7 +2,7 @@
 //!
 //! # Design Chips are delivered without a level: the core runs on while camera and flash no longer
 //! work. The level is an option byte, written once in a chip's life, at a start, before anything
-//! else runs: the option bytes are in the program's bank, so the core waits. A reset or a power cut
+//! else runs. The option bytes are in the program's bank, so the core waits. A reset or a power cut
 //! meanwhile keeps the old options (RM0433, FLASH option bytes, "Option byte modification
 //! sequence").
 //!

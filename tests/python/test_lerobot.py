@@ -43,7 +43,7 @@ from twin import PAIR, PRESSED, Twin
 
 
 class Connected:
-    """What arms and leaders need, and these do not."""
+    """Methods that arms and leaders need, and these do not."""
 
     is_connected = False
     is_calibrated = True

@@ -111,7 +111,7 @@ class Client(Node):
         return self
 
     def __exit__(self, *_):
-        # As long as Cyclone DDS has its reader, it tells of replies of the other kind.
+        # As long as Cyclone DDS has its reader, it reports replies of the other kind.
         del self._ask, self._replies, self._participant
         gc.collect()
 
@@ -405,7 +405,7 @@ def port(rig):
 
 
 def taken(reader):
-    """What a reader has, and what comes."""
+    """Samples that a reader has, and later ones."""
     while True:
         yield from until(lambda: reader.take(100))
 

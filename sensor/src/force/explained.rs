@@ -40,8 +40,8 @@ const UNEXPLAINED_BLURRED: f32 = 5.0;
 /// parts of it; and of the place, µm.
 const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// A contact of unknown or wide shape this near to a marker, mm, moves it in ways that the tables
-/// of shapes do not have: by these factors the uncertainties of direction, |F| and place are too
-/// small. Chosen on presses near markers (`hivtac-studies contacts --near-dots --seed 11`).
+/// of shapes do not have. The uncertainties of direction, |F| and place grow by these factors.
+/// Chosen on presses near markers (`hivtac-studies contacts --near-dots --seed 11`).
 const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
 /// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on

@@ -3,7 +3,7 @@
 //!
 //! The weights of a marker's soft edge assume an even film around it. Behind a film that lets light
 //! through, a fingertip or a red thing changes redness and brightness of the film next to the
-//! marker: pixels that the marker covers in part then weigh more or less than that part. So each
+//! marker. Pixels that the marker covers in part then weigh more or less than that part. So each
 //! pixel next to a blob has a *pull*: how far it moves the edge of a marker, up to a constant. A
 //! difference of pull between two sides shifts the centroid ([`Beside::shift_px2`]). An even
 //! surrounding shifts nothing.

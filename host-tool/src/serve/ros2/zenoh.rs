@@ -1,6 +1,6 @@
 //! Zenoh as a node's middleware, as `rmw_zenoh_cpp` speaks it: a key for each topic and service,
-//! liveliness tokens that announce them, and with each message an attachment that says when it was
-//! sent and by whom.
+//! liveliness tokens that announce them, and an attachment of each message with its time and
+//! sender.
 
 use super::{KEPT, Middleware, Trouble};
 use hivtac_host::clock::now_ns;

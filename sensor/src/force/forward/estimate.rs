@@ -119,10 +119,10 @@ pub struct Estimate {
 
 impl Forward<'_> {
     /// Takes steps from a guess, or without one from where the markers moved most. If they get
-    /// stuck, or end at a load that does not explain the markers, also takes steps from where the
-    /// markers moved most, or from the nearest of a few presses, unless the start forbids it.
-    /// These succeed where the first steps began badly. Returns the better load. Compiled once,
-    /// because the near memory is scarce.
+    /// stuck, or end at a load that does not explain the markers, it starts again: where the
+    /// markers moved most, or from the nearest of a few presses, unless the start forbids it. These
+    /// succeed where the first steps began badly. Returns the better load. Compiled once, because
+    /// the near memory is scarce.
     #[inline(never)]
     pub fn estimate(
         &self,

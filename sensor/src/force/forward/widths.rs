@@ -3,9 +3,9 @@
 //!
 //! Enough markers show how wide a contact is. Width is given as a soft disc's radius; a rigid face
 //! of 0.6 times that radius moves the images alike. A table holds the motions at knots of the
-//! place: polynomials in size and width, and standard deviations of the additional motion by
-//! contacts that are longer than wide, lean, or press with their rim. Film and markers are
-//! symmetric, so places along +x and +y give all others.
+//! place, as polynomials in size and width. It also has standard deviations of the additional
+//! motion by contacts that are longer than wide, lean, or press with their rim. Film and markers
+//! are symmetric, so places along +x and +y give all others.
 
 use super::Column;
 use super::covariance::{Covariance, add_square, between};
@@ -59,8 +59,8 @@ const OF_ITSELF: f32 = 0.08;
 /// Uncertainty due to the mesh of finite elements by which all contacts are known, in parts of the
 /// motion: of each coordinate, and of all together. A finer mesh gives way differently.
 const OF_MESH: [f32; 2] = [6e-4, 8e-4];
-/// A tilted force moves the images under a wide contact as under a contact that is farther along
-/// the tilt: by this many mm for each radian, at width 1 and the largest size.
+/// A tilted force moves the images under a wide contact as if the contact were farther along the
+/// tilt: by this many mm for each radian, at width 1 and the largest size.
 const ALONG_TILT_MM: f32 = 0.83;
 /// The widths where the first steps for an unknown contact begin, and where the next ones begin if
 /// these end narrow without success. Steps from a narrow contact to a wide one often do, near the

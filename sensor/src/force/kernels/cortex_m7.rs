@@ -31,10 +31,9 @@ unsafe extern "C" {
     /// (w₀·a₀ + w₁·a₁). That is four products in two multiplications and one extension, at the
     /// price of a shift by 8 at the end of a row.
     ///
-    /// *No overflow.* Sums are modulo 2³², so only the last one of a row has to fit: |256·Σ w·a| <
-    /// 2³¹ holds because |Σ w·a| ≤ 512 · 127 · 127 = 8,258,048 < 2²³ for every layer that a model
-    /// may have; see the assertion below. Lanes fit 16 bits: |256·w₁ + w₀| ≤ 32,639, and −127 ≤ x ≤
-    /// 32,512.
+    /// *No overflow.* Sums are modulo 2³², so only the last one of a row has to fit. |256·Σ w·a| <
+    /// 2³¹ holds because |Σ w·a| ≤ 512 · 127 · 127 = 8,258,048 < 2²³ for every possible layer; see
+    /// the assertion below. Lanes fit 16 bits: |256·w₁ + w₀| ≤ 32,639, and −127 ≤ x ≤ 32,512.
     ///
     /// *Contract.* `weights`: word-aligned, 32·`blocks` columns for each group of four rows, as
     /// `docs/model-file.md` lays them out, and eight readable bytes after them. `inputs`:

@@ -13,8 +13,8 @@
 //! 4. *Trust* (`trust`): limits relative to a rest position are much tighter and decide whether the
 //!    markers may give a force. The film answers any force symmetrically, so the pattern's strain
 //!    bounds the displacement of a single marker. Four properties of the images bound cuts,
-//!    growths, covers and holes: how little each image leans, is hollow or skewed; how alike their
-//!    colours are; how many pixels passed the threshold themselves.
+//!    growths, covers and holes: lean, hollowness and skew of each image, and the likeness of their
+//!    colours. So does the number of pixels that passed the threshold themselves.
 //!
 //! A new rest position has no earlier one to be compared with. Rule 4 judges it against itself
 //! ([`Found::may_rest`]), and the four markers must be alike: they are punched alike, and a film at

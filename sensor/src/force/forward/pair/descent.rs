@@ -14,9 +14,9 @@ use hivtac_terms::contact_shape::ContactShape;
 
 /// Most steps of a descent.
 pub(super) const STEPS: usize = 16;
-/// If a step does not explain more, shorter ones are tried (Marquardt 1963): equations hold each
-/// unknown where it is, with these parts of the strength with which the markers determine it. Near
-/// contacts have nearly the same slopes, so that without them a step may lead anywhere, or nowhere.
+/// If a step does not lower the residual, shorter ones are tried (Marquardt 1963). Equations hold
+/// each unknown at its value, with these parts of the markers' weight for it. Near contacts have
+/// nearly the same slopes, so that without them a step may lead anywhere, or nowhere.
 const HOLDS: [f32; 3] = [0.01, 0.05, 0.2];
 /// The steps have converged if the next one would explain at most this.
 const LEFT_TO_EXPLAIN: f32 = 0.05;

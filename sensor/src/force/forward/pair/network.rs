@@ -49,10 +49,10 @@ enum Kind {
 /// The layers, borrowed from a file.
 ///
 /// For each channel of the two hidden layers it has f32 bias and step, and the weights in units of
-/// the step, i16: in the second layer those of each parity after those of the one before. Then come
-/// f32 bias and step of each output, and for each channel the weights of all outputs. Outputs of a
-/// parity are x and y of the first corner, and that coordinate of the first left and of the first
-/// top marker which has the parity.
+/// the step, i16. In the second layer the weights are ordered by parity. Then come f32 bias and
+/// step of each output, and for each channel the weights of all outputs. Outputs of a parity are x
+/// and y of the first corner, and that coordinate of the first left and of the first top marker
+/// which has the parity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Network<'a> {
     first: &'a [[u8; row(INPUTS)]; FIRST],
