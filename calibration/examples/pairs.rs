@@ -1,8 +1,8 @@
 //! Solves pairs of contacts on the nominal film with the dots of `8v`, for `python/train_pairs.py`:
 //! `cargo run --release -p hivtac-calibration --example pairs -- pairs.csv 7600`, 25 minutes of one
-//! core. A line has the forces and the places of both, and the motion of the dots and of the
-//! mirrored layout's dots, each with its slopes by these numbers: by both, and the mean of single
-//! contacts. With `unseen` after the number, the pairs are others, on a fine mesh.
+//! core. A line has forces and places of both contacts, then motions of the dots and of the
+//! mirrored layout's dots with their slopes: under both, and the mean of single contacts. With
+//! `unseen` after the number, it solves other pairs, on a fine mesh.
 
 use std::fs::File;
 use std::io::Write;

@@ -1,7 +1,7 @@
-//! Measures what the sensor's model leaves of pairs that it has not seen, for the network's file:
-//! `cargo run --release -p hivtac-calibration --example pairs_left -- unseen.csv
-//! sensor/data/pairs-8v.bin`. The pairs are those of `pairs -- unseen.csv 600 unseen`. What is left
-//! has the errors of the network, of the tables and of a coarser mesh.
+//! Measures the errors of the sensor's model on unseen pairs, for the network's file: `cargo run
+//! --release -p hivtac-calibration --example pairs_left -- unseen.csv sensor/data/pairs-8v.bin`.
+//! The pairs are those of `pairs -- unseen.csv 600 unseen`. The errors are those of the network, of
+//! the tables and of a coarser mesh.
 
 use std::fs;
 
@@ -53,7 +53,7 @@ fn main() -> Result<()> {
     Ok(fs::write(path, bytes)?)
 }
 
-/// What the model leaves of a pair's motion, focal lengths, and how the variance of that grows.
+/// The model's error of a pair's motion, focal lengths, and the growth of its variance.
 fn left(
     numbers: &[f64],
     forward: &Forward<'_>,

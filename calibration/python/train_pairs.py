@@ -27,7 +27,7 @@ FASTEST, SLOWEST = 1e-2, 1e-6
 FOCAL_PX = 175.0
 # Slopes count along random steps of this size, deviations of the inputs.
 STEP = 0.3
-# Pairs off by more than this count by what they are off, not by its square, px.
+# Errors above this count in proportion, not by their square, px.
 FAR_OFF_PX = 0.1
 
 # A parity is three bits: what changes its sign if x is mirrored (1), if y is (2), and if the
@@ -39,7 +39,7 @@ SIGNS = np.array([[(-1.0) ** (a & b).bit_count() for a in range(8)] for b in ran
 BOTH = np.eye(10)
 for one in (2, 3, 6, 7):
     BOTH[np.ix_([one, one + 2], [one, one + 2])] = [[1, 1], [1, -1]]
-# For each dot: which kind it is (corner, left, top) and what mirrors the kind's first dot to it.
+# For each dot: its kind (corner, left, top), and the mirrors that take the kind's first dot to it.
 IMAGES = [(0, 0), (0, 1), (0, 3), (0, 2), (1, 0), (2, 0), (1, 1), (2, 2)]
 
 
@@ -275,7 +275,7 @@ class Data:
         self.slopes = slopes.astype(np.float32)
 
     def left(self, network, unit):
-        """What the network leaves of the motions, px."""
+        """The errors of the network's motions, px."""
         outputs, _, _ = network.forward(self.inputs, 0 * self.inputs)
         return (self.factor * unit * outputs - self.moved) @ self.to_dots
 
@@ -296,7 +296,7 @@ def train(network, data, unit, steps, report):
         off = factor * outputs - data.moved[batch]
         wanted = np.einsum("bk,bko->bo", along, data.slopes[batch])
         off_changes = factor * changes + grows * outputs - wanted
-        # A few strong pairs at the border of what is drawn would count for most.
+        # A few strong pairs at the border of the drawn range would dominate.
         all_off = np.sum(off**2 + off_changes**2, axis=1, keepdims=True)
         counts = 1 / np.sqrt(1 + all_off / FAR_OFF_PX**2)
         off, off_changes = off * counts, off_changes * counts

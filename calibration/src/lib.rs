@@ -9,7 +9,7 @@
 //! | `data` | forces with what the sensor saw: rendered, or from a unit and a force gauge |
 //! | `evaluation` | errors of a model's forces |
 //! | `train`, `fit` | networks; from a data set to weights |
-//! | `forward` | the film run forwards, from the known numbers of a unit |
+//! | `forward` | the forward model, from the known numbers of a unit |
 //! | `loads` | the loads of a data set, and their uncertainties |
 //! | `unit_fit` | a unit's film and camera, fitted to its loads |
 //! | `import` | networks trained in PyTorch |

@@ -26,10 +26,10 @@ enum Command {
     /// Calibration data from a real unit and a force gauge.
     #[command(subcommand)]
     Collect(CollectCommand),
-    /// A unit's own model from ten known loads, step by step (`--into FOLDER`): what to do next,
-    /// live numbers, and at the end the model and how good it is on loads left out. Or from a data
-    /// set (`--data`): 4 loads and more, some tilted, four of them 2 to 3 mm off the middle,
-    /// several frames each; prints what was found of the unit and writes its weights file.
+    /// A unit's own model from ten known loads, step by step (`--into FOLDER`): instructions, live
+    /// numbers, and at the end the model and its errors on loads left out. Or from a data set
+    /// (`--data`): 4 loads and more, some tilted, four of them 2 to 3 mm off the middle, several
+    /// frames each; prints the unit's numbers and writes its weights file.
     Unit(UnitArgs),
     /// Quantize a weights file; writes a model file. The same weights give the same bytes on every
     /// machine.
@@ -41,11 +41,10 @@ enum Command {
     Dataset(DatasetArgs),
     /// Train a network on a data set; writes a weights file.
     Train(TrainArgs),
-    /// Put the nominal film, run forwards, beside the network of a weights file that tells places;
-    /// the noise of markers is taken from a data set. Writes a weights file.
+    /// Add the nominal film's forward model to a weights file whose network gives places, with the
+    /// noise of markers from a data set. Writes a weights file.
     Film(FilmArgs),
-    /// Measure freshly rendered frames with a model file and print how far its forces are from the
-    /// truth.
+    /// Measure freshly rendered frames with a model file and print the errors of its forces.
     Check(CheckArgs),
     /// The model file of the nominal sensor with another layout of dots, for presses anywhere on
     /// the film. It has no network: its steps begin where the dots moved most.

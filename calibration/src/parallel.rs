@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 use anyhow::Result;
 use rayon::prelude::*;
 
-/// Does `count` parts of some work; returns what they make, in their order.
+/// Does `count` parts of some work; returns their results in order.
 pub fn map<T: Send>(count: usize, work: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let made: Vec<Mutex<Option<T>>> = (0..count).map(|_| Mutex::default()).collect();
     each(count, &|part| {
@@ -25,7 +25,7 @@ pub fn try_map<T: Send>(count: usize, work: impl Fn(usize) -> Result<T> + Sync) 
     map(count, work).into_iter().collect()
 }
 
-/// Of one type for all work: the compiler makes what shares it out once.
+/// Of one type for all work, so that it is compiled once.
 fn each(count: usize, work: &(dyn Fn(usize) + Sync)) {
     (0..count).into_par_iter().for_each(work);
 }
@@ -36,7 +36,7 @@ mod tests {
     use anyhow::anyhow;
 
     #[test]
-    fn parts_are_in_their_order_and_the_first_error_is_told() {
+    fn parts_are_in_their_order_and_the_first_error_is_reported() {
         assert_eq!(
             map(1000, |part| 3 * part),
             (0..1000).map(|part| 3 * part).collect::<Vec<_>>()

@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn a_miss_is_told_along_and_across_the_force() {
+    fn a_miss_is_reported_along_and_across_the_force() {
         let miss = Miss::of([0.0, 0.003, -0.1], [0.0, 0.0, -0.1]);
         assert!((miss.across_n - 0.003).abs() < 2e-6, "{miss:?}");
         assert!((miss.along_n - 45e-6).abs() < 1e-7, "{miss:?}");

@@ -33,7 +33,7 @@ pub struct Weights {
     pub uncertainty: Uncertainty,
     /// How it was trained, for the reader.
     pub training: Training,
-    /// The film run forwards, which improves the network's answer.
+    /// The forward model, which improves the network's answer.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub film: Option<FilmModel>,
     /// The network; none for other layouts than the square of four dots.
@@ -114,7 +114,7 @@ impl Weights {
                 self.network
                     .as_ref()
                     .is_none_or(|it| it.meaning.tells_place()),
-                "film: only a network that tells places can have one"
+                "film: only a network with places can have one"
             );
             ensure!(
                 film.rest_px.len() == markers,
@@ -131,8 +131,7 @@ impl Weights {
 
     /// The network.
     ///
-    /// # Errors
-    /// When there is none, as for other layouts than the square of four dots.
+    /// # Errors When the file has none, as for other layouts than the square of four dots.
     pub fn network(&self) -> Result<&Network> {
         let network = self.network.as_ref();
         network.context("these weights have no network, as their film has other dots than four")

@@ -33,7 +33,7 @@ fn stderr_of_failure(output: &Output) -> String {
 
 /// A user's mistake is reported in one line, whatever the environment asks of panics.
 #[test]
-fn a_mistake_is_told_without_a_backtrace() {
+fn a_mistake_is_reported_without_a_backtrace() {
     let directory = tempfile::tempdir().unwrap();
     let output = Command::new(env!("CARGO_BIN_EXE_hivtac-calibrate"))
         .current_dir(directory.path())

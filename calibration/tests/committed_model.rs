@@ -221,10 +221,10 @@ fn its_uncertainties_are_not_too_small_in_sessions_that_it_does_not_know() {
 }
 
 /// Each tenth of the frames by |F| holds 200; of these, 95 to 97 in a hundred lie within their
-/// bounds, give or take 1.5. Of |F|, more do: its uncertainty also has what the film's brightness
-/// next to the dots does, which these frames do not vary.
+/// bounds, give or take 1.5. Of |F|, more do: its uncertainty also covers the film's brightness
+/// next to the dots, which these frames do not vary.
 #[test]
-fn its_uncertainties_are_honest() {
+fn its_uncertainties_hold() {
     let evaluation = presses(2_000, 1);
     let parts = coverage(&evaluation.judged);
     assert_eq!(parts.len(), 10);

@@ -1,5 +1,5 @@
-//! Measures what frames of a film with eight dots tell: by area and force, and by what befalls a
-//! dot. These are tables of `docs/results/dots.md`.
+//! Measures forces from frames of a film with eight dots, by area and force, and by faults of a
+//! dot: tables of `docs/results/dots.md`.
 
 use hivtac_sensor::pipeline::Sensor;
 use hivtac_terms::status::Status;
@@ -129,8 +129,8 @@ fn needles_within_8_mm() {
     }
 }
 
-/// What befalls a dot after the tare.
-fn befall(options: &mut Options, fault: &str, dot: usize) {
+/// Applies a fault to a dot after the tare.
+fn apply(options: &mut Options, fault: &str, dot: usize) {
     let moved = |times: f64| {
         let mut glued_mm = Dots::defaults(8);
         glued_mm[dot] = [0.6, 0.8].map(|part| times * TENTH_OF_A_PX_MM * part);
@@ -157,7 +157,7 @@ fn befall(options: &mut Options, fault: &str, dot: usize) {
 /// A dot that is lost or lies, each in turn.
 #[test]
 #[ignore = "slow: 4,000 frames"]
-fn what_befalls_a_dot() {
+fn faults_of_a_dot() {
     let presses = Presses {
         within_mm: 4.0,
         force_mn: [50.0, 200.0],
@@ -173,7 +173,7 @@ fn what_befalls_a_dot() {
         let mut tally = Tally::default();
         for dot in 0..8 {
             let mut sensor = tared(&nominal());
-            let scene = scene(|options| befall(options, fault, dot));
+            let scene = scene(|options| apply(options, fault, dot));
             let mut random = ChaCha8Rng::seed_from_u64(dot as u64);
             for number in 0..100 {
                 let load = presses.draw(&mut random);

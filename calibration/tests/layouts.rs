@@ -1,5 +1,5 @@
 //! Tests frames of a film with eight dots through the sensor's own code: identities by the rest
-//! position, a force with an honest uncertainty, also without a dot, and clear refusals.
+//! position, a force with a correct uncertainty, also without a dot, and clear refusals.
 
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_calibration::forward::{self, layout_model, layout_scene, layout_weights};
@@ -77,7 +77,7 @@ fn loads() -> impl Iterator<Item = (u64, Load)> {
     })
 }
 
-/// Errors of direction, degrees, |F|, N, and place, mm; and what 95 of 100 of each are within.
+/// Errors of direction, degrees, |F|, N, and place, mm; and their stated 95 % bounds.
 pub fn errors_and_limits(force: &Force, load: &Load) -> ([f64; 3], [f64; 3]) {
     let newtons = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let length = newtons.iter().map(|part| part * part).sum::<f64>().sqrt();
@@ -131,7 +131,7 @@ fn judged(sensor: &mut Sensor<'_>, scene: &Scene) -> (u32, [u32; 3], Vec<Lost>) 
 }
 
 #[test]
-fn eight_dots_give_a_force_with_an_honest_uncertainty() {
+fn eight_dots_give_a_force_with_a_correct_uncertainty() {
     let scene = nominal();
     let (shown, within, _) = judged(&mut tared(&scene), &scene);
     assert!(shown >= 38, "{shown} of 40");
@@ -141,8 +141,7 @@ fn eight_dots_give_a_force_with_an_honest_uncertainty() {
     );
 }
 
-/// Eight dots tell how wide a contact is: a needle that is not known to be one is known nearly as
-/// well.
+/// Eight dots show how wide a contact is: an unannounced needle is measured nearly as well.
 #[test]
 fn a_contact_of_unknown_shape_is_little_less_certain() {
     let scene = nominal();
@@ -240,7 +239,7 @@ fn a_tare_is_refused_while_a_dot_is_missing_or_something_presses() {
     assert!(matches!(refused, Err(Refusal::Touched(_))), "{refused:?}");
 }
 
-/// The files that demo, twin and calibration use are what `hivtac-calibrate layout 8v` makes.
+/// `hivtac-calibrate layout 8v` makes the files that demo, twin and calibration use.
 #[test]
 #[ignore = "90 s: the tables of eight dots are made anew"]
 fn the_models_files_are_as_they_are_made() {

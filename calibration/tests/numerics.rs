@@ -1,6 +1,6 @@
 //! Tests training, import and export at extreme numbers (`docs/numerics.md`). Tests that measure
 //! print a row of that document's table: `cargo test --release -p hivtac-calibration --test
-//! numerics -- --nocapture`.
+//! calibration -- numerics --nocapture`.
 
 use std::collections::HashMap;
 
@@ -191,9 +191,9 @@ fn one_sample_and_duplicates_train_to_what_they_say() {
             .map(|i| if i % 2 == 0 { [0.0; 3] } else { label })
             .collect(),
     );
-    let told = apart(on_the_chip(&two, &moved(4.0)).0, label)
+    let reported = apart(on_the_chip(&two, &moved(4.0)).0, label)
         .max(apart(on_the_chip(&two, &moved(0.0)).0, [0.0; 3]));
-    assert!(told < 0.01, "{told}");
+    assert!(reported < 0.01, "{reported}");
     row(
         "one sample, 500 copies of one, a constant label",
         "11-8-8-3, float and chip, error of a component",
@@ -204,7 +204,7 @@ fn one_sample_and_duplicates_train_to_what_they_say() {
         "200 copies of each of two samples",
         "the same",
         "10 mN",
-        format!("{:.2} mN", 1e3 * told),
+        format!("{:.2} mN", 1e3 * reported),
     );
 }
 

@@ -19,7 +19,7 @@ pub enum Condition {
     Good = 2,
 }
 
-/// Sets the sensor's condition. Without a camera nothing is known, and the output pin is low.
+/// Sets the sensor's condition. Without a camera the output pin is low.
 pub fn set(condition: Condition) {
     CONDITION.store(condition as u8, Ordering::Relaxed);
     if condition == Condition::NoCamera {

@@ -1,4 +1,4 @@
-//! Places the threshold's table of 64 KiB in DTCM; the rest of the pipeline is where its owner is.
+//! Places the threshold's table of 64 KiB in DTCM, wherever the rest of the pipeline is.
 
 use hivtac_sensor::markers::tables::{ByteTable, Pixels, Run, Table, Weights};
 use hivtac_sensor::pipeline;

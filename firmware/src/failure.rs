@@ -1,18 +1,16 @@
-//! Keeps what ended the program, so that the next start can tell the host.
+//! Records what ended the program, so that the next start can report it to the host.
 //!
-//! # Design
-//! The record is at the end of DTCM (`memory.x`). A reset leaves it, only power-on does not, after
-//! which it is not read. The core writes DTCM past the caches, so that the record is in memory when
-//! the reset comes. It needs no clock and no key, as the backup domain would, which a small battery
-//! or capacitor also keeps through a short power cut. Each of its words is one of its error
-//! correction.
+//! # Design The record is at the end of DTCM (`memory.x`). It survives a reset, but not power-on,
+//! after which it is not read. The core writes DTCM past the caches, so the record is in memory
+//! when the reset comes. The backup domain would need a clock and a key, and a small battery or
+//! capacitor keeps it through a short power cut. Each word of the record is one word of DTCM's
+//! error correction.
 //!
 //! `hard_fault.s` enters [`hard_fault`] with a stack of its own, as the program's may be used up.
 //! Nothing here can panic.
 //!
-//! # Limitations
-//! Where thread mode stood before the watchdog's reset is unknown: this microcontroller's watchdog
-//! has no interrupt.
+//! # Limitations The program counter before a watchdog's reset is unknown: this microcontroller's
+//! watchdog has no interrupt.
 
 use crate::HEADER;
 use core::panic::PanicInfo;
@@ -24,7 +22,7 @@ use hivtac_wire::failure::{Failure, FailureKind, PLACE_BYTES};
 
 core::arch::global_asm!(include_str!("hard_fault.s"));
 
-/// What the record's words are; a panic's path follows.
+/// Indices of the record's words; a panic's path follows.
 const KIND: usize = 0;
 const STARTS: usize = 1;
 const COUNT: usize = 2;
@@ -69,7 +67,7 @@ struct Kept {
 type Words = [u32; WORDS];
 
 impl Kept {
-    /// The record; `None` if there is none.
+    /// The record, if any.
     fn read(&self) -> Option<Words> {
         let mut words = [0; WORDS];
         for (word, kept) in words.iter_mut().zip(&self.words) {
@@ -101,7 +99,7 @@ fn check(words: &Words) -> u32 {
     words.iter().fold(CHECK_START, sum)
 }
 
-/// What tells this program from others: its checksum, as an update writes it.
+/// This program's identity: its checksum, as an update writes it.
 fn program() -> u32 {
     // SAFETY: a constant in flash; volatile as an image has another value there than the compiler
     // knows.

@@ -21,7 +21,7 @@ static RESET_REASON: AtomicU8 = AtomicU8::new(ResetReason::Other as u8);
 
 /// A quarter of the watchdog's time.
 const FEED_PERIOD: Duration = Duration::from_millis(500);
-/// Of the watchdog's 32 kHz, of which it counts 4,096: 2.05 s.
+/// The watchdog counts 4,096 of its 32 kHz, divided by 16: 2.05 s.
 const WATCHDOG_DIVIDER: Pr = Pr::DIVIDE_BY16;
 
 /// Keeps why the microcontroller was reset. Call first, and once. It does not log: the clock of the

@@ -8,8 +8,8 @@
 //!                                         └→ memory → flash
 //! ```
 //!
-//! Which task may interrupt which: [`priorities`]. Their shared state: `docs/firmware.md`. Memory
-//! layout: `memory.x`, [`caches`]. Nothing is allocated after boot.
+//! Which task may interrupt which: [`priorities`]. Their shared state: `docs/shared-state.md`.
+//! Memory layout: `memory.x`, [`caches`]. Nothing is allocated after boot.
 #![no_std]
 #![no_main]
 
@@ -81,8 +81,8 @@ use static_cell::{ConstStaticCell, StaticCell};
 core::arch::global_asm!(include_str!("first_stage.s"));
 core::arch::global_asm!(include_str!("start.s"));
 
-/// By this mark and the next an update knows what the image is for, at places that `memory.x`
-/// fixes.
+/// This mark and the next identify the image's chip and board to an update, at places that
+/// `memory.x` fixes.
 #[used]
 #[unsafe(link_section = ".first_stage.mark")]
 static FIRST_STAGE: Mark = Mark::of_first_stage(board::NAME);

@@ -144,7 +144,7 @@ pub fn checked(file: &[u8]) -> Result<u32, Refusal> {
     fitting().check(file).map(|model| model.crc())
 }
 
-/// What a model must fit.
+/// The camera and the unit that a model must fit.
 pub fn fitting() -> Fitting {
     Fitting {
         preset: camera::PRESET,

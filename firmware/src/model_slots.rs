@@ -1,11 +1,10 @@
 //! Provides two places in SRAM for models that a host sends: one is in use while the other is
 //! filled.
 //!
-//! # Design
-//! A model runs from SRAM and not from the flash that keeps it: a core that reads a flash bank
-//! waits while that bank is erased, for a second. A slot is filled, then *lent*, as a file that
-//! does not change until it is given back. The memory task gives it back if the model is refused,
-//! the pipeline when a different model is in use.
+//! # Design A model runs from SRAM, not from the flash that keeps it: a core that reads a flash
+//! bank waits up to a second while that bank is erased. A slot is filled, then *lent*, as a file
+//! that does not change until it is given back. The memory task gives it back if the model is
+//! refused, the pipeline when a different model is in use.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 use hivtac_wire::message::MODEL_BYTES;
@@ -41,8 +40,8 @@ pub fn fill<T>(slot: u8, fill: impl FnOnce(&mut [u8; MODEL_BYTES]) -> T) -> Opti
     if lent.load(Ordering::Acquire) {
         return None;
     }
-    // SAFETY: the slot exists. It is not lent, so that there is no other reference to it: those of
-    // `fill` end with it, and none runs beside another.
+    // SAFETY: the slot exists. It is not lent, so there is no other reference to it: those of
+    // `fill` end with it, and no two run at once.
     let file = unsafe { &mut *file(slot)? };
     Some(fill(file))
 }

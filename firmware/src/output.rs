@@ -1,4 +1,4 @@
-//! The output pin, which shows contact, slip or a force limit without a host
+//! Drives the output pin, which shows contact, slip or a force limit without a host
 //! ([`hivtac_terms::temporal::Output`]).
 
 use crate::board::OUTPUT;

@@ -6,7 +6,7 @@
 //! | 1 | DCMI and its DMA | a band takes the number of the newest VSYNC edge; neither interrupts the other |
 //! | 2 | time driver | wakes the tasks below |
 //! | 3 | capture task | sets the camera up while nothing else works |
-//! | 4 | USB core, DMA of the UART | moves packets between its FIFOs and memory; tells that a frame was sent |
+//! | 4 | USB core, DMA of the UART | moves packets between its FIFOs and memory; signals that a frame was sent |
 //! | 5 | USB tasks | answer the host while a frame is being processed |
 //! | thread | processing, health | takes milliseconds and may be interrupted by all above |
 

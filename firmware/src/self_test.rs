@@ -6,10 +6,9 @@
 //! its registers and its frame time anyway. Only the temperature is omitted, because its converter
 //! takes time.
 //!
-//! # Limitations
-//! A kept model is not asked the known question. Its checksum proves that its bytes are those that
-//! were sent, and the built-in model's answer proves kernels and arithmetic. `docs/firmware.md` has
-//! the argument.
+//! # Limitations A kept model gets no known question. Its checksum proves that its bytes are those
+//! that were sent, and the built-in model's answer proves kernels and arithmetic.
+//! `docs/firmware.md` has the argument.
 
 use crate::condition::{self, Condition};
 use crate::dtcm_table::Sensor;

@@ -19,8 +19,8 @@ use hivtac_wire::message::{
     DeviceMessage, Outcome, Reply, SNAPSHOT_PART_BYTES, Snapshot, SnapshotPart,
 };
 
-/// The conversation with an active snapshot; 0 if there is none. Set by the USB tasks, cleared by
-/// them and the pipeline.
+/// The conversation with an active snapshot, or 0. Set by the USB tasks, cleared by them and the
+/// pipeline.
 static SNAPSHOT_FOR: AtomicU32 = AtomicU32::new(0);
 
 /// A frame that was kept whole. From the pipeline to the sender, one of the USB tasks.
@@ -89,7 +89,7 @@ impl Outgoing {
     /// No snapshot is being sent.
     pub const NONE: Self = Self(None);
 
-    /// Returns the next message of a snapshot; waits while there is none.
+    /// Returns the next message of a snapshot; waits for one.
     pub async fn next(&mut self) -> DeviceMessage {
         loop {
             if let Some(message) = self.message() {

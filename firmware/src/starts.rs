@@ -1,11 +1,10 @@
-//! Tells the first stage which starts are good, and takes over why the microcontroller started.
+//! Reports good starts to the first stage, and takes the reset reason over from it.
 //!
-//! # Design
-//! `first_stage.s` counts the starts in a row that ended in a reset by the program itself or by the
-//! watchdog. After four of them it starts the loader, so that a program that fails before it serves
-//! USB can be replaced without opening the housing. A start is good as soon as a host said hello,
-//! for then that host can start the loader; or after [`GOOD_AFTER`] in thread mode, as nobody may
-//! be plugged in. Power-on, a low supply and the reset line begin the count anew.
+//! # Design `first_stage.s` counts the starts in a row that ended in a reset by the program itself
+//! or by the watchdog. After four of them it starts the loader, so that a program that fails before
+//! it serves USB can be replaced without opening the housing. A start is good as soon as a host
+//! said hello, since that host can start the loader. Without a host it is good after [`GOOD_AFTER`]
+//! in thread mode. Power-on, a low supply and the reset line begin the count anew.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_stm32::pac::RCC;

@@ -1,11 +1,10 @@
-//! Raises the supply voltage under which the microcontroller resets itself, and tells it.
+//! Raises the supply voltage below which the microcontroller resets itself, and reports it.
 //!
-//! # Design
-//! Chips are delivered without a level: the core runs on while camera and flash no longer work. The
-//! level is an option byte, written once in a chip's life, at a start, before anything else is
-//! under way: the bank that has the program has the option bytes, too, and the core waits for it.
-//! A reset or a power cut meanwhile keeps the old options (RM0433, FLASH option bytes, "Option byte
-//! modification sequence").
+//! # Design Chips are delivered without a level: the core runs on while camera and flash no longer
+//! work. The level is an option byte, written once in a chip's life, at a start, before anything
+//! else runs. The option bytes are in the program's bank, so the core waits. A reset or a power cut
+//! meanwhile keeps the old options (RM0433, FLASH option bytes, "Option byte modification
+//! sequence").
 //!
 //! # Limitations
 //! The data sheet gives no time for it. Where it takes longer than the watchdog allows, the old

@@ -1,4 +1,4 @@
-//! Sends the samples over a UART, too: to a robot's controller without USB, or a second reader.
+//! Also sends the samples over a UART, for a robot's controller without USB, or a second reader.
 //!
 //! # Design
 //! It is always on and only sends, so it needs neither a host nor a setting. The messages and
@@ -49,7 +49,7 @@ bind_interrupts!(struct Irqs {
 pub fn offer(sample: Sample) {
     let number = UART_SEQUENCE.load(Ordering::Relaxed).wrapping_add(1);
     UART_SEQUENCE.store(number, Ordering::Relaxed);
-    // Without space it is dropped, which its number tells.
+    // Without space it is dropped; the gap in numbers shows it.
     let _ = UART_SAMPLES.try_send(Sample {
         sequence: number,
         markers: MarkerList::default(),

@@ -6,21 +6,21 @@
 //! *Cut transfers*: a host may end a control transfer anywhere, by a bus reset or another SETUP
 //! (USB 2.0, section 5.5.5). The driver would wait for the missing stage for ever, and serve no
 //! reset. So each stage ends with the reset or the SETUP, or after [`STAGE_LIMIT`]. Before a SETUP
-//! is taken, what an earlier transfer left on the control endpoint is taken away.
+//! is taken, the control endpoint is cleared of an earlier transfer's data.
 //!
 //! *Packets*: a packet that no host fetched is taken back at each reset, configuration, interface
 //! and halt (`usb_core`).
 //!
-//! *Suspend*: one from before a reset would make the stack deaf to SETUPs. It is passed on only if
+//! *Suspend*: with one from before a reset, the stack would ignore SETUPs. It is passed on only if
 //! the bus is still suspended.
 //!
 //! *Requests*: a device without high speed stalls a request for its device qualifier (section
-//! 9.6.2). A request about an endpoint that
-//! does not exist would fail an assertion in the driver (embassy-usb-synopsys-otg 0.3). So it is
-//! stalled before any other code acts on it, as USB 2.0, section 9.4, requires. The standard also
-//! requires that an endpoint restarts with DATA0 after a halt is cleared, or a configuration or an
-//! interface is set (sections 9.1.1.5, 9.4.5). So the toggle is reset then: the host expects DATA0,
-//! and would take a packet with the other toggle for one that it already has.
+//! 9.6.2). A request about an endpoint that does not exist would fail an assertion in the driver
+//! (embassy-usb-synopsys-otg 0.3). So it is stalled before any other code acts on it, as USB 2.0,
+//! section 9.4, requires. The standard also requires that an endpoint restarts with DATA0 after a
+//! halt is cleared, or a configuration or an interface is set (sections 9.1.1.5, 9.4.5). So the
+//! toggle is reset then: the host expects DATA0, and would take a packet with the other toggle for
+//! one that it already has.
 
 use crate::{usb_core, usb_watch};
 use core::future::{Future, poll_fn};
@@ -142,7 +142,7 @@ fn endpoint_of(setup: &[u8; 8]) -> Option<EndpointAddress> {
 }
 
 impl<P: ControlPipe> GuardedPipe<P> {
-    /// Waits for a SETUP, and takes away what an earlier transfer left.
+    /// Waits for a SETUP, and clears the data of an earlier transfer.
     async fn next_setup(&mut self) -> [u8; 8] {
         loop {
             let counted = with_timeout(MISSED, usb_watch::another_setup(self.served)).await;

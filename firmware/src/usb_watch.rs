@@ -1,4 +1,4 @@
-//! Notes what the USB driver's interrupt handler sees and does not tell: SETUPs, and packets that
+//! Counts events that the USB driver's interrupt handler does not report: SETUPs, and packets that
 //! left.
 
 use core::future::poll_fn;

@@ -55,7 +55,7 @@ def collisions(placed: dict[str, Part]) -> list[str]:
 
 
 def shapes(common) -> list:
-    """What an intersection gave, as a list of solids."""
+    """The solids of an intersection, as a list."""
     return list(common.solids())
 
 
@@ -102,7 +102,7 @@ def intruders(kit: Kit, meshes: dict[str, Mesh]) -> dict[str, dict[str, float]]:
         rows = {}
         for name, mesh in meshes.items():
             points = np.concatenate([mesh.samples(1.0)[0], mesh.corners])
-            # The film hides what is above it, the lens does not look back.
+            # The film hides everything above it, the lens does not look back.
             points = points[(points[:, 2] < kit.film - 0.01) & (points[:, 2] > kit.pupil + 0.01)]
             if len(points):
                 rows[name] = float(picture.inside(kit, points).max())
@@ -151,7 +151,7 @@ def mirrored(kit: Kit, meshes: dict[str, Mesh]) -> float:
     mesh = meshes["diffuser"]
     points = mesh.samples(0.5)[0]
     points = points[points[:, 2] > points[:, 2].max() - 1e-3]
-    # Only what is below a window shines.
+    # Only the part below a window shines.
     up = np.tile([0.0, 0.0, 50.0], (len(points), 1))
     points = points[~np.isfinite(meshes["cover"].first_hits(points, up)[0])]
     below = kit.film - points[:, 2]

@@ -1,4 +1,4 @@
-"""Every length of the kit: what the simulated sensor has, what is bought, and what follows."""
+"""Every length of the kit: of the simulated sensor, of bought parts, and derived ones."""
 
 import json
 import math
@@ -45,7 +45,7 @@ class Kit:
 
     bought: Bought = field(default_factory=Bought)
 
-    # What the simulated sensor has.
+    # The simulated sensor's.
     film_distance: float = SCENE["film_distance_mm"]
     film_thickness: float = SCENE["film_thickness_mm"]
     post_at: float = SCENE["post_mm"]

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 
 from kit.drawing import line, page, text
 
-# Supply, V: nominal, and what USB allows at a device.
+# Supply, V: nominal, and USB's range at a device.
 SUPPLY = (5.0, 4.4, 5.25)
 # Forward voltage of a white LED of 0.2 W at some mA, V: usual, and its spread.
 FORWARD = (2.8, 2.65, 3.0)
 LEDS = 8
 # A usual LED of this kind gives so much light for its current, lm/mA.
 LUMENS_PER_MA = 0.38
-# What the diffuser and the windows let pass, estimated: not measured.
+# Transmission of the diffuser and the windows, estimated, not measured.
 PASSED = 0.25
 
 
@@ -127,6 +127,6 @@ def perfboard(half: float, corner: float, hole: float) -> str:
         "copper and LEDs on this side, towards the film; yellow LEDs, black resistors",
         "red: 5 V (LEDs' anodes are on its side), blue: GND; a wire joins the four of each",
     ]
-    for row, told in enumerate(words):
-        body += text(6, 2 * middle - 4 + 4 * row, told)
+    for row, line in enumerate(words):
+        body += text(6, 2 * middle - 4 + 4 * row, line)
     return page(2 * middle, 2 * middle + 4, body)

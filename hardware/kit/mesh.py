@@ -1,4 +1,4 @@
-"""Triangles of a part, and what they say: closed, thick enough, printable without support."""
+"""Checks of a part's triangles: closed, thick enough, printable without support."""
 
 from dataclasses import dataclass
 

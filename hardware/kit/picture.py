@@ -48,7 +48,7 @@ def draw(
 
 
 def fill(picture: np.ndarray, depth: np.ndarray, triangle: np.ndarray, colour: np.ndarray) -> None:
-    """Draws one triangle where it is nearer than what is there."""
+    """Draws one triangle where it is nearer than those before it."""
     a, b, c = triangle
     left, top = np.floor(triangle[:, :2].min(axis=0)).astype(int)
     right, bottom = np.ceil(triangle[:, :2].max(axis=0)).astype(int) + 1

@@ -118,7 +118,7 @@ impl<W: Write + Seek> Bag<W> {
         Ok(bag)
     }
 
-    /// Also writes what the first two sensors feel together, from now on.
+    /// Also writes the grip of the first two sensors, from now on.
     ///
     /// # Errors
     /// When the file cannot be written.

@@ -46,7 +46,7 @@ fn millimetres(radius: &Micrometres) -> f64 {
     f64::from(radius.0) / 1e3
 }
 
-/// Text for a person about the shape of what presses.
+/// Text for a person about the contact's shape.
 pub fn text(shape: ContactShape) -> String {
     match shape {
         ContactShape::Needle => "needle, a tip like the model's".to_owned(),
@@ -104,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_told_in_words() {
+    fn it_is_reported_in_words() {
         let flat = text(ContactShape::Flat(Micrometres(2_500)));
         assert_eq!(flat, "flat, a rigid face of 2.5 mm radius");
         let round = text(ContactShape::Round(Micrometres(250)));

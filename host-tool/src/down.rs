@@ -52,7 +52,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_told_in_words() {
+    fn it_is_reported_in_words() {
         assert_eq!(
             text(Down::Told(Direction([0, 600, -800]))),
             "0.000 0.600 -0.800"

@@ -1,4 +1,4 @@
-//! Says what ended a device's program in an earlier run, and how to find the source line.
+//! Formats what ended a device's program in an earlier run, and how to find the source line.
 
 use hivtac_host::shown::shown;
 use hivtac_wire::failure::{Failure, FailureKind};
@@ -137,7 +137,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_told_with_the_command_that_finds_it() {
+    fn a_fault_is_reported_with_the_command_that_finds_it() {
         let lines = Ended::of(&fault()).lines();
         let expected = [
             "failure    before this start: nothing answered at an address, or memory is damaged \
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_is_told_with_its_place() {
+    fn a_panic_is_reported_with_its_place() {
         let lines = Ended::of(&Failure {
             kind: FailureKind::Panic,
             starts_ago: 3,

@@ -9,7 +9,7 @@ use hivtac_host::reply::CAMERA_PATIENCE;
 use hivtac_wire::message::Request;
 use serde_json::json;
 
-/// Let the camera find exposure and gain for the light that there is, until it restarts
+/// Let the camera find exposure and gain for the present light, until it restarts
 ///
 /// It does so by itself when it starts. What `settings set` gave it stays.
 ///

@@ -1,4 +1,4 @@
-//! What the sensing found in a picture, as text and as JSON.
+//! Formats the sensing's result for a picture as text and as JSON.
 
 use crate::lines::{contact_text, status_text};
 use hivtac_host::force_fields::{FORCE, ForceJson, PLACE};
@@ -82,7 +82,7 @@ impl BlobJson {
     }
 }
 
-/// By what a blob is no marker, and what helps if it should be one.
+/// Why a blob is no marker, and the remedy if it should be one.
 fn unlike(why: Unlike) -> String {
     match why {
         Unlike::Small(least) => format!("fewer than {least} pixels, or another --preset"),

@@ -9,9 +9,8 @@ use hivtac_host::focus::Focus;
 
 /// Show how sharp, bright and well placed the markers are, until all is right
 ///
-/// Picture after picture: the width of each marker's rim and of the marker, its colour and
-/// brightness, and where the pattern lies and how it is turned, each with its limit. Ends when
-/// everything is right.
+/// For each picture: the widths of each marker and its rim, its colour and brightness, and the
+/// pattern's place and turn, each with its limit. Ends when everything is right.
 ///
 /// Example: hivtac focus
 #[derive(Args)]

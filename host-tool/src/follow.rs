@@ -21,7 +21,7 @@ pub trait Follower {
     /// A message of the device arrived.
     fn message(&mut self, message: DeviceMessage);
 
-    /// The connection was lost, with what its decoder rejected.
+    /// The connection was lost, with the counts of its decoder's rejects.
     fn lost(&mut self, failure: Failure, rejected: Rejected);
 
     /// The device is connected again.

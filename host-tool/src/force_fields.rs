@@ -5,7 +5,7 @@ use Quantity::{Angle, Length, NewtonMetres, Newtons};
 use hivtac_terms::force::{Force, MOST_CONTACTS, Place, Torque};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-/// What a field measures. The wire counts it in thousandths of a degree, in µN, in µm or in nN·m.
+/// The quantity of a field. The wire counts it in thousandths of a degree, in µN, in µm or in nN·m.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Degrees.

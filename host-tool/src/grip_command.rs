@@ -3,7 +3,7 @@
 
 use crate::device::seconds;
 use crate::output::{self, Reader, note, print};
-use crate::record::{Heard, listen_to_all};
+use crate::record::{Arrival, listen_to_all};
 use clap::Args;
 use hivtac_host::clock::{Clock, now_ns};
 use hivtac_host::failure::{Failure, Kind};
@@ -133,7 +133,7 @@ fn geometry(poses: Option<&PathBuf>) -> Result<Geometry, Failure> {
     Ok(read.unwrap_or_default())
 }
 
-/// Show what two fingers feel together: grip force, common wrench, friction margin
+/// Show the grip of two fingers: grip force, common wrench, friction margin
 ///
 /// A line for each frame of the first finger, and at the end how late they came. `serve`, `record`
 /// and `view` have the same by `--grip`.
@@ -180,14 +180,14 @@ pub fn run(command: &GripCommand) -> Result<(), Failure> {
     if !command.json {
         print(&lines::header())?;
     }
-    let result = listen_to_all(&mut links, command.timeout, command.seconds, |heard| {
-        shown.all(heard)
+    let result = listen_to_all(&mut links, command.timeout, command.seconds, |arrivals| {
+        shown.all(arrivals)
     });
     note(&shown.lateness.summary());
     result.and_then(|()| stop::check())
 }
 
-/// What is shown of two fingers.
+/// The lines and counts shown for two fingers.
 struct Shown {
     paired: Paired,
     clocks: [Clock; 2],
@@ -201,12 +201,12 @@ struct Shown {
 
 impl Shown {
     /// Shows all grips until both fingers are over.
-    fn all(&mut self, heard: &Receiver<Heard>) -> Result<(), Failure> {
-        for Heard {
+    fn all(&mut self, arrivals: &Receiver<Arrival>) -> Result<(), Failure> {
+        for Arrival {
             sensor,
             at,
             message,
-        } in heard
+        } in arrivals
         {
             match message {
                 DeviceMessage::Stats(stats) => self.clocks[sensor].latency(stats.latency_us),

@@ -93,7 +93,7 @@ impl HealthJson {
     }
 }
 
-/// Have the device look at itself, and show what it finds, each with its code
+/// Have the device test itself, and show its findings with their codes
 ///
 /// Codes are those of docs/wire.md, "Health". Exit code 9 when something is not right.
 ///

@@ -6,7 +6,7 @@ use clap_complete::Shell;
 use hivtac_host::failure::{Failure, Kind};
 use std::path::PathBuf;
 
-/// Print what a shell completes this tool's commands by
+/// Print a shell's completions of this tool's commands
 ///
 /// Example: hivtac completion bash
 #[derive(Args)]

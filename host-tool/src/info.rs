@@ -22,7 +22,7 @@ use hivtac_wire::settings::SettingsReport;
 use serde::{Serialize, Serializer};
 use std::time::Duration;
 
-/// Show what the device is and how it fares
+/// Show the device's identity, settings, counters and health
 ///
 /// Example: hivtac info
 #[derive(Args)]

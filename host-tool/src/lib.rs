@@ -11,7 +11,7 @@
 //! live page ([`page`]), and recordings: written ([`bag`], [`ros`]) and read ([`recording`]). With
 //! the feature `twin`, the simulated sensor in real time (`live`).
 //!
-//! In a browser (`web/`) there are neither ports nor files: what needs them is left out there.
+//! A browser (`web/`) has neither ports nor files; modules that need them are left out there.
 
 pub mod bag;
 pub mod clock;

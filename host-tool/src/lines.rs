@@ -22,7 +22,7 @@ pub enum Format {
 
 /// A sample and, when it is compared with a simulation, its true force (`Some(None)`: not found).
 pub struct Row<'a> {
-    /// What the device sent.
+    /// The sample that the device sent.
     pub sample: &'a Sample,
     /// The true force, from the simulation.
     pub truth: Option<Option<Truth>>,
@@ -112,7 +112,7 @@ fn human_row(row: &Row) -> String {
     format!("{line}  {status}{}", human_parts(row.sample))
 }
 
-/// The sizes and places of two contacts; empty unless they are told apart.
+/// The sizes and places of two contacts; empty unless they are resolved.
 fn human_parts(sample: &Sample) -> String {
     let part = |force: &Force| {
         let size = FORCE[2].shown(force);
@@ -378,13 +378,13 @@ mod tests {
     }
 
     #[test]
-    fn a_person_is_told_that_there_is_no_force_though_nothing_says_why() {
+    fn a_person_is_reported_that_there_is_no_force_though_nothing_says_why() {
         let line = row(Format::Human, &sample(None, Status::default()), None);
         assert!(line.ends_with("        –  no force"), "{line}");
     }
 
     #[test]
-    fn a_person_is_told_of_a_contact_once() {
+    fn a_person_is_reported_of_a_contact_once() {
         let pressed = sample(Some(force(None)), Status::CONTACT);
         let line = row(Format::Human, &pressed, None);
         assert!(line.ends_with("      yes  ok"), "{line}");
@@ -436,7 +436,7 @@ mod tests {
 
     /// The force is the sum; the line has the contacts, too.
     #[test]
-    fn two_contacts_are_told_each() {
+    fn two_contacts_are_reported_each() {
         let mut two = with_place();
         two.status |= Status::TWO_CONTACTS;
         let one = force(Some(PLACE));

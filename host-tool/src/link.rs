@@ -93,8 +93,7 @@ impl Link {
             while let Some(message) = self.receive(next)? {
                 // Any other message is left over from an earlier conversation.
                 if let DeviceMessage::Hello(hello) = message {
-                    // The decoder is between two frames here; what it rejected before does not
-                    // count.
+                    // The decoder is between two frames here; its earlier rejects do not count.
                     self.decoder = Decoder::new();
                     return Ok(hello);
                 }
@@ -139,7 +138,7 @@ impl Link {
         while !bytes.is_empty() {
             stop::check()?;
             match self.port.write(bytes) {
-                // Windows tells a write that timed out like this.
+                // Windows reports a write that timed out like this.
                 Ok(0) if Instant::now() < end => (),
                 Ok(0) => return Err(self.lost("it takes no bytes")),
                 Ok(written) => {
@@ -190,7 +189,7 @@ impl Link {
         }
     }
 
-    /// The failure for what a device is asked over a port on which it only sends.
+    /// The failure of a request over a port on which a device only sends.
     fn cannot_ask(&self, what: &str) -> Failure {
         let message = format!(
             "cannot ask the device over {}: \"{what}\": it only sends samples there; use its USB port",
@@ -234,7 +233,7 @@ impl Link {
         Ok(id)
     }
 
-    /// Sends what is known of gravity, which the sensor uses from its next frame on. The device
+    /// Sends the direction of gravity, which the sensor uses from its next frame on. The device
     /// sends no reply, and this may be called at any rate.
     ///
     /// # Errors
@@ -273,7 +272,7 @@ impl Link {
         Err(unanswered(&asked, patience))
     }
 
-    /// Asks a silent device whether it takes part in this conversation; what comes first goes to
+    /// Asks a silent device whether it takes part in this conversation; earlier messages go to
     /// `other`. Returns true if it answers, false if a sample comes first: the answer may be lost
     /// when this host did not read for a while.
     ///
@@ -286,7 +285,7 @@ impl Link {
     ) -> Result<bool, Failure> {
         let end = Instant::now() + patience;
         if self.only_sends {
-            return self.hears(end, other);
+            return self.is_status(end, other);
         }
         let id = self.command(Request::GetInfo)?;
         while let Some(message) = self.receive(end)? {
@@ -307,21 +306,21 @@ impl Link {
         Err(self.lost("the device sends nothing and does not answer"))
     }
 
-    /// Whether a line that only sends tells of itself, rather than sends samples.
-    fn hears(
+    /// Whether a line that only sends carries a hello or statistics, rather than samples.
+    fn is_status(
         &mut self,
         end: Instant,
         mut other: impl FnMut(DeviceMessage),
     ) -> Result<bool, Failure> {
         while let Some(message) = self.receive(end)? {
-            let tells = match message {
+            let is_status = match message {
                 DeviceMessage::Hello(_) | DeviceMessage::Stats(_) => Some(true),
                 DeviceMessage::Sample(_) => Some(false),
                 _ => None,
             };
             other(message);
-            if let Some(tells) = tells {
-                return Ok(tells);
+            if let Some(is_status) = is_status {
+                return Ok(is_status);
             }
         }
         Err(self.lost("the device sends nothing"))
@@ -361,7 +360,7 @@ impl Link {
         Err(no_part(patience))
     }
 
-    /// What the decoder rejected since the device's hello.
+    /// The decoder's rejects since the device's hello.
     pub fn rejected(&self) -> Rejected {
         self.decoder.rejected()
     }
@@ -422,7 +421,7 @@ mod tests {
         assert_eq!(bytes.iter().collect::<Vec<_>>(), [1, 2, 3]);
     }
 
-    /// A device that answers nothing, with what it sends.
+    /// A device that answers nothing, with the bytes that it sends.
     struct Sending(io::Cursor<Vec<u8>>);
 
     impl Write for Sending {

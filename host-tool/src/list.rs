@@ -10,7 +10,7 @@ use std::time::Duration;
 
 /// List the sensors that are plugged in: serial number, port, name, board and firmware
 ///
-/// One that another program uses is listed with what is wrong.
+/// One that another program uses is listed with the error.
 ///
 /// Example: hivtac list
 #[derive(Args)]

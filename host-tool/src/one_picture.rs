@@ -1,4 +1,4 @@
-//! The sensing of one picture, which nothing came before.
+//! The sensing of a single picture, without earlier frames.
 
 use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::blob::Blob;
@@ -29,8 +29,8 @@ pub fn settings(model: &Model<'_>, preset: Option<Preset>, [width, height]: [u16
     }
 }
 
-/// Measures a picture, and looks again if the first look was refused. Returns, too, what the
-/// threshold finds.
+/// Measures a picture, and looks again if the first look was refused. Also returns the blobs that
+/// pass the threshold.
 pub fn measure(sensor: &mut Sensor<'_>, pixels: &[u16]) -> (Vec<Blob>, Measurement) {
     let mut measurement = sensor.measure_frame(pixels);
     let blobs = sensor.blobs().to_vec();

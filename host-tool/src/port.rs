@@ -13,7 +13,7 @@ use std::time::Duration;
 const PATIENCE: Duration = Duration::from_millis(50);
 /// Over USB, the device ignores the baud rate, which some drivers require.
 const USB_BAUD: u32 = 115_200;
-/// What a UART's address begins with.
+/// The start of a UART's address.
 const UART: &str = "uart:";
 /// Longest wait for a TCP connection.
 const TCP_PATIENCE: Duration = Duration::from_secs(2);
@@ -155,8 +155,8 @@ fn sensor(port: &SerialPortInfo) -> Option<Attached> {
     }
 }
 
-/// Anybody's device for tests has the same id, so its product counts, too. Linux may replace its
-/// spaces. Windows tells its driver's name instead, and nothing else that helps.
+/// Anybody's test devices have the same id, so the product's name is compared, too. Linux may
+/// replace its spaces. Windows gives only its driver's name.
 fn is_ours(usb: &UsbPortInfo) -> bool {
     let same_product = |product: &String| product.replace('_', " ") == PRODUCT;
     let product = (usb.product.as_ref()).filter(|_| !cfg!(windows));
@@ -207,7 +207,7 @@ fn open_tty(name: &str, baud: u32) -> Result<(Box<dyn Port>, String), Failure> {
     }
 }
 
-/// The cause of an error on a port, and what to do.
+/// The cause of an error on a port, and the remedy.
 fn advice(error: &serialport::Error) -> String {
     match error.kind {
         ErrorKind::Io(io::ErrorKind::NotFound) => {
@@ -279,7 +279,7 @@ mod tests {
     }
 
     #[test]
-    fn addresses_are_told_apart() {
+    fn addresses_are_distinguished() {
         assert_eq!(
             Address::parse("tcp:localhost:7"),
             Address::Tcp("localhost:7".into())

@@ -107,7 +107,7 @@ impl Reader {
         self.waited(Inbox::next)
     }
 
-    /// The next sample; `None` if there is none within this time.
+    /// The next sample; `None` if none comes within this time.
     ///
     /// # Errors
     /// Those of [`Reader::next_sample`].
@@ -115,8 +115,8 @@ impl Reader {
         self.wait(Inbox::next, Some(longest))
     }
 
-    /// The newest sample that the program has not seen; waits for one if there is none. Those
-    /// before it are passed over.
+    /// The newest sample that the program has not seen; waits for one if necessary. Those before it
+    /// are passed over.
     ///
     /// # Errors
     /// Those of [`Reader::next_sample`].
@@ -124,8 +124,8 @@ impl Reader {
         self.waited(Inbox::newest)
     }
 
-    /// The newest sample that the program has not seen; `None` if there is none within this time.
-    /// For loops that must not wait: 0 s is an answer at once.
+    /// The newest sample that the program has not seen; `None` if none comes within this time. With
+    /// 0 s it never waits.
     ///
     /// # Errors
     /// Those of [`Reader::next_sample`].

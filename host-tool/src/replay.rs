@@ -1,4 +1,4 @@
-//! `hivtac replay`: answers as the recorded device would, from a recording.
+//! `hivtac replay`: answers as the recorded device did.
 
 use crate::output::{Reader, note, print};
 use clap::Args;
@@ -29,8 +29,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Example: hivtac replay press.mcap --tcp 7000
 #[derive(Args)]
 pub struct ReplayArguments {
-    /// What `record` made; also one that was cut or damaged, or that other tools packed, trimmed or
-    /// merged
+    /// A recording of `record`, also one that was cut or damaged, or that other tools packed,
+    /// trimmed or merged
     file: PathBuf,
     /// The sensor with this name or serial number, where it holds several
     #[arg(long, value_name = "NAME")]

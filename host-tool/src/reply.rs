@@ -60,7 +60,7 @@ fn after_silence(request: &Request) -> &'static str {
         }
         _ => {
             "it may do it all the same: wait 10 s and try again; when it repeats, `hivtac info` \
-             tells whether it restarts"
+             shows whether it restarts"
         }
     }
 }
@@ -135,8 +135,8 @@ pub fn judge(what: &str, outcome: Outcome) -> Result<(), Failure> {
         Outcome::Touched { looks_like } => {
             let millinewtons = f64::from(looks_like.0) * 1e-3;
             &format!(
-                "the film looks touched, by {millinewtons:.1} mN, beside where it rested before, \
-                 when it was calibrated, or as sensors are built; take away what touches it, or \
+                "the film looks touched, by {millinewtons:.1} mN, compared with the film at an \
+                 earlier tare, at its calibration, or of sensors as built; take away what touches it, or \
                  say --force when nothing does"
             )
         }

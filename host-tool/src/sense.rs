@@ -53,16 +53,16 @@ pub struct SenseArguments {
     /// Model file; the firmware's own when not given
     #[arg(long, value_name = "FILE")]
     model: Option<String>,
-    /// Columns and rows that are looked at, of all pictures; the rest counts as empty
+    /// Columns and rows to search, in all pictures; the rest counts as empty
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = region)]
     region: Option<Region>,
-    /// Picture of the same size that is white where pictures are looked at, and black elsewhere
+    /// Picture of the same size, white where to search and black elsewhere
     #[arg(long, value_name = "IMAGE")]
     mask: Option<String>,
     /// Picture of the untouched film, to measure displacements from
     #[arg(long, value_name = "IMAGE")]
     tare: Option<String>,
-    /// The shape of what presses, as in `hivtac settings set contact`
+    /// The contact's shape, as in `hivtac settings set contact`
     #[arg(long, value_name = "SHAPE", default_value = "unknown",
           value_parser = contact_shape::parse)]
     contact: ContactShape,
@@ -197,7 +197,7 @@ impl<'a> Bench<'a> {
         })
     }
 
-    /// Reads a picture in the format of the model's camera, without what is not looked at.
+    /// Reads the visible part of a picture, in the format of the model's camera.
     fn picture(&self, path: &str) -> Result<Picture, Failure> {
         let mut picture = Picture::load(path, self.model.conditions.threshold.format())?;
         let size = [picture.width, picture.height];
@@ -290,14 +290,14 @@ impl<'a> Bench<'a> {
     }
 }
 
-/// Why a tare's picture was refused, and what to do.
+/// Why a tare's picture was refused, and the remedy.
 fn complaint(refusal: Refusal) -> String {
     match refusal {
         Refusal::Touched(force) => {
             let millinewtons = f64::from(force.0) * 1e-3;
             return format!(
-                "shows a film that looks touched, by {millinewtons:.1} mN, beside where the unit \
-                 rested when it was calibrated, or as sensors are built: use a picture without a \
+                "shows a film that looks touched, by {millinewtons:.1} mN, compared with the \
+                 unit at its calibration, or with sensors as built: use a picture without a \
                  press, or calibrate anew"
             );
         }

@@ -45,7 +45,7 @@ struct SnapshotFiles {
     /// The frame's bytes as the camera sent them, as PAM with two bytes a pixel
     #[arg(long, value_name = "FILE.pam")]
     raw: Option<String>,
-    /// What passes the threshold, white, and what dilation adds, grey, as PNG
+    /// Mask: pixels that pass the threshold, white, and those by dilation, grey, as PNG
     #[arg(long, value_name = "FILE.png")]
     mask: Option<String>,
 }

@@ -66,7 +66,7 @@ impl Tally {
         self.device.count(stats);
     }
 
-    /// Adds what the decoder of a connection rejected; call it once, when the connection ends.
+    /// Adds the rejects of a connection's decoder; call it once, when the connection ends.
     pub fn rejected(&mut self, of_connection: Rejected) {
         let sum = &mut self.rejected;
         sum.overlong = sum.overlong.saturating_add(of_connection.overlong);
@@ -398,7 +398,7 @@ mod tests {
     };
 
     #[test]
-    fn gaps_are_told_apart() {
+    fn gaps_are_distinguished() {
         let mut gaps = Gaps::default();
         assert_eq!(
             gaps.count(u32::MAX - 1, 10),

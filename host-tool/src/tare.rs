@@ -16,8 +16,8 @@ use std::time::Duration;
 const SLOWEST_FRAME: Duration = Duration::from_millis(500);
 /// Take the present position of the film as its rest position, until the device restarts
 ///
-/// Refused while something moves, or touches the film as the tare from before tells. Says where
-/// the markers are, how much they scatter, and how far they are from where they were.
+/// Refused while something moves the film or touches it, compared with the earlier tare. Shows the
+/// markers' places, their scatter, and their distance from the earlier ones.
 ///
 /// Example: hivtac tare --keep
 #[derive(Args)]

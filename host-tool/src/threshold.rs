@@ -60,7 +60,7 @@ mod tests {
     ];
 
     #[test]
-    fn thresholds_are_told_with_their_format() {
+    fn thresholds_are_reported_with_their_format() {
         let texts = ALL.map(|threshold| text(&threshold));
         let expected = [
             "rgb565, H 1–2, S 3–4, V 5–6",

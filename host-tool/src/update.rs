@@ -24,7 +24,7 @@ pub enum UpdateCommand {
 
 /// Send a model file, which the device checks, keeps through restarts and uses from then on
 ///
-/// Forces go on with the model before until then. What is damaged, not sound, or made for
+/// Forces go on with the earlier model until then. A file that is damaged, unsound, or made for
 /// another camera or unit is refused, and nothing changes.
 ///
 /// Example: hivtac update model thumb.hvtm
@@ -32,7 +32,7 @@ pub enum UpdateCommand {
 pub struct ModelArguments {
     #[command(flatten)]
     device: Device,
-    /// What `hivtac-calibrate` made
+    /// The model file of `hivtac-calibrate`
     #[arg(value_name = "FILE.hvtm", required_unless_present = "built_in")]
     file: Option<String>,
     /// The model that is built into the firmware instead of a file; the kept one is forgotten

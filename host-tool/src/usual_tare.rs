@@ -1,4 +1,4 @@
-//! The usual tare: how many frames, how long, and what is said of it.
+//! The usual tare: its number of frames, its time limit, and its messages.
 
 use hivtac_wire::message::Request;
 use std::time::Duration;

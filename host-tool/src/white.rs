@@ -35,8 +35,8 @@ const MOST_UNEVEN: f64 = 0.1;
 
 /// Make white white: fit the camera's gains of red and blue to a white card, and keep them
 ///
-/// Hold a white card where the film is; the picture's middle counts. A camera without colours, and
-/// what is no white card, are refused, and the settings stay as they were. Afterwards put the
+/// Hold a white card where the film is; the picture's middle counts. A camera without colours and
+/// anything but a white card are refused, and the settings stay as they were. Afterwards put the
 /// film back.
 ///
 /// Example: hivtac white
@@ -125,8 +125,7 @@ fn refuse(middle: &Middle, what: &str) -> Failure {
 
 /// The gains to try next; `None` if those in use make the card white.
 ///
-/// # Errors
-/// What is seen instead of a white card.
+/// # Errors The text describes the picture instead of a white card.
 fn next(middle: &Middle, white: White) -> Result<Option<White>, String> {
     let [red, green, blue] = middle.mean.map(|level| level.max(1.0));
     let [least, most] = BRIGHTNESS;

@@ -1,10 +1,10 @@
 //! Finds where the untouched film rests: how far from its rest position, and re-zeroing, which
 //! follows it.
 //!
-//! The markers' rest positions drift with temperature and with what the film remembers of its
-//! loads. Frames with all markers within half a pixel of the rest position show the untouched film,
-//! whether or not a force explains them: a touch moves the markers farther. The mean of a second of
-//! such frames gives the drift.
+//! The markers' rest positions drift with temperature and with the film's creep. Frames with all
+//! markers within half a pixel of the rest position show the untouched film, whether or not a force
+//! explains them: a touch moves the markers farther. The mean of a second of such frames gives the
+//! drift.
 //!
 //! Once this has lasted long enough, each coordinate of the rest position follows that mean. It
 //! moves by at most a rate, and never farther from where it was taken than a total.
@@ -40,7 +40,7 @@ const LONGEST_GAP_US: u64 = 100_000;
 /// Most frames of a mean: 65 s of frames of a millisecond. Sums are below 2⁴⁸.
 const MOST_FRAMES: u32 = 1 << 16;
 
-/// What a frame shows about the rest position.
+/// A frame's evidence about the rest position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RestChange {
     /// No result: no second of the untouched film ends with this frame.
@@ -321,10 +321,10 @@ mod tests {
             for _ in 0..ms * 1_000 / FRAME_US {
                 self.time_us += FRAME_US;
                 let before = self.tare;
-                let told = self.tare.follow(Some(limits), self.time_us, features);
+                let reported = self.tare.follow(Some(limits), self.time_us, features);
                 let has_moved = before.rest != self.tare.rest;
-                assert_eq!(has_moved, told == RestChange::Moved);
-                assert!(told != RestChange::Nothing || before.drift == self.tare.drift);
+                assert_eq!(has_moved, reported == RestChange::Moved);
+                assert!(reported != RestChange::Nothing || before.drift == self.tare.drift);
             }
         }
 
@@ -380,8 +380,8 @@ mod tests {
         assert_eq!(film.right(), 0.0);
     }
 
-    /// A second of frames shows how far the film rests from the rest position, whether or not that
-    /// moves. A followed drift is no longer a drift.
+    /// A second of frames gives the film's distance from the rest position, even if that does not
+    /// follow. A followed drift is no longer a drift.
     #[test]
     fn how_far_the_film_was_seen_from_there_stays_until_it_is_seen_again() {
         let mut film = Followed::new();

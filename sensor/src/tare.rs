@@ -1,13 +1,13 @@
 //! Measures the rest position of this unit, the tare, as the mean of good frames.
 //!
-//! Every force is measured against it. A wrong rest position makes all forces wrong, and none of
-//! them looks wrong. So it is refused unless
+//! Every force is measured against it, and a wrong rest position makes all forces wrong without a
+//! sign. So it is refused unless
 //!
 //! 1. the images are those of whole markers ([`Sensor::tare_with`](crate::pipeline::Sensor)): a
 //!    film at rest is flat, so optics give the images of four equal discs;
 //! 2. nothing moves: the frames scatter no more than noise does;
 //! 3. nothing touches the film, compared with the previous rest position or the unit's calibration;
-//!    without either, only as far as the exactness of building units allows to see a touch;
+//!    without either, only by the scatter of units as built;
 //! 4. the markers' distance from their centre fits a film at rest ([`Rest::fits`]).
 //!
 //! [Forced](TareBuilder::forced) skips 2 and 3.

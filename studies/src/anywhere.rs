@@ -1,5 +1,4 @@
-//! Measures how near the sensor's errors come to the least that four markers allow, anywhere on the
-//! film.
+//! Compares the sensor's errors anywhere on the film with the Cramér–Rao bound of four markers.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -24,7 +23,7 @@ pub const WEIGHTS: &str = "calibration/models/default.weights";
 /// bound.
 #[derive(Args)]
 pub struct Anywhere {
-    /// A weights file of a network that tells places, with its film.
+    /// A weights file of a network with places, with its film.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Presses of each force.

@@ -1,5 +1,5 @@
-//! `hivtac-studies`: runs the studies whose figures change with the models: units drawn at random,
-//! what presses them, and how near their errors come to the least that is possible.
+//! `hivtac-studies`: runs the studies whose figures change with the models: randomly drawn units,
+//! objects that press them, and their errors compared with the Cramér–Rao bound.
 
 mod anywhere;
 mod contacts;
@@ -13,7 +13,7 @@ mod units;
 use anyhow::Result;
 use clap::{Parser, Subcommand};
 
-/// What only proves or compares.
+/// Studies that prove or compare.
 #[derive(Parser)]
 #[command(version)]
 struct Cli {

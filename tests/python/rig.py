@@ -1,4 +1,4 @@
-"""The rig with the firmware, as a program: what a test in Python runs hivtac on."""
+"""The rig with the firmware, as a program, for tests in Python."""
 
 import json
 import os
@@ -62,7 +62,7 @@ class Rig:
         self._process.wait()
 
     def truth(self):
-        """What is true of each frame, by its number."""
+        """The truth of each frame, by its number."""
         lines = self.truth_file.read_text().splitlines()
         whole = [json.loads(line) for line in lines if line.endswith("}")]
         return {line["frame"]: line for line in whole}

@@ -43,7 +43,7 @@ from twin import PAIR, PRESSED, Twin
 
 
 class Connected:
-    """What arms and leaders need, and these do not."""
+    """Methods that arms and leaders need, and these do not."""
 
     is_connected = False
     is_calibrated = True
@@ -310,7 +310,7 @@ class Live(unittest.TestCase):
         self.assertEqual(observed(sample, 0.0)["contact1_place_x_m"], 0)
         self.assertEqual(observed(sample, 1.0)["contact_count"], 0)
 
-    def test_a_sensor_that_falls_silent_is_not_waited_for_and_one_that_goes_is_told(self):
+    def test_a_sensor_that_falls_silent_is_not_waited_for_and_one_that_goes_is_reported(self):
         with Twin(PRESSED) as twin:
             sensors = robot(tip={"port": twin.port})
             sensors.connect()
@@ -333,7 +333,7 @@ class Live(unittest.TestCase):
             sensors.disconnect()
             self.assertFalse(sensors.is_connected)
 
-    def test_what_cannot_be_is_told_with_what_to_do(self):
+    def test_what_cannot_be_is_reported_with_what_to_do(self):
         with self.assertRaisesRegex(ValueError, "at least one finger"):
             robot()
         with Twin() as twin:

@@ -48,7 +48,7 @@ def log(*words, seconds=None, program=(sys.executable, "-m", "hivtac.rerun")):
 
 
 class Content:
-    """What a file has, by entity and component."""
+    """The contents of a file, by entity and component."""
 
     def __init__(self, file):
         self.chunks = [chunk.to_record_batch() for chunk in RrdReader(file).stream()]
@@ -71,7 +71,7 @@ class Logged(unittest.TestCase):
     def test_forces_of_a_sensor_are_true_and_pictures_have_mask_and_markers(self):
         with Twin(PRESSED) as twin:
             twin.run("settings", "set", "contact", "needle")
-            # The tool looks for Python beside itself, then along the path.
+            # The tool looks for Python in its own folder, then along the path.
             path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
             served = ("env", f"PATH={path}", TOOL, "serve", "--rerun", "--port", twin.port)
             content = log("--", seconds=8, program=served)
@@ -133,7 +133,7 @@ class Logged(unittest.TestCase):
         self.assertEqual(set(content.by_frame("/thumb/force", "scalars")), {sample.frame})
         self.assertEqual(set(content.by_frame("/thumb/picture", "buffer")), {picture.frame})
 
-    def test_failures_are_told(self):
+    def test_failures_are_reported(self):
         with self.assertRaisesRegex(AssertionError, "hivtac: .*no-such"):
             log("no-such.mcap")
         with self.assertRaisesRegex(AssertionError, "not both"):

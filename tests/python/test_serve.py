@@ -18,7 +18,6 @@ import io
 import json
 import math
 import os
-import signal
 import statistics
 import struct
 import subprocess
@@ -57,6 +56,7 @@ from ros2_types import (
     Request,
     WrenchStamped,
 )
+from serve import INTERRUPTED, Serve, refused, until
 from websockets.sync.client import connect
 
 # Of a domain that nobody else is likely to use.
@@ -75,42 +75,6 @@ FOXGLOVE = ["--foxglove", "--listen", "127.0.0.1:0"]
 TARED = (True, "tare taken over 32 frames")
 # Frames that must be recognized by their forces, one after the other.
 ALIKE = 20
-
-
-class Serve:
-    """`hivtac serve`, until it is left."""
-
-    def __init__(self, *options):
-        self._errors = tempfile.NamedTemporaryFile()
-        self._process = subprocess.Popen(
-            [os.environ["HIVTAC_TOOL"], "serve", "--json", *options],
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            text=True,
-        )
-        line = self._process.stdout.readline()
-        if not line:
-            raise AssertionError(self.said())
-        self.told = json.loads(line)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.said()
-        self._errors.close()
-
-    def heard(self):
-        """What it has said on standard error until now."""
-        return Path(self._errors.name).read_text()
-
-    def said(self):
-        """Ends it as Ctrl-C does; what it said on standard error."""
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-        self._process.communicate(timeout=20)
-        self.code = self._process.returncode
-        return self.heard()
 
 
 class Node:
@@ -147,19 +111,9 @@ class Client(Node):
         return self
 
     def __exit__(self, *_):
-        # As long as Cyclone DDS has its reader, it tells of replies of the other kind.
+        # As long as Cyclone DDS has its reader, it reports replies of the other kind.
         del self._ask, self._replies, self._participant
         gc.collect()
-
-
-def until(what, seconds=PATIENCE):
-    """What `what` gives once it gives something."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if found := what():
-            return found
-        time.sleep(0.02)
-    raise AssertionError("it did not come in time")
 
 
 def number(vector):
@@ -197,7 +151,7 @@ def pressed(messages):
 
 
 class OnTheRig(unittest.TestCase):
-    def test_forces_are_those_of_the_scene_and_a_pulled_cable_is_told(self):
+    def test_forces_are_those_of_the_scene_and_a_pulled_cable_is_reported(self):
         node = Node()
         wrenches = [
             node.reader("rt/hivtac/wrench", WrenchStamped, reliability)
@@ -209,16 +163,16 @@ class OnTheRig(unittest.TestCase):
         with Rig() as rig:
             rig.set_needle()
             with Serve(*ROS2, *FOXGLOVE, *port(rig)) as serve:
-                self.assertEqual(serve.told["ros2"], "/hivtac")
-                self.assertEqual(serve.told["domain"], str(DOMAIN))
+                self.assertEqual(serve.ready["ros2"], "/hivtac")
+                self.assertEqual(serve.ready["domain"], str(DOMAIN))
                 to_foxglove = [number(it.wrench.force) for it in pressed(wrenches_of(serve))]
                 received = [pressed(taken(reader)) for reader in wrenches]
                 truth = rig.truth()
                 touched = [it.data for it in contacts.take(4096)]
                 self.check_a_pulled_cable(rig)
-                said = serve.said()
+                said = serve.end()
         self.assertRegex(said, "lost: (?s:.*)connected again to tcp:")
-        self.assertEqual(serve.code, 130)
+        self.assertEqual(serve.code, INTERRUPTED)
         self.assertIsNotNone(first_alike(to_foxglove, truth), to_foxglove)
         for messages in received:
             self.check_wrenches(messages, truth, begun)
@@ -308,16 +262,16 @@ class OfARecording(unittest.TestCase):
         self.assertGreater(len(received), len(kept) // 2)
         self.assertEqual(received, kept[-len(received) :])
 
-    def test_a_second_one_of_its_name_and_of_its_port_is_told(self):
+    def test_a_second_one_of_its_name_and_of_its_port_is_reported(self):
         with Replay(self.file) as one, Replay(self.file) as other:
             with Serve(*ROS2, *FOXGLOVE, *one.port) as first:
-                taken = ["--listen", first.told["foxglove"].removeprefix("ws://")]
-                refused = self.refused("--foxglove", *taken, *other.port)
-                self.assertEqual(refused.returncode, 1)
-                self.assertIn("choose another port with --listen", refused.stderr)
+                taken = ["--listen", first.ready["foxglove"].removeprefix("ws://")]
+                ended = refused("--foxglove", *taken, *other.port)
+                self.assertEqual(ended.returncode, 1)
+                self.assertIn("choose another port with --listen", ended.stderr)
                 with Replay(self.file) as third, Serve(*ROS2, *third.port) as second:
                     words = f"another node in domain {DOMAIN} is called /hivtac, too"
-                    until(lambda: all(words in serve.heard() for serve in (second, first)))
+                    until(lambda: all(words in serve.errors() for serve in (second, first)))
 
     def test_of_several_sensors_each_has_names_of_its_own(self):
         other_file = self.file.with_name("other.mcap")
@@ -335,10 +289,10 @@ class OfARecording(unittest.TestCase):
                         wrench.header.frame_id, f"hivtac_unit_{unit}_film"
                     )
 
-    def test_nobody_there_is_told(self):
+    def test_nobody_there_is_reported(self):
         alone = ["--ros2", "--domain", "231"]
         with Replay(self.file) as replay, Serve(*alone, *replay.port) as serve:
-            until(lambda: "nothing else of ROS 2 is in domain 231" in serve.heard())
+            until(lambda: "nothing else of ROS 2 is in domain 231" in serve.errors())
 
     def test_a_grip_of_two_sensors_has_topics_of_its_own(self):
         other_file = self.file.with_name("second.mcap")
@@ -349,7 +303,7 @@ class OfARecording(unittest.TestCase):
         with Replay(self.file) as one, Replay(other_file) as other:
             fingers = ["--grip", f"{one.port[1]},{other.port[1]}"]
             with Serve(*ROS2, *FOXGLOVE, *fingers) as serve:
-                with connect(serve.told["foxglove"], subprotocols=["foxglove.sdk.v1"]) as it:
+                with connect(serve.ready["foxglove"], subprotocols=["foxglove.sdk.v1"]) as it:
                     channels = advertised(it, 21)
                     data = messages(it, channels["/hivtac/grip/force"])
                     known = next(it.data for it in data if not math.isnan(it.data))
@@ -360,13 +314,9 @@ class OfARecording(unittest.TestCase):
 
     def test_one_sensor_is_not_served_twice(self):
         with Replay(self.file) as one, Replay(self.file) as other:
-            refused = self.refused("--foxglove", *one.port, *other.port[:2])
-        self.assertEqual(refused.returncode, 2)
-        self.assertIn("the same sensor is named twice", refused.stderr)
-
-    def refused(self, *options):
-        tool = [os.environ["HIVTAC_TOOL"], "serve", *options]
-        return subprocess.run(tool, capture_output=True, text=True, timeout=30)
+            ended = refused("--foxglove", *one.port, *other.port[:2])
+        self.assertEqual(ended.returncode, 2)
+        self.assertIn("the same sensor is named twice", ended.stderr)
 
 
 class WithoutASensor(unittest.TestCase):
@@ -377,14 +327,9 @@ class WithoutASensor(unittest.TestCase):
             ([], "233", 2, "ROS_DOMAIN_ID is 233"),
             (["--port", "no-such-port"], "232", 3, "no-such-port"),
         ]:
-            refused = subprocess.run(
-                [os.environ["HIVTAC_TOOL"], "serve", "--ros2", *options],
-                env=os.environ | {"ROS_DOMAIN_ID": domain},
-                capture_output=True,
-                text=True,
-            )
-            self.assertEqual(refused.returncode, code, refused.stderr)
-            self.assertRegex(refused.stderr, words)
+            ended = refused("--ros2", *options, env=os.environ | {"ROS_DOMAIN_ID": domain})
+            self.assertEqual(ended.returncode, code, ended.stderr)
+            self.assertRegex(ended.stderr, words)
 
 
 class Replay:
@@ -460,14 +405,14 @@ def port(rig):
 
 
 def taken(reader):
-    """What a reader has, and what comes."""
+    """Samples that a reader has, and later ones."""
     while True:
         yield from until(lambda: reader.take(100))
 
 
 def wrenches_of(serve):
     """The wrenches that Foxglove gets, as their schema says."""
-    with connect(serve.told["foxglove"], subprotocols=["foxglove.sdk.v1"]) as socket:
+    with connect(serve.ready["foxglove"], subprotocols=["foxglove.sdk.v1"]) as socket:
         channels = advertised(socket)
         unit = b"hivtac-rig-1".hex()
         names = ["contact", "contacts", "markers", "place", "slip", "status", "wrench"]

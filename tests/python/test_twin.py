@@ -21,7 +21,7 @@ from hivtac.twin import Twin, contact_on
 
 MODELS = Path(__file__).parents[2] / "calibration/models"
 
-# A ball of 8 g falls onto a film that looks up, beside its middle: z of the film is the world's, y
+# A ball of 8 g falls onto a film that looks up, off its middle: z of the film is the world's, y
 # the world's backwards.
 BALL = """
 <mujoco>

@@ -12,37 +12,27 @@ installs the packages first.
 # dependencies = ["zenoh-ros2-sdk>=0.1.8"]
 # ///
 
-import json
 import os
-import signal
 import socket
-import subprocess
 import sys
-import tempfile
-import time
 import unittest
-from pathlib import Path
 
 import zenoh
 from rig import true_force
 from rosbags.typesys import Stores, get_typestore
+from serve import INTERRUPTED, Serve, refused, until
 from twin import PRESSED, Twin
 from zenoh_ros2_sdk.publisher import ROS2Publisher
 from zenoh_ros2_sdk.service_client import ROS2ServiceClient
 from zenoh_ros2_sdk.subscriber import ROS2Subscriber
 from zenoh_ros2_sdk.utils import compute_service_type_hash
 
-TOOL = os.environ["HIVTAC_TOOL"]
 TYPES = get_typestore(Stores.ROS2_JAZZY)
 WRENCH = "geometry_msgs/msg/WrenchStamped"
 TRIGGER = "std_srvs/srv/Trigger"
 REQUEST, REPLY = "# no field\n", "bool success\nstring message\n"
 # A domain that nobody else is likely to use.
 DOMAIN = 97
-# How a command ends by Ctrl-C.
-INTERRUPTED = 130
-# s until something must have happened.
-PATIENCE = 40
 
 
 def free_port():
@@ -72,45 +62,12 @@ def environment(**changes):
     }
 
 
-class Serve:
-    """`hivtac serve --ros2` of a twin, until it is left."""
-
-    def __init__(self, twin, *options, **changes):
-        self._errors = tempfile.NamedTemporaryFile()
-        words = [TOOL, "serve", "--ros2", "--domain", str(DOMAIN), "--json"]
-        self._process = subprocess.Popen(
-            [*words, "--port", twin.port, *options],
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            text=True,
-            env=environment(**changes),
-        )
-        line = self._process.stdout.readline()
-        self.ready = json.loads(line) if line else None
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        if self._process.poll() is None:
-            self._process.send_signal(signal.SIGINT)
-        self.code = self._process.wait(20)
-        self._process.stdout.close()
-        self.heard = self.said()
-        self._errors.close()
-
-    def said(self):
-        return Path(self._errors.name).read_text()
+def options(twin):
+    return ["--ros2", "--domain", str(DOMAIN), "--port", twin.port]
 
 
-def until(condition, patience=PATIENCE):
-    """The condition's value once it is true."""
-    end = time.monotonic() + patience
-    while time.monotonic() < end:
-        if value := condition():
-            return value
-        time.sleep(0.05)
-    raise AssertionError(f"not within {patience} s")
+def serving(twin, **changes):
+    return Serve(*options(twin), env=environment(**changes))
 
 
 def subscribe(topic, kind, messages):
@@ -140,9 +97,10 @@ class OnZenoh(unittest.TestCase):
     def test_forces_reach_a_subscription_each_once_with_the_true_force(self):
         messages = []
         wrench = subscribe("/hivtac/wrench", WRENCH, messages)
-        with Serve(self.twin) as serve:
+        with serving(self.twin) as serve:
             self.assertEqual(serve.ready, {"ros2": "/hivtac", "domain": str(DOMAIN)})
             until(lambda: len(messages) >= 500)
+            errors = serve.end()
         wrench.close()
         stamps = [(it.header.stamp.sec, it.header.stamp.nanosec) for it in messages]
         self.assertEqual(stamps, sorted(set(stamps)))
@@ -152,7 +110,7 @@ class OnZenoh(unittest.TestCase):
         force = last.wrench.force
         for found, true in zip((force.x, force.y, force.z), truth, strict=True):
             self.assertAlmostEqual(found, true, delta=0.01)
-        self.assertEqual((serve.code, serve.heard), (INTERRUPTED, ""))
+        self.assertEqual((serve.code, errors), (INTERRUPTED, ""))
 
     def test_every_topic_has_the_type_that_ros_2_gives_it(self):
         kinds = {
@@ -168,7 +126,7 @@ class OnZenoh(unittest.TestCase):
         topics["/diagnostics"] = "diagnostic_msgs/msg/DiagnosticArray"
         received = {topic: [] for topic in topics}
         readers = [subscribe(topic, topics[topic], received[topic]) for topic in topics]
-        with Serve(self.twin):
+        with serving(self.twin):
             until(lambda: all(received.values()))
             tokens = [
                 str(reply.ok.key_expr)
@@ -207,35 +165,35 @@ class OnZenoh(unittest.TestCase):
         header = TYPES.types["std_msgs/msg/Header"]
         stamp = TYPES.types["builtin_interfaces/msg/Time"](0, 0)
         vector = TYPES.types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
-        with Twin("rest") as twin, Serve(twin) as serve:
+        with Twin("rest") as twin, serving(twin) as serve:
             reply = until(lambda: client.call(structure_needs_at_least_one_member=0))
             self.assertTrue(reply.success, reply.message)
             self.assertRegex(reply.message, "tare taken over")
             # No direction: it is refused, which shows that it came.
             gravity.publish(header=header(stamp, "hivtac_film"), vector=vector)
-            until(lambda: "a vector of gravity is left out" in serve.said())
+            until(lambda: "a vector of gravity is left out" in serve.errors())
         client.close()
         gravity.close()
 
-    def test_a_second_one_of_its_name_is_told(self):
+    def test_a_second_one_of_its_name_is_reported(self):
         words = f"another node in domain {DOMAIN} is called /hivtac, too"
-        with Twin() as twin, Serve(self.twin) as first, Serve(twin) as second:
-            until(lambda: words in first.said() and words in second.said())
+        with Twin() as twin, serving(self.twin) as first, serving(twin) as second:
+            until(lambda: words in first.errors() and words in second.errors())
 
     def test_without_a_router_and_with_a_wrong_setting_it_says_what_to_do(self):
         alone = f'connect/endpoints=["tcp/127.0.0.1:{free_port()}"]'
-        with Serve(self.twin, ZENOH_CONFIG_OVERRIDE=alone) as serve:
-            until(lambda: "rmw_zenohd" in serve.said())
+        with serving(self.twin, ZENOH_CONFIG_OVERRIDE=alone) as serve:
+            until(lambda: "rmw_zenohd" in serve.errors())
         for wrong, why in [
             ("mode", "is not key=value"),
             ("no/such/key=1", "no/such/key"),
         ]:
-            with Serve(self.twin, ZENOH_CONFIG_OVERRIDE=wrong) as serve:
-                self.assertIsNone(serve.ready)
-            self.assertEqual(serve.code, 1)
-            self.assertIn("cannot take part in ROS 2's domain", serve.heard)
-            self.assertIn(why, serve.heard)
-            self.assertIn("ZENOH_CONFIG_OVERRIDE", serve.heard)
+            env = environment(ZENOH_CONFIG_OVERRIDE=wrong)
+            ended = refused(*options(self.twin), env=env)
+            self.assertEqual(ended.returncode, 1)
+            self.assertIn("cannot take part in ROS 2's domain", ended.stderr)
+            self.assertIn(why, ended.stderr)
+            self.assertIn("ZENOH_CONFIG_OVERRIDE", ended.stderr)
 
 
 if __name__ == "__main__":

@@ -80,7 +80,7 @@ class Twin:
         )
 
     def truth(self):
-        """What is true of each frame until now, by its number."""
+        """The truth of each frame until now, by its number."""
         lines = self._truth_file.read_text().splitlines()
         whole = [json.loads(line) for line in lines if line.endswith("}")]
         return {line["frame"]: line for line in whole}

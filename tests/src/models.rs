@@ -85,7 +85,7 @@ pub fn weighted_file(
 }
 
 /// Returns a model of int8 weights with these layer widths, for frames of another geometry and
-/// pixel format. Its rest position is what this estimator finds in such frames.
+/// pixel format. Its rest position is this estimator's in such frames.
 pub fn file_for(
     geometry: Geometry,
     format: PixelFormat,

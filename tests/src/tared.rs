@@ -231,7 +231,7 @@ impl TaredSensor {
         Ok(tared)
     }
 
-    /// Tells the sensor what presses.
+    /// Sets the contact's shape.
     pub fn set_contact_shape(&mut self, shape: ContactShape) {
         self.sensor.set_contact_shape(shape);
     }
@@ -268,12 +268,12 @@ impl TaredSensor {
         self.sensor.set_tare(None, Drift::NONE);
     }
 
-    /// Sets what is known of gravity from now on.
+    /// Sets the direction of gravity from now on.
     pub fn set_down(&mut self, down: Down) {
         self.sensor.set_down(down);
     }
 
-    /// Keeps the rest position alone: nothing is known of frames.
+    /// Keeps the rest position alone, and discards the state of earlier frames.
     pub fn begin_anew(&mut self) {
         let rest = self.sensor.tare().copied();
         self.sensor.set_tare(rest, Drift::NONE);

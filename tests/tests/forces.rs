@@ -17,8 +17,8 @@ use hivtac_twin::{Format, Options, Preset, Scene};
 use serde_json::{Value, json};
 
 const SEED: u64 = 1;
-/// A frame of the OV7725 has 278 lines, of which each exposes a row. One of the OV5640 has 467, of
-/// which 441 expose 240 rows.
+/// A frame of the OV7725 has 278 lines, and each exposes a row. One of the OV5640 has 467; 441 of
+/// these expose 240 rows.
 const OV7725: Motion = Motion::rolling(278);
 const OV5640: Motion = Motion::rolling(254);
 
@@ -99,7 +99,7 @@ fn monitor(rig: &Rig, frames: usize) -> Vec<Value> {
     lines
 }
 
-/// Frames that the device may have measured before the first one of which it sent a sample.
+/// Frames that the device may have measured before its first sample's frame.
 const EARLIER: u64 = 4;
 
 /// Compares every line of the host tool with the sensing on this computer, which measures the same
@@ -135,10 +135,10 @@ fn check_forces(rig: &Rig, lines: &[Value], scene: &Scene, model: &[u8], motion:
 }
 
 /// Checks that a sample has the values of its frame alone, with uncertainties that are not smaller:
-/// the device adds what the film may remember of earlier frames.
+/// the device adds the film's possible creep by earlier frames.
 fn follows(said: &Value, measured: &Value) -> Result<(), String> {
     const SIGMAS: [usize; 3] = [6, 7, 10];
-    let told = |value: &Value| {
+    let reported = |value: &Value| {
         let mut value = value.clone();
         let mut sigmas = Vec::new();
         if let Some(force) = value["force"].as_array_mut() {
@@ -146,7 +146,7 @@ fn follows(said: &Value, measured: &Value) -> Result<(), String> {
         }
         (value, sigmas)
     };
-    let ((said_rest, said_sigmas), (rest, sigmas)) = (told(said), told(measured));
+    let ((said_rest, said_sigmas), (rest, sigmas)) = (reported(said), reported(measured));
     let as_certain = said_sigmas.iter().zip(&sigmas).all(|(a, b)| a >= b);
     match said_rest == rest && as_certain {
         true => Ok(()),

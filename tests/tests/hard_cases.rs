@@ -1,4 +1,4 @@
-//! Tests of the scene's hard cases: each is correct or rejected, never silently wrong. Honest
+//! Tests of the scene's hard cases: each is correct or rejected, never silently wrong. Undisturbed
 //! frames must not be refused for that.
 
 use std::fmt::Debug;
@@ -47,7 +47,7 @@ fn hard_cases_are_right_or_refused_at_every_size() {
 
 /// Returns a press in a sequence that fills the whole range evenly: |F| to 0.25 N, or the largest
 /// label of a stage, α to ±12°, β to ±10°, the tip up to 0.25 mm off the middle.
-fn honest_load(contact: Contact, index: usize) -> Load {
+fn undisturbed_load(contact: Contact, index: usize) -> Load {
     let most_n = match contact {
         Contact::Force => MAX_FORCE_N,
         Contact::Stick | Contact::Slip { .. } => MAX_LABEL_N,
@@ -67,13 +67,13 @@ fn honest_load(contact: Contact, index: usize) -> Load {
 
 /// Results on nominal frames, which the views share.
 #[derive(Clone, Default)]
-struct Honest {
+struct Undisturbed {
     refused: usize,
     /// The largest error of a marker in the accepted frames, px.
     worst_px: f64,
 }
 
-impl Honest {
+impl Undisturbed {
     fn add(&mut self, detection: Detection, shown: &dyn Debug) {
         match detection {
             Detection::Trusted { worst_px, .. } => self.worst_px = self.worst_px.max(worst_px),
@@ -89,17 +89,17 @@ impl Honest {
 /// refused, and none that is accepted has a larger error than allowed.
 fn hardly_any_is_refused(views: &[View], frames: Range<usize>) {
     let mut sensors: Vec<_> = views.iter().map(|view| view.sensor().unwrap()).collect();
-    let mut found = vec![Honest::default(); views.len()];
+    let mut found = vec![Undisturbed::default(); views.len()];
     let scene = views[0].nominal().unwrap();
     for index in frames.clone() {
-        let load = honest_load(views[0].contact, index);
+        let load = undisturbed_load(views[0].contact, index);
         let frame = scene.render_load(&load, index as u64).unwrap();
         for ((sensor, found), view) in sensors.iter_mut().zip(&mut found).zip(views) {
             found.add(sensor.detect(&frame), &(view, &load));
         }
     }
     let frames = frames.len();
-    for (Honest { refused, worst_px }, view) in found.into_iter().zip(views) {
+    for (Undisturbed { refused, worst_px }, view) in found.into_iter().zip(views) {
         println!("{view:?}: {refused} of {frames} refused, worst {worst_px:.3} px");
         assert!(
             worst_px <= view.tolerance_px(),
@@ -116,17 +116,17 @@ fn hardly_any_is_refused_of(contact: Contact, size: [u32; 2], frames: Range<usiz
 }
 
 #[test]
-fn honest_frames_are_accepted() {
+fn undisturbed_frames_are_accepted() {
     hardly_any_is_refused_of(Contact::Force, [320, 240], 0..500);
 }
 
 #[test]
-fn honest_frames_are_accepted_in_yuv422() {
+fn undisturbed_frames_are_accepted_in_yuv422() {
     hardly_any_is_refused(&[View::YUV422], 0..1_000);
 }
 
 #[test]
-fn honest_frames_of_a_tip_that_sticks_or_slips_are_accepted() {
+fn undisturbed_frames_of_a_tip_that_sticks_or_slips_are_accepted() {
     hardly_any_is_refused_of(Contact::Stick, [320, 240], 0..250);
     for mu in [0.3, 0.8] {
         hardly_any_is_refused_of(Contact::Slip { mu }, [320, 240], 0..250);
@@ -136,7 +136,7 @@ fn honest_frames_of_a_tip_that_sticks_or_slips_are_accepted() {
 /// The frames after those of the quick tests.
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn of_thousands_of_honest_frames_at_most_one_in_a_thousand_is_refused() {
+fn of_thousands_of_undisturbed_frames_at_most_one_in_a_thousand_is_refused() {
     hardly_any_is_refused_of(Contact::Force, [320, 240], 500..4_500);
     hardly_any_is_refused(&[View::YUV422], 1_000..5_000);
     hardly_any_is_refused_of(Contact::Force, [800, 600], 0..500);

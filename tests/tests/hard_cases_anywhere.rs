@@ -1,5 +1,5 @@
 //! Tests of the scene's hard cases under contacts anywhere, with the committed model that gives
-//! places. Each is right or refused, never silently wrong, and honest frames are not refused.
+//! places. Each is right or refused, never silently wrong, and undisturbed frames are not refused.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -20,8 +20,8 @@ const PRESSES: Contacts = Contacts {
     place_mm: 4.0,
 };
 
-/// Presses on honest frames.
-const HONEST: Contacts = Contacts {
+/// Presses on undisturbed frames.
+const UNDISTURBED: Contacts = Contacts {
     force_n: [0.002, 0.2],
     ratio: 0.8,
     place_mm: 4.0,
@@ -82,8 +82,8 @@ impl Outcome {
 }
 
 /// Moving cases are left out: they are about one frame's time, and their force itself moves. At
-/// most `most` faults are allowed: what some presses leave unexplained widens the uncertainties,
-/// and with them what passes.
+/// most `most` faults are allowed: the residuals of some presses widen the uncertainties, and with
+/// them the limits.
 fn hold(presses: Range<u64>, most: usize) {
     let mut sensor = sensor();
     let mut wrong = Vec::new();
@@ -132,15 +132,15 @@ fn hard_cases_anywhere_are_right_or_refused_under_many_presses() {
     hold(60..150, 4);
 }
 
-/// Checks honest frames in which no marker reaches the picture's border: at most one in a thousand
-/// is refused, and none is wrong.
+/// Checks undisturbed frames in which no marker reaches the picture's border: at most one in a
+/// thousand is refused, and none is wrong.
 fn hardly_any_is_refused(frames: Range<u64>) {
     let mut sensor = sensor();
     let scene = hivtac_twin::Scene::preset("rest", Preset::Ov7725, 320, 240, 7).unwrap();
     let mut random = Random::new(23);
     let (mut refused, mut reasons) = (0, BTreeMap::new());
     for number in 0..frames.end {
-        let load = HONEST.draw(&mut random).unwrap();
+        let load = UNDISTURBED.draw(&mut random).unwrap();
         if !frames.contains(&number) {
             continue;
         }
@@ -164,12 +164,12 @@ fn hardly_any_is_refused(frames: Range<u64>) {
 }
 
 #[test]
-fn honest_frames_anywhere_are_accepted() {
+fn undisturbed_frames_anywhere_are_accepted() {
     hardly_any_is_refused(0..2_000);
 }
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn of_thousands_of_honest_frames_anywhere_at_most_one_in_a_thousand_is_refused() {
+fn of_thousands_of_undisturbed_frames_anywhere_at_most_one_in_a_thousand_is_refused() {
     hardly_any_is_refused(2_000..10_000);
 }

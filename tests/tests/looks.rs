@@ -62,7 +62,7 @@ fn patched(far_mm: f64, radius_mm: f64, paint: Paint) -> Options {
 }
 
 /// A force is measured ahead of a frame's last rows, and anew if something red follows. Both are
-/// one frame, of which later frames know.
+/// one frame for later frames.
 #[test]
 fn a_frame_that_is_measured_ahead_in_vain_counts_once() {
     let below = Patch {

@@ -1,5 +1,5 @@
-//! Tests of the marker rules on rendered frames: every honest frame passes, and no false one has an
-//! error beyond a bound.
+//! Tests of the marker rules on rendered frames: every undisturbed frame passes, and no false one
+//! has an error beyond a bound.
 
 use hivtac_terms::conditions::CentroidEstimator;
 use hivtac_terms::threshold::PixelFormat;
@@ -84,7 +84,7 @@ fn around(count: u32) -> impl Iterator<Item = (f64, f64)> {
 }
 
 #[test]
-fn every_honest_press_is_trusted() {
+fn every_undisturbed_press_is_trusted() {
     for views in views(Contact::Force, &[[320, 240]]) {
         let mut sensors = views.map(|view| (view, view.sensor().unwrap()));
         let scene = scene(views[0].preset, Options::default());
@@ -110,8 +110,7 @@ fn every_honest_press_is_trusted() {
     }
 }
 
-/// Iterates over options with light, everywhere or on one side, below what the value threshold
-/// needs.
+/// Iterates over options with light, everywhere or on one side, below the value threshold's need.
 fn dim() -> impl Iterator<Item = Options> {
     let gains = [0.6, 0.45, 0.36, 0.32, 0.3, 0.28, 0.24];
     let gradients = [0.15, 0.4, 0.9];

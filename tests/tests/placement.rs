@@ -66,10 +66,10 @@ fn the_sensing_runs_from_itcm() {
         packages.iter().any(|package| symbol.name.contains(package))
             || symbol.name.starts_with("hivtac_")
     };
-    // Code that rarely runs: for a model, a setting, a tare, a message or a self-test, after a
-    // force or in place of one without a film, for a second look at a refused frame, for a lost
-    // marker, for a contact that is no needle or turns, and for two. It has no loop over pixels;
-    // two contacts have one over weights, for which there is no room.
+    // Code that rarely runs: for a model, a setting, a tare, a message or a self-test; after a
+    // force, or in place of one without a film; for second looks, lost markers, contacts other than
+    // needles, torques, and two contacts. It has no loop over pixels; two contacts have one over
+    // weights, for which there is no room.
     let seldom = [
         "hivtac_sensor5force5model",
         "hivtac_sensor..force..model",

@@ -1,5 +1,5 @@
-//! Tests that honest contacts anywhere get a force from a model that gives places, and that few of
-//! them get one from a model that does not.
+//! Tests that contacts anywhere get a force from a model that gives places, and that few of them
+//! get one from a model that does not.
 
 use hivtac_terms::status::Status;
 use hivtac_tests::judged::Contacts;
@@ -66,13 +66,13 @@ fn compare(views: [View; 2], frames: u64) {
         // wide.
         assert!(anywhere.cut * 10 < frames, "{view:?}: {anywhere:?}");
         assert!(anywhere.refused * 200 <= frames, "{view:?}: {anywhere:?}");
-        // For most of these frames, a model of presses in the middle has no honest answer.
+        // For most of these frames, a model of presses in the middle has no valid answer.
         assert!(middle.refused * 3 > frames, "{view:?}: {middle:?}");
     }
 }
 
 #[test]
-fn honest_contacts_anywhere_have_a_force_at_qvga() {
+fn undisturbed_contacts_anywhere_have_a_force_at_qvga() {
     for views in views(Contact::Force, &[[320, 240]]) {
         compare(views, 2_400);
     }
@@ -80,7 +80,7 @@ fn honest_contacts_anywhere_have_a_force_at_qvga() {
 
 #[test]
 #[ignore = "slow: run by cargo xtask test --all"]
-fn honest_contacts_anywhere_have_a_force_at_800_by_600() {
+fn undisturbed_contacts_anywhere_have_a_force_at_800_by_600() {
     for views in views(Contact::Force, &[[800, 600]]) {
         compare(views, 800);
     }

@@ -80,7 +80,7 @@ impl Rig {
         Rig::start_before(elf, options, |source| source)
     }
 
-    /// As [`Rig::start_with`]; the camera sees what `look` makes of the scene.
+    /// As [`Rig::start_with`]; the camera sees the scene as changed by `look`.
     ///
     /// # Errors
     /// If it does not become ready.

@@ -41,8 +41,8 @@ fn frames(scene: &Scene) -> impl Iterator<Item = Frame> {
     })
 }
 
-/// Of 95 honest errors of 100, the largest of direction, |F| and place, in standard uncertainties;
-/// and by how much three of them are more than that bound of |F|.
+/// The bound of 95 in 100 correctly stated errors of direction, |F| and place, in standard
+/// uncertainties; and by how much three of them are more than that bound of |F|.
 const BOUNDS: [f64; 3] = [1.731, 1.960, 2.448];
 const FAR: f64 = 3.0 / 1.960;
 
@@ -124,7 +124,7 @@ fn beside_a_fingertip_behind_the_film_uncertainties_hold() {
     }
 }
 
-/// So does what appears in the room after the tare, seen behind some markers in part.
+/// So do things that appear in the room after the tare, partly behind some markers.
 #[test]
 fn beside_a_thing_behind_the_film_uncertainties_hold() {
     let things = [
@@ -146,8 +146,8 @@ fn beside_a_thing_behind_the_film_uncertainties_hold() {
     }
 }
 
-/// Mean standard uncertainty of the direction, m°, of a sensor that remembers what it saw, and of
-/// one that knows nothing before each frame.
+/// Mean standard uncertainty of the direction, m°, of a sensor that remembers earlier frames, and
+/// of one without memory.
 fn means(
     frames: impl Iterator<Item = Frame>,
     sense: fn(&mut TaredSensor, &Frame) -> Measurement,

@@ -33,13 +33,13 @@ fn sense_finds_the_devices_own_markers_in_its_snapshot() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("frame.pam");
     let rig = Rig::start(&["--scene", "demo", "--seed", "1"]).unwrap();
-    let told = take(&rig, &file);
+    let reported = take(&rig, &file);
     rig.finish().unwrap();
     let found = sense(&[file.to_str().unwrap()]);
-    assert!(told["markers"].is_array(), "{told}");
-    assert_eq!(told["markers"], found["markers"]);
+    assert!(reported["markers"].is_array(), "{reported}");
+    assert_eq!(reported["markers"], found["markers"]);
     assert_eq!(
-        (&told["width"], &told["height"]),
+        (&reported["width"], &reported["height"]),
         (&found["width"], &found["height"])
     );
 }
@@ -51,13 +51,13 @@ fn so_it_does_in_yuv422() {
     let file = folder.path().join("frame.pam");
     let elf = artifact::named_by("HIVTAC_BUG_ELFS").join("yuv422.elf");
     let rig = Rig::start_with(&elf, &["--scene", "demo", "--seed", "1"]).unwrap();
-    let told = take(&rig, &file);
+    let reported = take(&rig, &file);
     rig.finish().unwrap();
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
     let model = root.join("calibration/models/yuv422/default.hvtm");
     let found = sense(&["--model", model.to_str().unwrap(), file.to_str().unwrap()]);
-    assert!(told["markers"].is_array(), "{told}");
-    assert_eq!(told["markers"], found["markers"]);
+    assert!(reported["markers"].is_array(), "{reported}");
+    assert_eq!(reported["markers"], found["markers"]);
 }
 
 /// With the nominal sensor at rest, `focus` ends with its first picture.
@@ -94,23 +94,23 @@ fn a_wrong_threshold_is_mended() {
     };
     run("threshold", &["--hsv", "80,100,100,255,45,255"]);
     assert_eq!(forces(), 0, "with a threshold for cyan dots");
-    let told = json_lines(&run("threshold auto", &["--json"]))
+    let reported = json_lines(&run("threshold auto", &["--json"]))
         .unwrap()
         .remove(0);
     assert_eq!(
-        (&told["is_of_model"], &told["set"]),
+        (&reported["is_of_model"], &reported["set"]),
         (&true.into(), &true.into()),
-        "{told}"
+        "{reported}"
     );
-    let level = |name: &str, which: &str| told[name][which].as_u64().unwrap();
-    let half_way = told["half_way"]["saturation_low"].as_u64().unwrap();
+    let level = |name: &str, which: &str| reported[name][which].as_u64().unwrap();
+    let half_way = reported["half_way"]["saturation_low"].as_u64().unwrap();
     assert!(
         level("film", "high") < half_way && half_way < level("dots", "low"),
-        "{told}"
+        "{reported}"
     );
     assert!(
-        (0.005..0.015).contains(&told["passed"].as_f64().unwrap()),
-        "{told}"
+        (0.005..0.015).contains(&reported["passed"].as_f64().unwrap()),
+        "{reported}"
     );
     assert!(forces() >= 6, "forces are back");
     rig.finish().unwrap();

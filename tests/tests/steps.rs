@@ -1,4 +1,4 @@
-//! Tests of the film run forwards, by the committed model: it finds the contact that explains the
+//! Tests of the forward model, by the committed model: it finds the contact that explains the
 //! markers' motion, refuses markers that no contact explains, and survives any input.
 
 use hivtac_sensor::force::forward::{Covariance, Forward, Markers, Pose, STEPS_AT_MOST};

@@ -1,4 +1,4 @@
-//! Tests of tares: a tare of bad markers is refused, or harmless; honest units are tared.
+//! Tests of tares: a tare of bad markers is refused, or harmless; faultless units are tared.
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
@@ -177,8 +177,8 @@ fn painted_tares(seed: u64, tares: u64) -> (usize, Vec<String>) {
     (taken, wrong)
 }
 
-/// Paint on less than a tenth of a millimetre can be too small to show in a marker's shape. What it
-/// leaves unexplained is then taken for the unit's own, and widens the uncertainties.
+/// Paint on less than a tenth of a millimetre can be too small to show in a marker's shape. Its
+/// residual is then taken for the unit's own, and widens the uncertainties.
 fn few_do_harm(seed: u64, tares: u64) {
     let (taken, wrong) = painted_tares(seed, tares);
     let forces = taken * 2 * PRESSED;
@@ -298,7 +298,7 @@ fn what_still_presses_is_refused_and_a_camera_that_moved_is_tared() {
 fn first_tares(units: u64, force_n: f64) -> (u64, usize, Vec<String>) {
     let mut sensor = sensor();
     let mut random = Random::new(11);
-    let (mut refused, mut told, mut wrong) = (0, 0, Vec::new());
+    let (mut refused, mut reported, mut wrong) = (0, 0, Vec::new());
     for number in 0..units {
         let scene = scene(&built(&mut random), number);
         let place_mm = [0; 2].map(|_| between(&mut random, -4.0, 4.0));
@@ -315,26 +315,26 @@ fn first_tares(units: u64, force_n: f64) -> (u64, usize, Vec<String>) {
             let load = PRESSES.draw(&mut random).unwrap();
             let frame = scene.render_load(&load, number).unwrap();
             match Judged::of(&sensor.sense(&frame), &frame.truth) {
-                Judged::Right => told += 1,
+                Judged::Right => reported += 1,
                 Judged::Wrong(how) => wrong.push(how),
                 Judged::Refused(_) => {}
             }
         }
     }
-    (refused, told, wrong)
+    (refused, reported, wrong)
 }
 
-/// The limits follow from what gluing, lens and camera allow to be seen.
+/// The limits follow from the scatter of gluing, lens and camera.
 #[test]
 fn a_first_tare_of_a_pressed_film_is_refused_or_within_what_is_stated() {
     for (force_n, least) in [(0.002, 0), (0.005, 30), (0.01, 54)] {
-        let (refused, told, wrong) = first_tares(60, force_n);
+        let (refused, reported, wrong) = first_tares(60, force_n);
         assert!(
             refused >= least,
             "{force_n} N: {refused} of 60 were refused"
         );
         // A few places have errors a tenth larger than stated.
-        let most = (told + wrong.len()) / 25;
+        let most = (reported + wrong.len()) / 25;
         assert!(wrong.len() <= most, "{force_n} N: {}", wrong.join("\n"));
     }
 }

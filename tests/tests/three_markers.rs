@@ -1,5 +1,5 @@
 //! Tests of forces from three markers while the fourth one is lost: nearly as good as those from
-//! four, with honest uncertainties, and none where three markers say too little.
+//! four, with correct uncertainties, and none where three markers do not suffice.
 
 use hivtac_sensor::force::Force;
 use hivtac_terms::status::Status;

@@ -120,7 +120,7 @@ fn untouched(sensor: &mut TaredSensor, way: [f64; 3]) -> Measurement {
 }
 
 #[test]
-fn a_sensor_that_is_told_how_it_is_held_measures_as_one_that_stays() {
+fn a_sensor_that_is_reported_how_it_is_held_measures_as_one_that_stays() {
     // For the default model a film that hangs belongs to another unit; one that does not is its
     // own.
     for (before, most) in [(TOWARDS, [0.7, 1.0, 0.035]), (ALONG, [0.5, 0.2, 0.015])] {
@@ -186,7 +186,7 @@ fn a_sensor_that_may_be_turned_says_how_little_it_knows() {
 /// The orientation at the tare is unknown. Later knowledge of the orientation has no effect until a
 /// new tare is taken.
 #[test]
-fn a_tare_that_is_older_than_what_is_told_counts_as_any_way() {
+fn a_tare_that_is_older_than_what_is_reported_counts_as_any_way() {
     let mut sensor = tared(TOWARDS, Down::Fixed);
     sensor.set_down(down_of(AWAY));
     assert!(

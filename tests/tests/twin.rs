@@ -35,8 +35,8 @@ const MT9V034_ARRAY: [u32; 2] = [376, 240];
 const SAMPLES: usize = 24;
 const PATIENCE: Duration = Duration::from_secs(TIMEOUT_S as u64);
 
-/// What a new device is sent. A threshold makes what earlier frames left be forgotten. The first
-/// one is not the model's: samples say so, until the first frame under the second.
+/// The requests to a new device. A threshold discards the state of earlier frames. The first one is
+/// not the model's: samples say so, until the first frame under the second.
 fn set_up(kind: Kind) -> [Request; 4] {
     let [other, own]: [Threshold; 2] = match kind {
         Kind::Ov7725 | Kind::Ov5640 => {
@@ -87,8 +87,8 @@ fn next_sample(link: &mut Link, is_mismatch: bool) -> Sample {
     }
 }
 
-/// Returns what the firmware in a rig says of itself, and the samples of successive frames, from
-/// the first one after what it was sent.
+/// Returns the hello of the firmware in a rig, and the samples of successive frames, from the first
+/// one after these requests.
 fn from_the_rig(rig: &Rig, kind: Kind, count: usize) -> (DeviceHello, SettingsReport, Vec<Sample>) {
     let address = Address::Tty(rig.port().to_owned());
     let (mut link, hello) = Link::connect(&address, PATIENCE).unwrap();
@@ -223,8 +223,8 @@ fn same_samples(twin: &mut Twin, scene: &Scene, rig: &Rig, samples: Vec<Sample>)
     forces
 }
 
-/// A twin with a camera says what the program in the rig says, which has that camera, and makes the
-/// same of the same frames of a scene of the whole array.
+/// A twin with a camera sends the same hello as the program in the rig with that camera, and the
+/// same samples for the same frames of a scene of the whole array.
 fn a_twin_is_as_the_program(kind: Kind, scene: &Scene, rig: Rig) {
     let (hello, settings, samples) = from_the_rig(&rig, kind, SAMPLES);
     let mut twin = Twin::new(kind, Layout::default());
@@ -326,7 +326,8 @@ const NEEDLES: [Press; 2] = [
         angles_deg: [0.0, 4.0],
     },
 ];
-/// Corrections of a dot's place by its image, and about what they take for a pixel.
+/// Number of corrections of a dot's place by its image, and the approximate size of a pixel for
+/// them.
 const CORRECTIONS: usize = 12;
 const MM_PER_PX: f64 = 0.05;
 /// Samples until both are found and followed.
@@ -379,17 +380,17 @@ fn samples_of(moved_mm: &[[f64; 3]], count: usize) -> (Vec<Sample>, Rig, TempDir
     (samples, rig, folder)
 }
 
-/// The flashed program finds them within two seconds, and then tells them in every frame.
+/// The flashed program finds them within two seconds, and then reports them in every frame.
 #[test]
 #[ignore = "slow: boots two devices"]
 fn two_needles_are_two_contacts_on_the_flashed_program() {
     let (samples, rig, _folder) = samples_of(&moved_by_two(), SAMPLES_OF_TWO);
     let steps = samples.windows(2).map(|pair| pair[1].frame - pair[0].frame);
     let steps: Vec<u32> = steps.collect();
-    let told = |sample: &Sample| sample.status.contains(Status::TWO_CONTACTS);
-    let first = samples.iter().position(told).expect("two contacts");
+    let reported = |sample: &Sample| sample.status.contains(Status::TWO_CONTACTS);
+    let first = samples.iter().position(reported).expect("two contacts");
     assert!((20..190).contains(&first), "{first}");
-    assert!(samples[first..].iter().all(told), "{samples:?}");
+    assert!(samples[first..].iter().all(reported), "{samples:?}");
     assert!(steps[FIRST..].iter().all(|step| *step == 1), "{steps:?}");
     let last = samples.last().unwrap();
     let mut each = last.each_contact().to_vec();
@@ -441,8 +442,8 @@ fn health_and_stats(rig: &Rig) -> (Health, Stats) {
     let (mut health, mut stats) = (None, None);
     for request in [Request::GetHealth, Request::GetInfo] {
         let ask = link.request(request, PATIENCE, |message| match message {
-            DeviceMessage::Health(told) => health = Some(told),
-            DeviceMessage::Stats(told) => stats = Some(told),
+            DeviceMessage::Health(reported) => health = Some(reported),
+            DeviceMessage::Stats(reported) => stats = Some(reported),
             _ => {}
         });
         ask.unwrap();

@@ -176,7 +176,7 @@ fn check_lost_and_back(browser: &mut Browser, first: Rig, link: &Path) {
 
 #[test]
 #[ignore = "slow, and needs Chromium: run by cargo xtask test --all"]
-fn the_page_shows_the_truth_and_does_what_it_is_told() {
+fn the_page_shows_the_truth_and_does_what_it_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     let link = folder.path().join("sensor");
     let first = rig(&link);

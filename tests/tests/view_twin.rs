@@ -1,4 +1,5 @@
-//! Tests `hivtac view --twin` in a real browser: a press by pointer events, read beside the truth.
+//! Tests `hivtac view --twin` in a real browser: a press by pointer events, compared with the
+//! truth.
 
 use std::env;
 use std::path::PathBuf;
@@ -39,7 +40,7 @@ fn on_page(browser: &mut Browser, [x, y]: [f64; 2]) -> [f64; 2] {
     [at(x, left, width), at(y, top, height)]
 }
 
-/// Returns what the page compares once its truth is as a condition says.
+/// Returns the page's comparison once its truth meets a condition.
 fn compared(browser: &mut Browser, condition: &str) -> Value {
     let compared = format!("{}.dataset.compared", part("truth"));
     let is = format!(
@@ -82,8 +83,8 @@ fn a_press_by_the_pointer_is_read_within_three_sigma() {
     press(&mut browser, "view-twin.png");
 }
 
-/// Presses the film of a page by the pointer, and compares what is sensed with the truth.
-/// Where `HIVTAC_SCREENSHOTS` says, it keeps a screenshot of this name.
+/// Presses the film of a page by the pointer, and compares the sensed force with the truth. It
+/// keeps a screenshot of this name in `HIVTAC_SCREENSHOTS`.
 pub fn press(browser: &mut Browser, screenshot: &str) {
     browser
         .until(&format!("{} && !{}.hidden", part("truth"), part("truth")))

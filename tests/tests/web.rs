@@ -34,7 +34,7 @@ fn open(script: &str) -> Browser {
     Browser::open_after(script, &address, PAGE).unwrap()
 }
 
-/// Returns what a promise of the page comes to.
+/// Returns the result of a promise of the page.
 fn awaited(browser: &mut Browser, promise: &str) -> Value {
     let kept = format!("globalThis.awaited = null; {promise}.then((it) => {{ awaited = it; }}); 0");
     browser.value(&kept).unwrap();
@@ -115,9 +115,9 @@ fn a_picture_of_ones_own_is_sensed_as_by_native_code() {
         .collect();
     let native = photograph::sense(&with_opacity, 320, 240);
     let mut lines = native.split(|&byte| byte == b'\n');
-    let [sample, told] =
+    let [sample, reported] =
         [(); 2].map(|()| -> Value { serde_json::from_slice(lines.next().unwrap()).unwrap() });
-    assert_eq!(shown["markers"], told["markers"]);
+    assert_eq!(shown["markers"], reported["markers"]);
     assert_eq!(shown["markers"].as_array().unwrap().len(), 4);
     let size = sample["sample"][4][3].as_f64().unwrap() / 1e3;
     assert!((shown["force"]["magnitude"].as_f64().unwrap() - size).abs() < 1e-9);
@@ -132,7 +132,7 @@ fn a_picture_of_ones_own_is_sensed_as_by_native_code() {
     );
 }
 
-/// Web Serial with one port. What the page writes waits in `mock.out`; `mock.come` brings bytes.
+/// Web Serial with one port. The page's output waits in `mock.out`; `mock.come` brings bytes.
 /// `mock.held` says that another program has the port. Files that are offered are kept.
 const MOCK: &str = r#"
 const mock = globalThis.mock = { out: [], held: false, chosen: true, incoming: null, saved: null };
@@ -329,9 +329,9 @@ fn what_hinders_a_connection_is_said() {
         .unwrap();
 }
 
-/// WebUSB with the loader of an STM32H743, of 16 sectors. It answers as AN3156 says, and keeps what
-/// it may not be asked. `loader.wrong` flips a bit of what is kept, `loader.end` pulls the cable
-/// after so many blocks.
+/// WebUSB with the loader of an STM32H743, of 16 sectors. It answers as AN3156 says, and records
+/// forbidden requests. `loader.wrong` flips a bit of the flash; `loader.end` pulls the cable after
+/// that many blocks.
 const LOADER: &str = r#"
 const loader = globalThis.loader = { wrong: false, end: Infinity, misuse: [] };
 const FLASH = 0x08000000, SECTOR = 128 << 10;

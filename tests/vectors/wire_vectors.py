@@ -70,7 +70,7 @@ def frame(content):
 
 
 def hello_start(protocol, schema):
-    """What both hellos begin with in every version."""
+    """The beginning of both hellos in every version."""
     start = [raw("Hello", [0]), unsigned("protocol", protocol)]
     return start + [(varint(schema), f"schema {schema:#018x}")]
 

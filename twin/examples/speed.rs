@@ -1,5 +1,5 @@
 //! Measures the frames rendered per second, and the film's share of a frame's time, on one core:
-//! `cargo run --release -p hivtac-scene --example speed`.
+//! `cargo run --release -p hivtac-twin --example speed`.
 
 use std::time::Instant;
 

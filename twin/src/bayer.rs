@@ -1,6 +1,6 @@
-//! A sensor whose pixels see one colour each. Its picture has twice the resolution of a frame: of
-//! four pixels of one colour that are nearest to each other it makes the mean, and from these means
-//! all colours of each pixel of the frame.
+//! A sensor whose pixels see one colour each. Its picture has twice the resolution of a frame. It
+//! averages the nearest four pixels of one colour, and interpolates all colours of the frame's
+//! pixels from these means.
 
 use crate::exposure::Image;
 use crate::light::Channel;
@@ -79,7 +79,7 @@ fn pixel(picture: &[[Channel; 3]], size: [usize; 2], [x, y]: [usize; 2]) -> [Cha
     std::array::from_fn(|c| Channel::from_bits((sums[c] + counts[c] / 2).div_euclid(counts[c])))
 }
 
-/// Returns the place `step` − 1 beside another one, of `count`. Beyond the border the picture is
+/// Returns the place `step` − 1 away from another one, of `count`. Beyond the border the picture is
 /// mirrored, so that colours alternate on.
 fn beside(at: usize, step: usize, count: usize) -> usize {
     match (at + step).checked_sub(1) {

@@ -20,8 +20,7 @@ pub(crate) struct Coverage {
 impl Coverage {
     /// Returns the coverage by an image, limited to what a frame of this size can see.
     pub(crate) fn of(image: &Image, width: u32, height: u32) -> Coverage {
-        // The margin holds what is blurred into the frame; the grid is never larger than it needs
-        // to be.
+        // The margin holds light that is blurred into the frame.
         let margin = 4.0 * image.blur_px + 2.0;
         let fits = |outline: &Outline| {
             let (low, high) = outline.bounds();
@@ -61,8 +60,8 @@ impl Coverage {
         grid
     }
 
-    /// Returns an empty grid that holds the polygons and a margin. One spare column takes what the
-    /// last edges carry to their right.
+    /// Returns an empty grid that holds the polygons and a margin. One spare column takes the last
+    /// edges' carry to their right.
     fn around(outlines: &[Outline], margin: i64) -> Coverage {
         let start = ([0.0; 2], [0.0; 2]);
         let outlines = outlines

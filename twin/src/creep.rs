@@ -164,7 +164,7 @@ impl Memory {
             }
         }
         let [x, y, z, right, down] = sum;
-        // All loads press, and what is left of them presses as well.
+        // All loads press, and so do their remainders.
         let force = Load::from_vector([x, y, z]).unwrap_or(Load::REST);
         let placed = force.with_offset_mm([right / z, down / z]);
         let placed = placed.unwrap_or(force);

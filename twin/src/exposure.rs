@@ -58,9 +58,9 @@ impl<L: Fn(f64) -> Load> Exposure<'_, L> {
         }
     }
 
-    /// Returns what the film mirrors of the LEDs of a board at this distance behind the pinhole,
-    /// mm, at the frame's time. A lens that is in focus on the film blurs them as what is twice as
-    /// far.
+    /// Returns the film's reflections of the LEDs of a board at this distance behind the pinhole,
+    /// mm, at the frame's time. A lens that is in focus on the film blurs them as objects at twice
+    /// its distance.
     pub(crate) fn leds(&self, board_mm: f64) -> [Image; 4] {
         let far_mm = 2.0 * FILM_DISTANCE_MM + board_mm;
         let blur_px = self.lens.blur_px_at(far_mm, self.camera.focal_px());

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! Every frame comes with its [`Truth`]: the force and the true centroids. Frames are pure
-//! functions of scene, seed, frame number and load, with the same bytes on every machine:
-//! transcendental functions come from `libm` only, no operations are fused, and the noise generator
+//! functions of scene, seed, frame number and load, with the same bytes on every machine.
+//! Transcendental functions come from `libm` only, no operations are fused, and the noise generator
 //! is the crate's own.
 //!
 //! ```

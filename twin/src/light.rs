@@ -61,7 +61,7 @@ pub(crate) struct Light {
     haze: f64,
     /// Gain of red, green and blue.
     balance: [f64; 3],
-    /// What shows through the film.
+    /// The room behind the film.
     room: Room,
     /// The film without markers.
     film: Vec<[Channel<i16>; 3]>,
@@ -94,7 +94,7 @@ impl Light {
         self.film.clone()
     }
 
-    /// Returns the colour of a paint on the film. The film's own includes what shows through it.
+    /// Returns the colour of a paint on the film. The film's own includes the light through it.
     pub(crate) fn colour(&self, paint: Paint) -> [f64; 3] {
         match paint {
             Paint::Film => self.room.through(FILM_COLOUR, FILM_COLOUR),

@@ -1,4 +1,4 @@
-//! The film's answer to a load, complete or simplified: it shows what each part is worth.
+//! The film's answer to a load, complete or simplified, to measure the effect of each part.
 
 use crate::film::DiscMotion;
 use crate::film::reduced::{NOMINAL_RADIUS_MM, Unit};
@@ -30,7 +30,7 @@ pub struct Mechanics {
     /// Radius of the disc over which the tip spreads its force, for loads that leave it open, mm,
     /// 0.25 to 2.
     pub tip_radius_mm: f64,
-    /// What the film remembers of a scene's motion.
+    /// The film's creep by a scene's motion.
     pub creep: Creep,
 }
 
@@ -96,8 +96,7 @@ impl Mechanics {
 
     /// Checks that a film can take a load, held for ever.
     ///
-    /// # Errors
-    /// If the load is outside what the film's tables hold for.
+    /// # Errors If the load is outside the range of the film's tables.
     pub(crate) fn check(&self, film: &Film, load: &Load) -> Result<(), SceneError> {
         let load = self.completed(load);
         film.check(&load)?;

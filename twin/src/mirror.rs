@@ -9,7 +9,7 @@ use crate::{Camera, FILM_DISTANCE_MM};
 
 /// The LEDs of the usual OV7725 board from its lens's axis, mm (the board's drawing).
 const LEDS_MM: [[f64; 2]; 4] = [[-11.6, -10.2], [11.6, -10.2], [11.6, 10.2], [-11.6, 10.2]];
-/// Radius of what shines of an LED of size 2835, mm.
+/// Radius of the shining part of an LED of size 2835, mm.
 const LED_RADIUS_MM: f64 = 1.5;
 /// First and last step of the search for a reflection, mm.
 const STEPS_MM: [f64; 2] = [0.5, 1e-3];

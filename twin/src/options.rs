@@ -28,7 +28,7 @@ pub struct Options {
     /// Distance from the pinhole back to a camera board whose LEDs a glossy film mirrors, 4 to 30
     /// mm; `None` for a matt film, or LEDs that are off.
     pub board_leds_mm: Option<f64>,
-    /// What shows through the film.
+    /// The room behind the film.
     pub room: Room,
     /// Standard deviation of a fixed pattern of brightness from pixel to pixel, 0 to 0.5 of the
     /// brightness: the film's grain and the sensor's uneven pixels.

@@ -3,7 +3,7 @@
 use crate::options::within;
 use crate::{Patch, SceneError};
 
-/// What shows through the film.
+/// The room behind the film.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "file", derive(serde::Deserialize))]
 #[cfg_attr(feature = "file", serde(default, deny_unknown_fields))]
@@ -11,7 +11,7 @@ pub struct Room {
     /// The part of the light that passes the film, 0 to 1: 0 for an opaque film, 0.9 for clear
     /// silicone. The rest is scattered, as the opaque film scatters all of it.
     pub transmission: f64,
-    /// The room's light on what is behind the film, in parts of the lamp's on the film, 0 to 10. A
+    /// The room's light on things behind the film, in parts of the lamp's on the film, 0 to 10. A
     /// wall of the film's colour fills the view.
     pub brightness: f64,
     /// Radius of a fingertip that presses, where it touches the film, mm, 0 to 10; 0 for a tip that

@@ -336,7 +336,7 @@ impl Scene {
         picture
     }
 
-    /// Paints what shows through the film: the room's things, and the fingertip that presses.
+    /// Paints the things behind the film: those of the room, and the fingertip that presses.
     fn paint_behind<L: Fn(f64) -> Load>(
         &self,
         picture: &mut [[Channel<i16>; 3]],
@@ -418,7 +418,7 @@ impl Scene {
         let Mechanics { creep, .. } = self.options.film;
         let force = self.options.film.completed(force);
         let presses = force.magnitude_n() > 0.0;
-        // Force and place are the tip's, independent of what the film remembers.
+        // Force and place are the tip's, independent of creep.
         let touched = match creep.is_elastic() {
             true => exposure.now,
             false => self.options.film.press(&self.film, &force),

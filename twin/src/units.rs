@@ -86,7 +86,7 @@ pub fn as_unit(number: u64, scene: Scene) -> Result<Scene, SceneError> {
     scene.with_options(options)
 }
 
-/// Returns these options with what unit `number` differs in: camera, film and glued markers.
+/// Returns these options with the differences of unit `number`: camera, film and glued markers.
 fn with_unit(number: u64, camera: &Camera, options: Options) -> Options {
     let mut random = noise::uniform(noise::mix(number));
     // The sum of twelve uniform numbers: nearly normal, with variance 1.

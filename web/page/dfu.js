@@ -35,7 +35,7 @@ export function whyNot() {
 
 const pause = (ms) => new Promise((go) => setTimeout(go, Math.min(ms, LONGEST_PAUSE_MS)));
 
-/** What is wrong when the loader cannot be opened, and what to do. */
+/** Cause and remedy when the loader cannot be opened. */
 function refused(error) {
   const advice = {
     NotFoundError: "no loader was chosen; if none is listed: restart the sensor into its loader " +
@@ -130,7 +130,7 @@ class Loader {
     throw new Error("the loader does not become idle: take the sensor off its supply, and try again");
   }
 
-  /** Waits until the loader has done what it was sent. */
+  /** Waits until the loader has finished a request. */
   async settle() {
     for (let look = 0; look < LOOKS; look += 1) {
       const { status, state, ms } = await this.status();

@@ -4,7 +4,7 @@
 const USB = { usbVendorId: 0x1209, usbProductId: 0x0001 };
 /** Web Serial needs a rate; on USB it has no meaning. */
 const BAUD = 115200;
-/** Room for what comes while the page is busy. */
+/** Room for bytes that come while the page is busy. */
 const BUFFER = 1 << 16;
 
 /** Why this page cannot open a port; null if it can. */
@@ -18,7 +18,7 @@ export function whyNot() {
     "or `hivtac view`; the simulated sensor and pictures work here, too";
 }
 
-/** What is wrong when a port cannot be opened, and what to do. */
+/** Cause and remedy when a port cannot be opened. */
 function refused(error) {
   const advice = {
     NotFoundError: "no port was chosen; if yours is not listed: connect the sensor, and try " +
@@ -40,7 +40,7 @@ function nameOf(port) {
     ? "serial port" : `USB ${hex(usbVendorId)}:${hex(usbProductId)}`;
 }
 
-/** Opens the port that the user chooses, and connects it; returns what closes it. */
+/** Opens the port that the user chooses, and connects it; returns a function that closes it. */
 export async function open(connect, say) {
   let port;
   try {

@@ -70,7 +70,7 @@ export function listen(ours) {
   const bytes = bytesOf(module).buffer;
   post("load", { bytes }, [bytes]);
   offer({ connect, simulate, sense, firmware, firmwareParts, startLoader });
-  // For tests and measurements: what comes of a camera's frames.
+  // For tests and measurements: the sums of a camera's frames.
   globalThis.HIVTAC.sum = (camera, frames) => ask("sum", { camera, frames });
 }
 
@@ -86,7 +86,7 @@ const sense = (levels, width, height) =>
 /** Checks a file of firmware: `board`, `version`, `look`; or `why` not. */
 const firmware = (bytes) => ask("firmware", { bytes }, [bytes.buffer]).then(({ told }) => told);
 
-/** What is written into a device whose flash begins so: `parts` and `bytes`; or `why` not. */
+/** The parts to write into a device whose flash begins so: `parts` and `bytes`; or `why` not. */
 const firmwareParts = (bytes) =>
   ask("firmwareParts", { bytes }, [bytes.buffer]).then(({ told, bytes: all }) => ({
     ...told, bytes: all,
@@ -94,7 +94,7 @@ const firmwareParts = (bytes) =>
 
 const startLoader = () => ask("startLoader");
 
-/** Shows a device, which has `name`, `send` and `close`; returns what it tells of itself. */
+/** Shows a device, which has `name`, `send` and `close`; returns its identity. */
 function connect(next) {
   device = next;
   post("connect", { name: next.name });

@@ -87,7 +87,7 @@ async function levels(file) {
   return [pen.getImageData(0, 0, width, height).data, width, height];
 }
 
-/** Shows what the sensing made of a picture. */
+/** Shows the sensing's result for a picture. */
 function show(figure, bytes, name) {
   const end = bytes.indexOf(10);
   const { why, sample, lights } = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));

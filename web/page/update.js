@@ -1,4 +1,4 @@
-// New firmware for a sensor: a file, the sensor's restart into its loader, and what is written.
+// New firmware for a sensor: a file, the sensor's restart into its loader, and the writing.
 
 import { openLoader, whyNot } from "./dfu.js";
 import { bytesOf } from "./packed.js";
@@ -16,7 +16,7 @@ function divided(parts, bytes) {
   });
 }
 
-/** Writes and reads back; `say` tells how far it is. */
+/** Writes and reads back; `say` reports its progress. */
 async function write(loader, look, firmwareParts, say) {
   const { why, parts, bytes } = await firmwareParts(await loader.read(FLASH, look));
   if (why !== undefined) throw new Error(`the sensor in its loader is another one: ${why}`);

@@ -25,12 +25,12 @@ pub struct Job {
     pub ticket: Option<Ticket>,
     /// The commands, each with the longest wait for its reply.
     pub commands: VecDeque<(Request, Duration)>,
-    /// What is said when all are done.
+    /// The message when all are done.
     pub done: String,
 }
 
-/// What a conversation tells.
-pub enum Heard {
+/// An event of a conversation.
+pub enum ConversationEvent {
     /// The first hello.
     Hello(DeviceHello),
     /// Any other message.
@@ -71,7 +71,7 @@ pub struct Conversation {
     jobs: VecDeque<Job>,
     sent: Option<Sent>,
     last_id: u16,
-    heard: VecDeque<Heard>,
+    events: VecDeque<ConversationEvent>,
 }
 
 impl Conversation {
@@ -85,7 +85,7 @@ impl Conversation {
             jobs: VecDeque::new(),
             sent: None,
             last_id: 0,
-            heard: VecDeque::new(),
+            events: VecDeque::new(),
         }
     }
 
@@ -99,12 +99,12 @@ impl Conversation {
         std::mem::take(&mut self.out)
     }
 
-    /// Takes the next that it tells; `None` if there is nothing more.
-    pub fn heard(&mut self) -> Option<Heard> {
-        self.heard.pop_front()
+    /// Takes its next event, if any.
+    pub fn next_event(&mut self) -> Option<ConversationEvent> {
+        self.events.pop_front()
     }
 
-    /// What the decoder rejected since the device's hello.
+    /// The decoder's rejects since the device's hello.
     pub fn rejected(&self) -> Rejected {
         self.decoder.rejected()
     }
@@ -117,11 +117,11 @@ impl Conversation {
                 (Received::Message(message), Phase::Open) => self.message(message, now_us),
                 (Received::Message(DeviceMessage::Hello(hello)), Phase::Greets(..)) => {
                     self.phase = Phase::Open;
-                    // What it rejected before its hello does not count.
+                    // Rejects before its hello do not count.
                     self.decoder.reset();
-                    self.heard.push_back(Heard::Hello(hello));
+                    self.events.push_back(ConversationEvent::Hello(hello));
                 }
-                // What is left over from an earlier conversation.
+                // The rest of an earlier conversation.
                 (Received::Message(_), Phase::Greets(..)) => {}
                 (Received::ForeignHello(prefix), _) => {
                     let failure = foreign(&self.name, prefix);
@@ -134,7 +134,7 @@ impl Conversation {
 
     fn message(&mut self, message: DeviceMessage, now_us: u64) {
         let Some(sent) = &mut self.sent else {
-            self.heard.push_back(Heard::Message(message));
+            self.events.push_back(ConversationEvent::Message(message));
             return;
         };
         match (&message, &mut sent.collected) {
@@ -153,7 +153,7 @@ impl Conversation {
             (DeviceMessage::Sample(sample), Some(collected)) => collected.remember(sample.clone()),
             _ => {}
         }
-        self.heard.push_back(Heard::Message(message));
+        self.events.push_back(ConversationEvent::Message(message));
     }
 
     fn replied(&mut self, outcome: Outcome) {
@@ -176,8 +176,8 @@ impl Conversation {
     fn snapshot(&mut self, taken: Result<Taken, Failure>) {
         self.sent = None;
         if let Some(job) = self.jobs.pop_front() {
-            self.heard
-                .push_back(Heard::Snapshot(job.ticket, taken.map(Box::new)));
+            self.events
+                .push_back(ConversationEvent::Snapshot(job.ticket, taken.map(Box::new)));
         }
     }
 
@@ -190,14 +190,16 @@ impl Conversation {
         if job.commands.is_empty()
             && let Some(job) = self.jobs.pop_front()
         {
-            self.heard.push_back(Heard::Ended(job.ticket, Ok(job.done)));
+            self.events
+                .push_back(ConversationEvent::Ended(job.ticket, Ok(job.done)));
         }
     }
 
     fn give_up(&mut self, failure: Failure) {
         self.sent = None;
         if let Some(job) = self.jobs.pop_front() {
-            self.heard.push_back(Heard::Ended(job.ticket, Err(failure)));
+            self.events
+                .push_back(ConversationEvent::Ended(job.ticket, Err(failure)));
         }
     }
 
@@ -207,12 +209,13 @@ impl Conversation {
         self.sent = None;
         for job in self.jobs.drain(..) {
             let failure = Failure::new(Kind::Lost, failure.to_string());
-            self.heard.push_back(Heard::Ended(job.ticket, Err(failure)));
+            self.events
+                .push_back(ConversationEvent::Ended(job.ticket, Err(failure)));
         }
-        self.heard.push_back(Heard::Lost(failure));
+        self.events.push_back(ConversationEvent::Lost(failure));
     }
 
-    /// Sends what is due, and gives up what took too long.
+    /// Sends due messages, and gives up commands that took too long.
     pub fn turn(&mut self, now_us: u64) {
         match self.phase {
             Phase::Greets(begun_us, next_us) => self.greet(begun_us, next_us, now_us),

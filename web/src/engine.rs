@@ -1,6 +1,6 @@
-//! One sensor at a time, simulated or connected, and what the page asks of it.
+//! One sensor at a time, simulated or connected, and the page's requests to it.
 
-use crate::conversation::{Conversation, Heard, Job, PATIENCE, Ticket};
+use crate::conversation::{Conversation, ConversationEvent, Job, PATIENCE, Ticket};
 use crate::recorder::{Recorded, Recorder};
 use crate::simulated::Simulated;
 use hivtac_host::failure::{Failure, Kind};
@@ -37,7 +37,7 @@ pub struct Engine {
     /// Time since 1970 when the page's time was 0, ns.
     epoch_ns: u64,
     delivered_us: u64,
-    heard_us: u64,
+    last_message_us: u64,
     events: Vec<Event>,
     /// Bytes that events announce, in their order.
     blobs: VecDeque<Vec<u8>>,
@@ -90,7 +90,7 @@ impl Engine {
             recorder: Recorder::default(),
             epoch_ns,
             delivered_us: now_us,
-            heard_us: now_us,
+            last_message_us: now_us,
             events: Vec::new(),
             blobs: VecDeque::new(),
         }
@@ -161,7 +161,7 @@ impl Engine {
         }
     }
 
-    /// The port is gone; `why` says what the browser said.
+    /// The port is gone; `why` is the browser's message.
     pub fn lost(&mut self, why: &str, now_us: u64) {
         let message = format!(
             "connection to {} lost: {why}; cable pulled or device reset? Connect it again",
@@ -174,30 +174,30 @@ impl Engine {
     }
 
     fn hear(&mut self, now_us: u64) {
-        while let Some(heard) = self.conversation.heard() {
-            self.take(heard, now_us);
+        while let Some(event) = self.conversation.next_event() {
+            self.take(event, now_us);
         }
     }
 
-    fn take(&mut self, heard: Heard, now_us: u64) {
-        match heard {
-            Heard::Hello(hello) => {
+    fn take(&mut self, event: ConversationEvent, now_us: u64) {
+        match event {
+            ConversationEvent::Hello(hello) => {
                 self.events.push(rows::hello(1, true, self.presses));
                 self.state = Some(State::new(self.name.clone(), hello));
-                self.heard_us = now_us;
+                self.last_message_us = now_us;
                 self.tell(now_us);
             }
-            Heard::Message(message) => self.message(message, now_us),
-            Heard::Ended(Some(ticket), result) => {
+            ConversationEvent::Message(message) => self.message(message, now_us),
+            ConversationEvent::Ended(Some(ticket), result) => {
                 match result {
                     Ok(done) => self.answer(ticket, true, &done),
                     Err(failure) => self.answer(ticket, false, &failure.to_string()),
                 }
                 self.tell(now_us);
             }
-            Heard::Snapshot(Some(ticket), taken) => self.snapshot(ticket, taken),
-            Heard::Ended(None, _) | Heard::Snapshot(None, _) => {}
-            Heard::Lost(failure) => {
+            ConversationEvent::Snapshot(Some(ticket), taken) => self.snapshot(ticket, taken),
+            ConversationEvent::Ended(None, _) | ConversationEvent::Snapshot(None, _) => {}
+            ConversationEvent::Lost(failure) => {
                 let recorded = self.recorder.end(&failure.to_string());
                 self.keep(recorded);
                 let text = failure.to_string();
@@ -221,7 +221,7 @@ impl Engine {
         let unix_ns = self.epoch_ns + 1_000 * now_us;
         let full = self.recorder.message(&message, now_us, unix_ns);
         if let DeviceMessage::Sample(sample) = message {
-            self.heard_us = now_us;
+            self.last_message_us = now_us;
             self.feed.sample(sample);
         }
         self.keep(full);
@@ -309,7 +309,7 @@ impl Engine {
                         commands: commands.into(),
                         done: command.done,
                     });
-                    // A device that does not tell its settings has obeyed all the same.
+                    // A device that does not send its settings has obeyed all the same.
                     self.ask(None, Request::GetSettings);
                 }
                 Ok(None) => self.answer(ticket, false, "there is no such order"),
@@ -336,7 +336,7 @@ impl Engine {
         let Some(state) = &mut self.state else {
             return;
         };
-        if now_us - self.heard_us >= SILENCE_US && state.trouble.is_none() {
+        if now_us - self.last_message_us >= SILENCE_US && state.trouble.is_none() {
             state.trouble("the device sends no samples: does its camera run?".to_owned());
             self.ask(None, Request::GetInfo);
             self.tell(now_us);

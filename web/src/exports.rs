@@ -1,5 +1,5 @@
-//! What the page's scripts call. Bytes go in and out through one buffer each: the scripts write
-//! into [`reserve`]'s memory before a call, and read [`taken`]'s after it.
+//! Functions that the page's scripts call. Bytes go in and out through one buffer each: the scripts
+//! write into [`reserve`]'s memory before a call, and read [`taken`]'s after it.
 
 use crate::engine::Engine;
 use crate::firmware::Firmware;
@@ -123,7 +123,7 @@ pub extern "C" fn start_loader(ticket: u32) {
     with(|engine| engine.start_loader(ticket));
 }
 
-/// Checks the file of firmware that was put in; puts out what it is, as JSON.
+/// Checks the input as a firmware file; outputs its identity as JSON.
 #[unsafe(no_mangle)]
 pub extern "C" fn firmware() -> usize {
     let board = with(|engine| engine.board().map(str::to_owned));
@@ -132,8 +132,8 @@ pub extern "C" fn firmware() -> usize {
     put(facts.to_string().into_bytes())
 }
 
-/// Puts out what is written into a device whose flash begins with the bytes that were put in: a
-/// line of JSON, then the bytes.
+/// Outputs the parts to write into a device whose flash begins with the input's bytes: a line of
+/// JSON, then the bytes.
 #[unsafe(no_mangle)]
 pub extern "C" fn firmware_parts() -> usize {
     let (facts, bytes) = FIRMWARE.with_borrow(|firmware| input(|found| firmware.parts(found)));
@@ -152,15 +152,15 @@ pub extern "C" fn blob() -> usize {
     put(with(Engine::blob))
 }
 
-/// Senses the picture that was put in, red, green, blue and opacity of each pixel; puts out what
-/// the page shows of it.
+/// Senses the input's picture, red, green, blue and opacity of each pixel; outputs the page's view
+/// of it.
 #[unsafe(no_mangle)]
 pub extern "C" fn sense(width: u16, height: u16) -> usize {
     put(input(|levels| photograph::sense(levels, width, height)))
 }
 
-/// Sums what comes of some frames of the first camera (0) or the second; the CRC in the lower half,
-/// the number of forces above it.
+/// Sums up some frames of the first camera (0) or the second: the CRC in the lower half, the number
+/// of forces above it.
 #[unsafe(no_mangle)]
 pub extern "C" fn sum(camera: u32, frames: u32) -> u64 {
     let kind = match camera {

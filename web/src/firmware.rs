@@ -1,4 +1,4 @@
-//! New firmware for a device, of a file that the user chose: checked, and divided into what the
+//! New firmware for a device, from the user's file: checked, and divided into blocks that the
 //! page's script writes by the device's loader.
 
 use hivtac_wire::image::{FIRST_LOOK, Image, PROGRAM};
@@ -27,8 +27,8 @@ impl Firmware {
         }
     }
 
-    /// What is written into a device whose flash begins with `found`: `parts`, address and length
-    /// of each, and all their bytes; or `why` not.
+    /// The parts to write into a device whose flash begins with `found`: `parts`, address and
+    /// length of each, and all their bytes; or `why` not.
     pub fn parts(&self, found: &[u8]) -> (Value, Vec<u8>) {
         let Some(image) = &self.0 else {
             return (json!({ "why": "no firmware was chosen" }), Vec::new());
@@ -58,13 +58,13 @@ mod tests {
         let mut firmware = Firmware::default();
         assert_eq!(firmware.parts(&[]).0["why"], "no firmware was chosen");
         let image = examples::image("board", "1.2.3", 150_000, 7);
-        let told = firmware.choose(image.bytes(), None);
-        assert_eq!(told["version"], image.version());
-        let (told, bytes) = firmware.parts(&image.bytes()[..FIRST_LOOK]);
-        assert_eq!(told["parts"][0][0], PROGRAM);
+        let reported = firmware.choose(image.bytes(), None);
+        assert_eq!(reported["version"], image.version());
+        let (reported, bytes) = firmware.parts(&image.bytes()[..FIRST_LOOK]);
+        assert_eq!(reported["parts"][0][0], PROGRAM);
         assert_eq!(bytes, image.program());
-        let (told, bytes) = firmware.parts(&[0xFF; FIRST_LOOK]);
-        assert_eq!(told["parts"][0][0], FIRST_STAGE);
+        let (reported, bytes) = firmware.parts(&[0xFF; FIRST_LOOK]);
+        assert_eq!(reported["parts"][0][0], FIRST_STAGE);
         assert_eq!(
             bytes.len(),
             image.first_stage().len() + image.program().len()

@@ -1,4 +1,4 @@
-//! The page that needs no server: what `hivtac view` and `hivtac view --twin` do, for a browser.
+//! The page that needs no server: `hivtac view` and `hivtac view --twin` in a browser.
 //!
 //! ```text
 //! simulated sensor (hivtac_host) ─┐
@@ -11,14 +11,14 @@
 //!
 //! | module | subject |
 //! |---|---|
-//! | [`engine`] | one sensor at a time, simulated or connected, and what the page asks of it |
+//! | [`engine`] | one sensor at a time, simulated or connected, and the page's requests to it |
 //! | [`conversation`] | hello, commands one after the other, messages (`docs/wire.md`) |
 //! | [`recorder`] | a recording in memory |
 //! | [`simulated`] | the simulated sensor, frame by frame |
-//! | [`photograph`] | what the sensing makes of a picture of one's own |
-//! | [`firmware`] | new firmware, checked and divided into what is written |
+//! | [`photograph`] | the sensing's result for a user's picture |
+//! | [`firmware`] | new firmware, checked and divided into blocks to write |
 //! | [`same_bits`] | frames whose samples are the same bytes on every machine |
-//! | `exports` | what the page's scripts call, of the WebAssembly module only |
+//! | `exports` | functions that the page's scripts call, of the WebAssembly module only |
 
 pub mod conversation;
 pub mod engine;

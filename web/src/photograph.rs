@@ -1,4 +1,4 @@
-//! What the sensing makes of a picture of one's own, as `hivtac sense` does.
+//! The sensing's result for a user's picture, as `hivtac sense` shows it.
 
 use hivtac_host::frame::{Frame, Taken};
 use hivtac_host::live::camera::Kind;

@@ -11,7 +11,7 @@ use hivtac_wire::version::HelloPrefix;
 /// Seed of the scene.
 const SEED: u64 = 5;
 
-/// What came of some frames.
+/// The sums of some frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Summed {
     /// CRC-32 of all pixels and of all samples as they are sent.
@@ -20,8 +20,8 @@ pub struct Summed {
     pub forces: u32,
 }
 
-/// Renders frames of the demo's wandering tip, measures each as a new device would, and sums what
-/// the camera sees and what the device sends.
+/// Renders frames of the demo's wandering tip, measures each as a new device would, and sums pixels
+/// and samples.
 ///
 /// # Errors
 /// When the scene cannot be made.

@@ -78,9 +78,9 @@ fn a_simulated_sensor_obeys_is_pressed_and_is_recorded() {
     page.until("picture", |it| it["ticket"] == 4);
     let picture = page.engine.blob();
     let line = picture.split(|&byte| byte == b'\n').next().unwrap();
-    let told: Value = serde_json::from_slice(line).unwrap();
+    let reported: Value = serde_json::from_slice(line).unwrap();
     assert_eq!(picture.len(), line.len() + 1 + 4 * 320 * 240);
-    assert_eq!(told["markers"].as_array().unwrap().len(), 4);
+    assert_eq!(reported["markers"].as_array().unwrap().len(), 4);
     page.order(5, r#"{"sensor":0,"order":"stop_recording"}"#);
     page.until("file", |it| {
         it["name"] == "hivtac-7477696e0000000000000000-1.mcap"

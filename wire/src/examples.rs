@@ -1,4 +1,4 @@
-//! Provides messages for tests: the longest of each kind, and any.
+//! Messages for tests: the longest of each kind, and random ones.
 
 use crate::failure::*;
 use crate::health::*;

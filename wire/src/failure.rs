@@ -1,4 +1,4 @@
-//! Defines what a device tells about the failure that last ended its program.
+//! Defines a device's report of the failure that last ended its program.
 
 use heapless::String;
 use postcard_schema::Schema;
@@ -11,7 +11,7 @@ pub const PLACE_BYTES: usize = 48;
 /// new firmware.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Schema)]
 pub struct Failure {
-    /// What happened.
+    /// Its kind.
     pub kind: FailureKind,
     /// Number of starts since then: 1 if it ended the run before this one.
     pub starts_ago: u32,
@@ -21,7 +21,7 @@ pub struct Failure {
     pub program_counter: Option<u32>,
     /// The link register then, often the return address of the function; `None` if it is unknown.
     pub link_register: Option<u32>,
-    /// Address that was accessed; `None` if the core did not tell it.
+    /// Address that was accessed; `None` if the core did not report it.
     pub address: Option<u32>,
     /// The core's Configurable Fault Status Register, 0 without a fault.
     pub fault_status: u32,

@@ -152,7 +152,7 @@ pub struct Sample {
     /// The force; `None` exactly if `status` has a bit that means "no force".
     pub force: Option<Force>,
     /// The two contacts whose sum `force` is, if the status has [`Status::TWO_CONTACTS`] and they
-    /// are told apart; otherwise empty ([`Sample::each_contact`]).
+    /// are resolved; otherwise empty ([`Sample::each_contact`]).
     pub contacts: ContactList,
     /// The markers, if they were requested ([`Request::StartWithMarkers`]) and all were found;
     /// otherwise empty.
@@ -160,7 +160,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// Each contact: one, two, or none if nothing touches the film or two are not told apart.
+    /// Each contact: one, two, or none if nothing touches the film or two are not resolved.
     pub fn each_contact(&self) -> &[Force] {
         force::contacts(self.status, self.force.as_ref(), &self.contacts)
     }

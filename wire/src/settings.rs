@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 /// Longest name, bytes of UTF-8.
 pub const NAME_BYTES: usize = 24;
 
-/// The name that a user gave a device; empty if there is none.
+/// The name that a user gave a device, or empty.
 pub type Name = String<NAME_BYTES>;
 
 /// A rest position that was taken on a device, and the settings with which its markers were found.

@@ -13,8 +13,8 @@ use serde::Deserialize;
 pub const SCHEMA_HASH: u64 =
     u64::from_le_bytes(hash_ty_path::<(DeviceMessage, HostMessage)>("hivtac"));
 
-/// Names and types of all that a device sends, as recordings carry them: a later release reads by
-/// them what this one recorded.
+/// Names and types of a device's messages, as recordings carry them, so that later releases can
+/// read these recordings.
 pub const DEVICE_TYPES: &NamedType = DeviceMessage::SCHEMA;
 
 /// The frozen start of both hellos: variant 0, then these two fields, in every protocol version.

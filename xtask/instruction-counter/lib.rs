@@ -21,7 +21,7 @@ use qemu::{BlockHandle, PluginId};
 #[allow(non_upper_case_globals)]
 pub static qemu_plugin_version: c_int = if cfg!(feature = "plugin-api-2") { 2 } else { 1 };
 
-/// What was counted until now. With one processor, the lock is always free.
+/// The count until now. With one processor, the lock is always free.
 static COUNTER: Mutex<Counter> = Mutex::new(Counter {
     blocks: Vec::new(),
     is_counting: false,
@@ -29,7 +29,7 @@ static COUNTER: Mutex<Counter> = Mutex::new(Counter {
     counts: [0; 2],
 });
 
-/// What a block of instructions does.
+/// The effect of a block of instructions.
 #[derive(Clone, Copy)]
 enum Block {
     /// It is the body of `counting_begins`, which is not counted, nor are the other two.
@@ -38,7 +38,7 @@ enum Block {
     End,
     /// It is the body of `last_band_begins`.
     LastBand,
-    /// It has so many instructions.
+    /// Its number of instructions.
     Work(usize),
 }
 

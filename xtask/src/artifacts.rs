@@ -34,8 +34,8 @@ pub enum Board {
 }
 
 /// Builds the firmware for all tests; returns it as it is flashed. The others are in the folder
-/// `bugs`: with seeded bugs, of which the rig chooses one and must detect it, with the model for
-/// YUV422, for the second board.
+/// `bugs`: with seeded bugs, one of them chosen and detected by the rig; with the model for YUV422;
+/// for the second board.
 pub fn test_firmware() -> Result<PathBuf> {
     let [mut yuv422, openmv] = [Board::Weact, Board::OpenmvH7].map(|it| firmware_command(it, ""));
     yuv422.env("HIVTAC_MODEL", "calibration/models/yuv422/default.hvtm");
@@ -79,8 +79,8 @@ pub fn firmware_command(board: Board, feature: &str) -> Command {
     command
 }
 
-/// The cargo commands that build what lints of the microcontroller's programs check: for each board
-/// the firmware with all seeded bugs, which is never flashed, and the image for QEMU.
+/// The cargo commands that build the microcontroller's programs for lints: for each board the
+/// firmware with all seeded bugs, which is never flashed, and the image for QEMU.
 pub fn for_target() -> [Command; 3] {
     let [mut weact, mut openmv] =
         [Board::Weact, Board::OpenmvH7].map(|board| firmware_command(board, "seeded-bugs"));

@@ -37,7 +37,7 @@ pub struct Demo {
 const EIGHT: &str = "8";
 const MODEL_OF_EIGHT: &str = "calibration/models/8v/default.hvtm";
 
-/// What the demo runs, and the folder of its logs.
+/// The demo's programs, and the folder of its logs.
 struct Programs {
     firmware: PathBuf,
     rig: PathBuf,

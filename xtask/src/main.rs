@@ -29,15 +29,14 @@ use clap::Parser;
 enum Task {
     /// Run the firmware on the emulated board with a simulated tip, and show the forces.
     Demo(demo::Demo),
-    /// Run every test, and print a table of how they went. What each step prints is in
-    /// target/xtask/test.
+    /// Run every test, and print a table of results. Each step's output is in target/xtask/test.
     Test(test::Test),
-    /// What a frame and an inference cost on the microcontroller, measured in QEMU.
+    /// Count the instructions of a frame and an inference on the microcontroller, in QEMU.
     Bench(bench::Bench),
-    /// Put small mistakes into the firmware, one at a time, and show those that no test notices:
-    /// two to three hours of a core. `cargo xtask test rig` must have built what its tests run.
+    /// Put small mistakes into the firmware, one at a time, and list those that no test notices:
+    /// two to three hours of a core. Run `cargo xtask test rig` before.
     Mutants(mutants::Mutants),
-    /// Show what the firmware takes of each memory.
+    /// Show the firmware's use of each memory.
     Size,
     /// Make the files of a release: programs, Python wheels and firmware, and install them.
     Release(release::Release),

@@ -1,9 +1,9 @@
-//! `cargo xtask mutants`: puts small mistakes into the firmware, one at a time, and shows those
+//! `cargo xtask mutants`: puts small mistakes into the firmware, one at a time, and lists those
 //! that no test notices.
 //!
-//! cargo-mutants makes mistakes in what runs on a computer, and runs that package's tests.
-//! `tests/mutants/firmware.json` lists mistakes in what needs the microcontroller, each with rig
-//! tests of which one must fail. Both are made in a copy of the project.
+//! cargo-mutants makes mistakes in the package that runs on a computer, and runs its tests.
+//! `tests/mutants/firmware.json` lists mistakes in code for the microcontroller, each with rig
+//! tests that must notice it. Both are made in a copy of the project.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ use crate::artifacts::{self, Board, RIG_TESTS};
 use crate::process;
 use crate::toolchain::{self, cargo, work_folder};
 
-/// The mistakes in what needs the microcontroller.
+/// The mistakes in code for the microcontroller.
 const LIST: &str = "tests/mutants/firmware.json";
 /// The settings of cargo-mutants, with the mistakes that change nothing.
 const PORTABLE: &str = "tests/mutants/portable.toml";
@@ -38,7 +38,7 @@ struct Mutant {
     /// Text that the file has once.
     from: String,
     to: String,
-    /// Names of rig tests, of which one must fail.
+    /// Names of rig tests; at least one must fail.
     tests: Vec<String>,
     /// Why none of them fails; empty if one must.
     #[serde(default)]

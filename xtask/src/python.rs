@@ -15,12 +15,12 @@ pub struct Tests {
     file: &'static str,
     /// The project's own packages that are installed, too.
     installed: &'static [&'static str],
-    /// What becomes of Python's warnings.
+    /// Python's action on warnings.
     warnings: &'static str,
     run_on: RunOn,
 }
 
-/// What tests run on, besides the host tool.
+/// Programs that the tests need in addition to the host tool.
 enum RunOn {
     /// The simulated sensor of the tool.
     Tool,
@@ -102,7 +102,7 @@ impl Tests {
         environment(&name.to_string_lossy(), &packages)
     }
 
-    /// Installs what they need, and runs them.
+    /// Installs their needs, and runs them.
     pub fn run(&self, tally: &mut Tally) -> Result<()> {
         let python = self.environment()?;
         if !self.installed.is_empty() {
@@ -168,7 +168,7 @@ pub struct Kit {
     /// Folder to write to.
     #[arg(default_value = "target/kit")]
     out: PathBuf,
-    /// What bought parts measure: `--pupil-mm 1.6 --lens-front-mm 21`; `--help` after `--` lists
+    /// Measures of bought parts: `--pupil-mm 1.6 --lens-front-mm 21`; `--help` after `--` lists
     /// all.
     #[arg(last = true)]
     bought: Vec<String>,

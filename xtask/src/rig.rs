@@ -48,8 +48,8 @@ impl Rig {
     /// Makes the rig end, and waits for that.
     pub fn finish(self) -> Result<()> {
         let id = self.process.id().to_string();
-        let told = process::succeeds(Command::new("kill").args(["-TERM", &id]));
-        ensure!(told, "the rig is gone");
+        let is_signalled = process::succeeds(Command::new("kill").args(["-TERM", &id]));
+        ensure!(is_signalled, "the rig is gone");
         self.ended()
     }
 

@@ -26,7 +26,7 @@ pub struct Test {
 }
 
 /// A step: its name, its work, and for a step of `--all` a function that finds an obstacle to it
-/// here. The work is told whether slow tests are run, too.
+/// here. The work's argument says whether to run slow tests, too.
 type Step = (&'static str, Work, Option<Obstacle>);
 type Work = fn(bool, &mut Tally) -> Result<()>;
 type Obstacle = fn() -> Option<String>;
@@ -163,8 +163,8 @@ fn format() -> Result<()> {
     Ok(())
 }
 
-/// Checks the builds that [`artifacts::lint_as_built`] linted, and lints the rest. What only slow
-/// tests run is left out unless `all` is set.
+/// Checks the builds that [`artifacts::lint_as_built`] linted, and lints the rest. Programs of slow
+/// tests are left out unless `all` is set.
 fn host_lints(all: bool) -> Result<()> {
     toolchain::ensure_component("clippy", "clippy")?;
     for command in artifacts::everything(all) {

@@ -24,7 +24,7 @@ const FOLDERS: [&str; 2] = ["host-tool/src/page/files", "web/page"];
 const WORKER: &str = "engine.js";
 /// The line of the page that loads its scripts, for `hivtac view`.
 const LOADS: &str = r#"<script type="module" src="main.js"></script>"#;
-/// What is said until the first sensor is there.
+/// Messages until the first sensor is there.
 const WAITS: [&str; 2] = ["connecting to hivtac …", "starting the simulated sensor …"];
 
 /// Builds the page, with these images for devices; returns its folder.

@@ -18,8 +18,8 @@ pub struct LayoutArgs {
     /// The layout: 8v has dots at (±7, ±4.5), (±2.5, 0) and (0, ±2.4) mm.
     #[arg(default_value = "8v")]
     layout: Layout,
-    /// The weights file, with which a unit's calibration begins. The model file is beside it: the
-    /// same name with `hvtm`.
+    /// The weights file, with which a unit's calibration begins. The model file has the same name
+    /// with `hvtm`.
     #[arg(long)]
     out: PathBuf,
 }

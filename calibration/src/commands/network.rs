@@ -100,8 +100,8 @@ pub struct FilmArgs {
     /// Gauss–Newton steps from the network's answer, 0 to 3.
     #[arg(long, default_value_t = 1)]
     steps: u8,
-    /// Solve the films of other units anew, some minutes; without this what the weights file holds
-    /// of them stays.
+    /// Solve the films of other units anew, some minutes; otherwise the weights file's data on them
+    /// stay.
     #[arg(long)]
     others: bool,
     /// The weights file to write.
@@ -155,7 +155,7 @@ pub struct UnitArgs {
     /// some tenths where a place was found by eye.
     #[arg(long, value_name = "MM", default_value_t = 0.0, value_parser = length)]
     place_mm: f64,
-    /// The weights file to write; with `--into` it is `unit.weights` there, beside the model,
+    /// The weights file to write; with `--into` it is `unit.weights` there, and the model is
     /// `unit.hvtm`.
     #[arg(long, requires = "data")]
     out: Option<PathBuf>,

@@ -1,4 +1,4 @@
-//! Chooses the loads that a data set shows.
+//! Chooses the loads of a rendered data set.
 
 use std::sync::LazyLock;
 

@@ -1,5 +1,4 @@
-//! Forces together with what the sensor saw: the data from which models are made and by which they
-//! are judged.
+//! Forces with the sensor's view of them: the data by which models are made and judged.
 //!
 //! ```text
 //! loads → scene → frames → sensing ─┐

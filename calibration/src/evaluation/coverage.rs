@@ -82,7 +82,7 @@ mod tests {
 
     /// Errors as large as stated, in all directions: 95 of 100 lie within their bounds.
     #[test]
-    fn an_honest_bound_holds_for_95_of_100() {
+    fn a_correct_bound_holds_for_95_of_100() {
         let mut random = ChaCha8Rng::seed_from_u64(4);
         let mut frame = || {
             let size: f64 = random.random_range(0.01..0.2);

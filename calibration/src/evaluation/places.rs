@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_are_told_apart_by_place_and_size() {
+    fn frames_are_distinguished_by_place_and_size() {
         let frames = [
             frame(0.1, [0.5, 0.0], 0.2),
             frame(0.1, [0.0, -0.9], 0.3),

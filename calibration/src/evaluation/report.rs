@@ -31,7 +31,7 @@ impl Evaluation {
         ]
     }
 
-    /// Describes what the evaluation shows, and what it does not.
+    /// Describes the evaluation's scope.
     pub fn sentence(&self) -> String {
         if self.measured {
             return format!(
@@ -46,8 +46,8 @@ impl Evaluation {
         format!(
             "Simulated frames ({}), contact reading `{}` ({}), all rows of a data set of its own. \
              Nothing here was measured on a real sensor, and the \
-             paper's numbers hold its gauge, its stage and its film's hysteresis, too: they are \
-             beside ours, not below.",
+             paper's numbers include its gauge, its stage and its film's hysteresis: they are no \
+             measure of ours.",
             self.frames,
             self.contact,
             meaning(self.contact)
@@ -167,7 +167,7 @@ fn cell(text: Option<String>) -> String {
 /// How often direction and size lie within their stated 95 % bounds.
 fn push_coverage(html: &mut String, frames: &[Judged]) {
     html.push_str(
-        "<h2>Are the stated uncertainties honest?</h2><table><tr><th>|F|, mN (a tenth of the \
+        "<h2>Do the stated uncertainties hold?</h2><table><tr><th>|F|, mN (a tenth of the \
          frames each)</th>\
          <th>direction within its stated 95 % bound, %</th><th>median bound, °</th><th>median \
          error, °</th>\

@@ -25,7 +25,7 @@ const TILTED_MM: [f64; 3] = [1.0, 2.0, 3.0];
 /// Half the axes of a pad, and half the length and the half width of an edge, mm.
 const PAD_MM: [f64; 2] = [4.0, 2.5];
 const EDGE_MM: [f64; 2] = [3.0, 0.8];
-/// Factor on standard uncertainties, and what is added to it at the dots. It rises with the smaller
+/// Factor on standard uncertainties, and its increase at the dots. It rises with the smaller
 /// coordinate of the place, mm. Chosen so that forces of presses outside the ensemble are within
 /// the stated 95 % nearly as often as stated.
 const WIDER: f64 = 1.4;

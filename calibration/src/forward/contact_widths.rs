@@ -17,7 +17,7 @@ use super::motions::MotionsSpec;
 use super::presses::{Presses, ROOTS, forces_n};
 use crate::parallel;
 
-/// Fineness of the film's mesh. What counts is the difference of two contacts on the same mesh.
+/// Fineness of the film's mesh. Only the difference of two contacts on the same mesh is used.
 const FINENESS: f64 = 0.7;
 /// Radii of soft discs and of rims of flat faces, mm.
 const DISCS_MM: [f64; 8] = [0.25, 0.6, 1.0, 1.5, 2.0, 2.75, 3.4, 4.0];
@@ -28,8 +28,8 @@ const TILTED_MM: [f64; 2] = [2.0, 3.0];
 /// soft disc that is as wide.
 const PAD_MM: ([f64; 2], f64) = ([4.0, 2.5], 3.2);
 const EDGE_MM: ([f64; 2], f64) = ([3.0, 0.8], 2.6);
-/// How much longer than wide an edge is, in parts of what a pad is; and a tilted face, whose
-/// pressure is wider across the tilt.
+/// The elongation of an edge, in parts of a pad's; and of a tilted face, whose pressure is wider
+/// across the tilt.
 const LONG_EDGE: f64 = 2.3;
 const LONG_TILTED: f64 = -0.6;
 /// The width of a tilted face in parts of its radius times [`OF_FACE`].

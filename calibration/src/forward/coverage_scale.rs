@@ -30,11 +30,11 @@ struct LeastScale {
 }
 
 impl Weights {
-    /// These weights with the nominal film run forwards after the network, in `steps` Gauss–Newton
+    /// These weights with the nominal forward model after the network, in `steps` Gauss–Newton
     /// steps, 0–3. The noise of markers is that of a data set of presses anywhere, widened until 96
     /// of 100 errors of direction and place lie within their bounds. Where large forces need more,
-    /// the tables get an error of their own in the markers' motion. What the weights hold of other
-    /// units stays.
+    /// the tables get an error of their own in the markers' motion. The weights' data on other
+    /// units stay.
     ///
     /// # Errors
     /// When the network gives no place, or the data set has too few presses at known places.
@@ -66,7 +66,7 @@ impl Weights {
 fn least_scales(weights: &Weights, dataset: &Dataset) -> Result<Vec<LeastScale>> {
     let bytes = export(weights)?;
     let model = Model::parse(&bytes).map_err(|error| anyhow!("{error}"))?;
-    let forward = model.forward.context("the network tells no place")?;
+    let forward = model.forward.context("the network gives no place")?;
     let mut chip = Chip::new(model, &dataset.rest()?)?;
     let mut all = Vec::new();
     for sample in dataset.samples() {

@@ -1,5 +1,5 @@
-//! The film run forwards for any layout of dots: its tables come from those of the whole film, so
-//! that a layout needs no new finite elements.
+//! The forward model of any layout of dots: its tables come from those of the whole film, so a
+//! layout needs no new finite elements.
 
 use crate::parallel;
 use anyhow::{Result, anyhow};
@@ -132,8 +132,8 @@ fn random_pose(number: u64, last_mm: f64) -> Pose {
     }
 }
 
-/// What a chip's tables leave of the motion under a load, by coordinate, focal lengths; `None` for
-/// dots that the camera does not see.
+/// The error of a chip's tables under a load, by coordinate, focal lengths; `None` for dots that
+/// the camera does not see.
 fn left(
     chip: &Forward<'_>,
     setup: &UnitSetup<'_>,

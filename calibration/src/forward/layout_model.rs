@@ -1,5 +1,4 @@
-//! The model file of a layout of dots on the nominal film: the film run forwards, without a
-//! network.
+//! The model file of a layout of dots on the nominal film: a forward model without a network.
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use hivtac_sensor::force::forward::{Markers, Noise};
@@ -82,7 +81,7 @@ pub fn layout_model(layout: Layout, steps: u8) -> Result<ModelSpec> {
     seen_at_rest(spec, &scene)
 }
 
-/// The weights file of a layout's model: what `unit` begins with. It has no network.
+/// The weights file of a layout's model, with which `unit` begins. It has no network.
 pub fn layout_weights(spec: &ModelSpec) -> Result<Weights> {
     let forward = spec.forward.as_ref().context("the model has no film")?;
     let double = |pair: [f32; 2]| pair.map(f64::from);

@@ -28,7 +28,7 @@ impl LeastSquares {
         for term in 0..terms {
             let mut column: Vec<f64> = rows.iter().map(|row| row[term]).collect();
             let mut of = vec![0.0; term + 1];
-            // Gram–Schmidt, twice: the second pass removes what rounding left.
+            // Gram–Schmidt, twice: the second pass removes rounding errors.
             for _ in 0..2 {
                 for (unit, part) in units.iter().zip(&mut of) {
                     let along = dot(unit, &column);

@@ -1,5 +1,5 @@
-//! The film run forwards, from the known numbers of a unit: a few numbers in a weights file, tables
-//! in a model file.
+//! The forward model, from the known numbers of a unit: a few numbers in a weights file, tables in
+//! a model file.
 
 mod contact_shapes;
 mod contact_widths;
@@ -51,7 +51,7 @@ pub use torques::torques;
 pub use unit::Known;
 pub use weight::{Pressed, Weighed, everywhere, weight};
 
-/// What is known of a unit's film and camera.
+/// A unit's film and camera, as far as known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FilmModel {
@@ -198,7 +198,7 @@ impl FilmModel {
     }
 }
 
-/// What all files of the nominal film under the nominal tip share; computed once.
+/// The part that all files of the nominal film under the nominal tip share; computed once.
 #[derive(Clone)]
 struct Nominal {
     stiffness: Stiffness,
@@ -418,8 +418,8 @@ mod tests {
         [(sum / count).sqrt(), worst]
     }
 
-    /// Error of the chip's prediction of what weight does under loads of these sizes, N, from the
-    /// film hanging at rest. In px at 320×240: root mean square and largest.
+    /// Error of the chip's prediction of the weight's effect under loads of these sizes, N, from
+    /// the film hanging at rest. In px at 320×240: root mean square and largest.
     fn weight_off_px(sizes_n: [f64; 2]) -> [f64; 2] {
         let camera = Camera::new(Preset::Ov7725, 320, 240).unwrap();
         let setup = UnitSetup {
@@ -453,16 +453,16 @@ mod tests {
                 now: down.map(|part| part as f32),
             };
             let hanging = forward.hanging(turned, true).unwrap();
-            let mut told = forward::Prediction::zeros(OF_FOUR);
+            let mut reported = forward::Prediction::zeros(OF_FOUR);
             let chip = forward::Pose {
                 size: pose.size as f32,
                 tilt: pose.tilt.map(|part| part as f32),
                 place_mm: pose.place_mm.map(|part| part as f32),
                 width: 0.0,
             };
-            hanging.add_to(&chip, &forward, &mut told);
+            hanging.add_to(&chip, &forward, &mut reported);
             for c in 0..8 {
-                let moved = f64::from(told.moved[c]);
+                let moved = f64::from(reported.moved[c]);
                 let off = camera.focal_px() * (moved - (with[c] - without[c]));
                 sum += off * off;
                 worst = worst.max(off.abs());

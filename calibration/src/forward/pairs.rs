@@ -35,7 +35,7 @@ const PLACE_STEP_MM: f64 = 1e-2;
 /// Images of dots, focal lengths from where they rest.
 pub type Images = Vec<[f64; 2]>;
 
-/// A motion of dots, with its slopes by numbers of what presses.
+/// A motion of dots, with its slopes by the numbers of a contact.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// The motion, focal lengths.
@@ -100,8 +100,7 @@ impl Pair {
     fn mean(&self, [first, second]: &[Motion; 2]) -> Motion {
         let [a, b] = self.parts();
         let together_n: f64 = self.forces_n.map(length).iter().sum();
-        // What the first contact's part has to do with the mean: as it grows, its single force
-        // falls.
+        // The slope of the mean by the first contact's part: as it grows, its single force falls.
         let mut by_part = vec![(1.0, &first.moved), (-1.0, &second.moved)];
         for axis in 0..3 {
             by_part.push((-self.forces_n[0][axis] / a, &first.slopes[axis]));
@@ -305,7 +304,7 @@ mod tests {
             }
         }
 
-        /// What the sensor makes of a frame under needles: its status, and two contacts.
+        /// The sensor's answer to a frame under needles: its status, and two contacts.
         fn seen(&mut self, needles: &[Needle]) -> (Status, Option<TwoContacts>) {
             let needle =
                 |(place, force): &Needle| (Patch::tip(*place, NOMINAL_RADIUS_MM).unwrap(), *force);
@@ -328,7 +327,7 @@ mod tests {
 
     /// Frames of the simulated camera: one needle is one contact, two are two, three are neither.
     #[test]
-    fn two_needles_are_told_from_one_and_from_three() {
+    fn two_needles_are_distinguished_from_one_and_from_three() {
         let model = Model::parse(MODEL).unwrap();
         let mut bench = Bench::new(&model);
         let (status, two) = bench.seen(&[LEFT]);

@@ -1,4 +1,4 @@
-//! Makes the tables of a film run forwards, from the simulated sensor.
+//! Makes the tables of a forward model, from the simulated sensor.
 
 use crate::parallel;
 use anyhow::Result;

@@ -26,7 +26,7 @@ const OF_EIGHT: &[u8] = include_bytes!("../../models/8v/default.hvtm");
 /// The tables of a fitted unit hold for places within this, ±, mm.
 const OWN_REACH_MM: f64 = 4.2;
 
-/// What is known before a unit is fitted.
+/// Prior knowledge of a unit.
 #[derive(Clone, Copy, Debug)]
 pub struct Known<'a> {
     /// Standard uncertainty of a load's |F|, N.

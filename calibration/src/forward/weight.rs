@@ -166,9 +166,9 @@ fn fitted_parts<const N: usize>(
     }))
 }
 
-/// What loads of these sizes add to the effect of gravity at rest, by function of gravity. Gravity
-/// along z and −z separates the parts in Δ and in its square; that along the film is proportional.
-/// `turned` are the films under gravity in each direction of [`DOWN`].
+/// The effect that loads of these sizes add to that of gravity at rest, by function of gravity.
+/// Gravity along z and −z separates the parts in Δ and in its square; that along the film is
+/// proportional. `turned` are the films under gravity in each direction of [`DOWN`].
 fn added<F: Weighed>(
     film: &F,
     turned: &[([f64; 3], F::Turned); 5],

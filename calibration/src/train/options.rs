@@ -14,14 +14,14 @@ const WIDEST: usize = hivtac_sensor::force::layer::MAX_WIDTH;
 /// The most layers between inputs and outputs.
 const MOST_HIDDEN: usize = hivtac_sensor::force::model::MAX_LAYERS - 1;
 
-/// How to train. Those without an argument are for studies of other networks: what they are by
-/// default is what helps.
+/// How to train. Those without an argument are for studies of other networks; their defaults are
+/// best.
 #[derive(Args, Clone, Debug, PartialEq)]
 pub struct Options {
     /// Widths of the hidden layers.
     #[arg(long, value_delimiter = ',', default_values_t = Options::default().hidden)]
     pub hidden: Vec<usize>,
-    /// What the outputs are.
+    /// The meaning of the outputs.
     #[arg(skip)]
     pub meaning: Meaning,
     /// How the chip holds the weights.
@@ -43,18 +43,18 @@ pub struct Options {
     /// larger; the network is then folded back to features.
     #[arg(skip = Options::default().whitened)]
     pub whitened: bool,
-    /// Has directions count more. `None` weighs nothing, and nothing is weighed where angles are
-    /// the outputs.
+    /// Weights errors by their effect on the direction. `None` for no weights; outputs of angles
+    /// are never weighted.
     #[arg(skip = Options::default().direction_weight)]
     pub direction_weight: Option<DirectionWeight>,
-    /// Each step takes this times the step size off every weight (AdamW), biases excepted. What no
-    /// data ask for goes away, such as the weights of components that never vary, which would make
+    /// Each step takes this times the step size off every weight (AdamW), biases excepted. Weights
+    /// that no data determine vanish, such as those of components that never vary, which would make
     /// the chip's rounding of inputs larger.
     #[arg(skip)]
     pub weight_decay: f64,
-    /// Before training with rounding, each unit whose activation would have seven bits becomes so
-    /// many, one for each part of its reach ([`Network::split`]): the layer is as many times wider
-    /// on the chip, and its steps as many times finer. For int8.
+    /// Before training with rounding, each unit whose activation would have seven bits is split
+    /// into this many, one for each part of its reach ([`Network::split`]): the layer is as many
+    /// times wider on the chip, and its steps as many times finer. For int8.
     #[arg(skip = Options::default().unit_parts)]
     pub unit_parts: usize,
     /// Decides first weights and shuffling.

@@ -34,7 +34,7 @@ const MODEL: &str = "unit.hvtm";
 /// Options of the guided `unit`.
 #[derive(Debug, clap::Args)]
 pub struct GuideArgs {
-    /// Be led through the loads: the folder for what is recorded and for the unit's model. The same
+    /// Guides through the loads: the folder for the recording and for the unit's model. The same
     /// command goes on where it was interrupted.
     #[arg(long, value_name = "FOLDER")]
     into: Option<PathBuf>,
@@ -62,7 +62,7 @@ pub struct GuideArgs {
     direction_deg: f64,
     #[command(flatten)]
     gauge_port: GaugeArgs,
-    /// What the gauge recorded by itself, once all loads are done, as `collect align` takes it.
+    /// The gauge's own recording, once all loads are done, as `collect align` takes it.
     #[arg(long, value_name = "FILE", requires = "into")]
     gauge: Vec<PathBuf>,
 }

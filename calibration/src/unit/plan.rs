@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn loads_are_told_in_words_and_those_done_are_left_out() {
+    fn loads_are_reported_in_words_and_those_done_are_left_out() {
         let planned = usual();
         let done = [planned[0].pose, planned[2].pose];
         let left = poses::left(&planned, &done, |it| it.pose);

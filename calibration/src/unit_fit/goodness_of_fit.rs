@@ -1,4 +1,4 @@
-//! Explains in words what a fit's χ² says of its loads, and what to do about it.
+//! Explains a fit's χ² in words: what it says of the loads, and what to do.
 
 use std::fmt;
 
@@ -43,12 +43,12 @@ impl fmt::Display for GoodnessOfFit<'_> {
         match *chi_square < WRONG {
             true => write!(
                 f,
-                "the gauge or the {known} known less well than is said ({options}), or the film \
+                "the gauge or the {known} known less well than stated ({options}), or the film \
                  creeps. Check the gauge's zero, and press again; more loads help, too."
             ),
             false => write!(
                 f,
-                "a load is told wrongly. Check its force, its direction and its place, the gauge's \
+                "a load is stated wrongly. Check its force, its direction and its place, the gauge's \
                  zero and unit, that one tip alone touched the film, and that nothing moved the \
                  sensor since its tare. Then put it on again: until then the model is worth little."
             ),
@@ -80,7 +80,7 @@ mod tests {
         assert!(good.contains("1.39, as it should be") && !good.contains("200 mN"));
         for (chi_square, wider, advice) in [
             (4.0, "2.0 times as wide", "--place-mm"),
-            (400.0, "20.0 times as wide", "told wrongly"),
+            (400.0, "20.0 times as wide", "stated wrongly"),
         ] {
             let text = words(chi_square);
             for part in [wider, advice, "200 mN at x +3.0, y -1.5 mm"] {

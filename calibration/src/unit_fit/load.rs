@@ -1,4 +1,4 @@
-//! The unknowns of an applied load: how far it was from its stated values.
+//! The unknowns of an applied load: its differences from the stated values.
 
 use crate::loads::SeenLoad;
 

@@ -4,17 +4,17 @@
 //!
 //! | file | subject |
 //! |---|---|
-//! | `numbers` | the numbers, and what is known of them before any load |
+//! | `numbers` | the numbers, and their priors |
 //! | `load` | the unknowns of a load |
-//! | `seen` | where a camera sees the dots of a solved film |
+//! | `view` | where a camera sees the dots of a solved film |
 //! | `problem` | residuals of numbers and loads, and their rates |
 //! | `equations` | the linearized problem as normal equations |
 //! | `descent` | Gauss–Newton steps to the least χ² |
-//! | `explained` | what χ² says of the loads, in words |
-//! | `left_out` | the fit's errors on loads left out of it |
+//! | `goodness_of_fit` | the meaning of χ², in words |
+//! | `leave_one_out` | the fit's errors on loads left out of it |
 //! | `field` | from few solved places of the tip to every place |
-//! | `own` | the unit's tables and their uncertainty, for its model file |
-//! | `weight` | what gravity does to the unit's film when it is turned |
+//! | `own_film` | the unit's tables and their uncertainty, for its model file |
+//! | `weight` | the effect of gravity on the unit's film when it is turned |
 
 mod descent;
 mod equations;

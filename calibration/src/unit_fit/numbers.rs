@@ -154,7 +154,7 @@ const FILM: [(Change, [f64; 4]); 17] = [
     (Change::Down(2), [0.0, 0.6, -1.2, 1.2]),
 ];
 
-/// What is known of how a film is made and mounted, before anything is seen of it.
+/// Prior knowledge of how a film is made and mounted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Family {
     /// Like the simulated sensor's: even, weightless, without stretch, cut at its holes.

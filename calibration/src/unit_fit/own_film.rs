@@ -50,7 +50,7 @@ pub struct OwnFilm {
     functions: Vec<Vec<f32>>,
     dots: Vec<OwnTable>,
     covariance: OwnCovariance,
-    /// What gravity does. Present if gravity was known under the loads and the film finds an
+    /// The effect of gravity. Present if gravity was known under the loads and the film finds an
     /// equilibrium in every orientation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     weight: Option<Box<OwnWeight>>,
@@ -264,9 +264,8 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
     tables(&dots, moved, 0.0)
 }
 
-/// Covariances of how the unit's dots move, as the loads leave them open. `beside` is an
-/// independent error of each coordinate at the largest size, focal lengths; it grows in proportion
-/// to size.
+/// Covariances of the motion of the unit's dots that the loads leave. `beside` is an independent
+/// error of each coordinate at the largest size, focal lengths; it grows in proportion to size.
 fn remaining_covariance(
     problem: &Problem<'_>,
     found: &Found,

@@ -23,7 +23,7 @@ const FAMILY_PX: f64 = 0.006;
 /// The same for loads whose places nobody noted: then only the family of films relates them.
 const FAMILY_PX_NOWHERE: f64 = 0.02;
 
-/// What is known of the camera and the rest position before any load.
+/// Camera and rest position, as known before any load.
 #[derive(Clone, Debug)]
 pub struct Bench {
     /// The camera's nominal focal length, px.
@@ -125,13 +125,13 @@ struct Images {
     pressed: Vec<Vec<[f64; 2]>>,
 }
 
-/// What a unit with given images shows, x and y of each dot, px.
+/// The observations of a unit with given images, x and y of each dot, px.
 struct Seen {
     rest: Vec<f64>,
     pressed: Vec<Vec<f64>>,
 }
 
-/// Derivatives of what is seen by the unknowns: x and y of each dot, px.
+/// Derivatives of the observations by the unknowns: x and y of each dot, px.
 pub struct UnitRates {
     /// By number, per standard deviation: of where the dots rest.
     pub rest: Vec<Vec<f64>>,
@@ -318,8 +318,8 @@ impl Problem<'_> {
         }
     }
 
-    /// What a unit with these images shows, px: where its dots rest, and their shift in each state
-    /// from the rest position as a tare measures it.
+    /// The observations of a unit with these images, px: its dots' rest places, and their shift in
+    /// each state from the rest position as a tare measures it.
     fn seen(&self, made: &Made, images: &Images) -> Seen {
         let pressed = images.pressed.iter();
         Seen {
@@ -410,7 +410,8 @@ impl Problem<'_> {
         })
     }
 
-    /// Derivatives of what is seen by the unknowns, at rest and in some states of the unit's film.
+    /// Derivatives of the observations by the unknowns, at rest and in some states of the unit's
+    /// film.
     ///
     /// # Errors
     /// When a state is not stable.
@@ -590,8 +591,8 @@ fn moved_px(made: &Made, there: &[[f64; 2]], rest: &[[f64; 2]]) -> Vec<f64> {
     moved.collect()
 }
 
-/// Derivatives of a load's residual by its own unknowns. `force` is the rate of what is seen by a
-/// force along x, y and z, px/N; `place` that by a place along x and y, px/mm.
+/// Derivatives of a load's residual by its own unknowns. `force` is the rate of the observations by
+/// a force along x, y and z, px/N; `place` that by a place along x and y, px/mm.
 fn own_slopes(
     load: &SeenLoad,
     noise_px: &[f64],

@@ -248,10 +248,10 @@ fn predicts(fit: &Fit, chip: &Forward<'_>, truth: &Truth) {
     ] {
         let seen = truth.seen_px(&truth.press(force_n, place_mm), 0);
         let pose = chip_pose(chip, force_n, place_mm);
-        let told = chip
-            .tables
-            .predict(&pose, &chip.limits, &chip::Markers::defaults(seen.len()));
-        let px = fit.own.to_px(&told.moved);
+        let reported =
+            chip.tables
+                .predict(&pose, &chip.limits, &chip::Markers::defaults(seen.len()));
+        let px = fit.own.to_px(&reported.moved);
         for k in 0..seen.len() {
             for i in [0, 1] {
                 let off = px[2 * k + i] - (seen[k][i] - rest_px[k][i]);
@@ -265,8 +265,8 @@ fn predicts(fit: &Fit, chip: &Forward<'_>, truth: &Truth) {
 }
 
 /// The chip knows how a fitted film moves and, with gravity known under the loads, how it moves
-/// when it is turned. It agrees with full solutions of the true film to a part of what turning
-/// does.
+/// when it is turned. It agrees with full solutions of the true film to a part of the effect of
+/// turning.
 #[test]
 #[ignore = "slow"]
 fn a_mounted_film_is_known_turned() {
@@ -304,12 +304,12 @@ fn a_mounted_film_is_known_turned() {
             let moved_px = |film: &Truth| film.moved_px(force_n, place_mm);
             let [with, without] = [&film, &truth].map(moved_px);
             let pose = chip_pose(&chip, force_n, place_mm);
-            let mut told = chip::Prediction::zeros(8);
+            let mut reported = chip::Prediction::zeros(8);
             let mut covariance = chip::Covariance::zeros(8);
             let hanging = chip.hanging(turned, true).unwrap();
-            hanging.add_to(&pose, &chip, &mut told);
+            hanging.add_to(&pose, &chip, &mut reported);
             hanging.add_uncertainty(&pose, &chip, &mut covariance);
-            let told_px = fit.own.to_px(&told.moved);
+            let told_px = fit.own.to_px(&reported.moved);
             let does = |k: usize| with[k] - without[k];
             let most = (0..8)
                 .map(does)

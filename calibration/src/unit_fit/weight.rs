@@ -1,4 +1,4 @@
-//! Computes what gravity does to a unit's film when it is turned, by finite elements.
+//! Computes the effect of gravity on a unit's film when it is turned, by finite elements.
 
 use anyhow::{Context, Result, ensure};
 use hivtac_sensor::force::forward::Stiffness;
@@ -17,7 +17,7 @@ use crate::forward::{Moved, Pressed, Weighed, weight};
 const PLACES_MM: [f64; 3] = [-3.8, 0.0, 3.8];
 const TILTS: [[f64; 2]; 4] = [[0.6, 0.0], [-0.6, 0.0], [0.0, 0.6], [0.0, -0.6]];
 
-/// What [`WeightSpec`] holds, as a unit's file keeps it.
+/// The contents of [`WeightSpec`], as a unit's file keeps them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OwnWeight {

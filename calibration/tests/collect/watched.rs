@@ -46,7 +46,9 @@ fn read(mut stream: TcpStream) -> String {
 fn states(events: &str) -> Vec<Value> {
     let states = events.split("event: state\ndata: ").skip(1);
     let states = states.filter_map(|rest| serde_json::from_str(rest.lines().next()?).ok());
-    states.map(|told: Value| told["state"].clone()).collect()
+    states
+        .map(|reported: Value| reported["state"].clone())
+        .collect()
 }
 
 /// Number of covered places among the needed ones: all but hard presses in corners.

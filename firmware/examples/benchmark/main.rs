@@ -27,7 +27,7 @@ use measure::{Scanners, Workplace};
 use meter::Meter;
 use static_cell::ConstStaticCell;
 
-// What is started first, and loads what `memory.x` puts into ITCM.
+// The first stage, which loads ITCM as `memory.x` says.
 core::arch::global_asm!(include_str!("../../src/first_stage.s"));
 core::arch::global_asm!(include_str!("../../src/start.s"));
 

@@ -79,7 +79,7 @@ pub fn frame_time(rate: Rate) -> Duration {
     Duration::from_micros((fitted().frame_us)(rate).into())
 }
 
-/// The frame time by the device's own clock, from the last two frames that were looked at.
+/// The frame time by the device's own clock, from the last two noted frames.
 #[derive(Default)]
 pub struct Pace {
     before: Edge,
@@ -101,7 +101,7 @@ impl Pace {
         }
     }
 
-    /// The frame time, µs; `None` before two frames were looked at.
+    /// The frame time, µs; `None` before two frames were noted.
     pub fn frame_us(&self) -> Option<u32> {
         self.frame_us
     }

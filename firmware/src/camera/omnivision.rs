@@ -125,13 +125,13 @@ pub struct Part {
     pub facts: Facts,
     /// Gains of white if none are set.
     pub white: White,
-    /// What resets all of its registers.
+    /// The writes that reset all of its registers.
     pub reset: &'static Table<u8>,
-    /// What is written before all others, and not read back.
+    /// The first writes, which are not read back.
     pub begin: &'static Table<u8>,
     /// The registers that are the same for all settings.
     pub table: &'static Table<u8>,
-    /// What is written after all others.
+    /// The last writes.
     pub end: &'static Table<u8>,
     /// Registers, and their bits, without which no frame can be read.
     pub needed: &'static Table<u16>,
@@ -147,7 +147,7 @@ pub struct Part {
     pub automatic: fn(bool, bool) -> u8,
     /// The registers of exposure and gain.
     pub light: &'static [u16],
-    /// What values of these mean.
+    /// The meaning of these registers' values.
     pub light_of: fn(&[u8]) -> Light,
     /// The values for exposure and gain.
     pub held_of: fn(Light) -> Held,

@@ -62,7 +62,7 @@ pub fn white(White { red, blue }: White) -> Values {
     few(gains.into_iter().flat_map(gain))
 }
 
-/// Automatic control: bits for what is not automatic.
+/// Automatic control: a set bit makes its control manual.
 pub const CONTROL: u16 = 0x3503;
 /// [`CONTROL`]: exposure.
 pub const MANUAL_EXPOSURE: u8 = 0x01;
@@ -90,7 +90,7 @@ const STOP: [u16; 2] = [
     START[0] + WINDOW[0] + MARGIN[0] - 1,
     START[1] + WINDOW[1] + MARGIN[1] - 1,
 ];
-/// The margin's part before the window, of what is read.
+/// The margin's part before the window, of the read array.
 const OFFSET: [u16; 2] = [MARGIN[0] / 2 / SUBSAMPLING, MARGIN[1] / 2 / SUBSAMPLING];
 
 const _: () = assert!(START[0].is_multiple_of(2) && START[1].is_multiple_of(2));
@@ -144,7 +144,7 @@ pub const TABLE: &[(u16, u8)] = &[
     // would only shorten the time that the DMA has for a word.
     (0x3824, 0x04),
     (0x460C, 0x22),
-    // Pins: VSYNC, HREF, PCLK and data are outputs, which they are not after a reset; MIPI is off.
+    // Pins: VSYNC, HREF, PCLK and data become outputs; MIPI is off.
     (0x3017, 0xFF),
     (0x3018, 0xFF),
     (0x300E, 0x58),
@@ -184,7 +184,7 @@ pub const TABLE: &[(u16, u8)] = &[
     (0x380D, low(LINE_CLOCKS)),
     (0x380E, high(LINES)),
     (0x380F, low(LINES)),
-    // Where the window begins in what is read.
+    // The window's start in the read array.
     (0x3810, high(OFFSET[0])),
     (0x3811, low(OFFSET[0])),
     (0x3812, high(OFFSET[1])),

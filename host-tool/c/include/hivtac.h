@@ -70,8 +70,8 @@ typedef struct hivtac_sample {
     double force_covariance[9];  /* of force_n, row by row, N^2 */
     double place_m[2];           /* where it touches, from the film's middle, m */
     double place_sigma_m;        /* standard uncertainty of each coordinate, m */
-    uint64_t contact_count;      /* how many contacts are told: 0, 1 or 2; with bit 28 of status,
-                                    0 means two that are not told apart */
+    uint64_t contact_count;      /* how many contacts are known: 0, 1 or 2; with bit 28 of
+                                    status, 0 means two that are not resolved */
     hivtac_contact contacts[2];  /* each contact; force_n is their sum, or what the settings filter
                                     and creep make of it */
 } hivtac_sample;

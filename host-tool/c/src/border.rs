@@ -1,4 +1,4 @@
-//! The border to C: failures become numbers and a text, and no panic crosses it.
+//! The border to C: failures become error codes with a text, and no panic crosses it.
 
 use hivtac_host::failure::{Failure, Kind};
 use std::cell::RefCell;

@@ -94,7 +94,7 @@ pub unsafe extern "C" fn hivtac_newest(
     unsafe { take(sensor, timeout_s, sample, Reader::newest_within) }
 }
 
-/// Writes what a wait gives.
+/// Writes the result of a wait.
 ///
 /// # Safety
 /// As of [`hivtac_next`].

@@ -132,7 +132,7 @@ fn the_example_prints_true_forces_with_either_library() {
 }
 
 #[test]
-fn what_cannot_be_is_told_and_nothing_crashes() {
+fn what_cannot_be_is_reported_and_nothing_crashes() {
     let folder = tempfile::tempdir().unwrap();
     let program = folder.path().join("edges");
     let archive = libraries().join("libhivtac.a");
@@ -164,7 +164,7 @@ fn a_sensor_of_ros2_control_has_true_states() {
     check(&printed);
 }
 
-/// The package as its users build it; without ROS 2 nothing is tried.
+/// The package as its users build it; skipped without ROS 2.
 #[test]
 #[ignore = "needs CMake, and ROS 2 with ros2_control"]
 fn the_sensor_of_ros2_control_builds_where_ros_2_is_sourced() {

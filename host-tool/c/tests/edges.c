@@ -42,7 +42,7 @@ int main(int count, char **arguments)
     CHECK(hivtac_next(sensor, 20, &sample) == HIVTAC_SAMPLE);
     uint32_t first = sample.sequence;
     CHECK(hivtac_next(sensor, 20, &sample) == HIVTAC_SAMPLE && sample.sequence > first);
-    /* What waits is taken at once, and then nothing is waited for. */
+    /* Waiting samples are taken at once, and then it does not wait. */
     int result;
     while ((result = hivtac_newest(sensor, 0, &sample)) == HIVTAC_SAMPLE) {
     }

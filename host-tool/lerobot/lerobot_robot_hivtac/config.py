@@ -1,4 +1,4 @@
-"""What a user sets, on the command line of LeRobot or in Python."""
+"""A user's settings, on the command line of LeRobot or in Python."""
 
 from dataclasses import dataclass, field
 from typing import Any

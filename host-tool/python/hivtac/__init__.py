@@ -176,7 +176,7 @@ class Sample:
 
     @property
     def slip(self) -> bool:
-        """Whether what touches the film slips."""
+        """Whether the contact slips."""
         return "slip" in self.status
 
 

@@ -104,7 +104,7 @@ def contact_on(model: Any, data: Any, geom: int, site: int) -> tuple[hivtac.Floa
             continue
         parts = np.zeros(6)
         mujoco.mj_contactForce(model, data, index, parts)
-        # MuJoCo tells the force on the second geom.
+        # MuJoCo gives the force on the second geom.
         side = 1.0 if contact.geom2 == geom else -1.0
         force = turn.T @ (side * contact.frame.reshape(3, 3).T @ parts[:3])
         place = turn.T @ (contact.pos - data.site_xpos[site])

@@ -1,5 +1,5 @@
-//! A conversation with a device. While anything waits, the interpreter's lock is free, and so is
-//! the connection's own: one thread may take samples while another waits for a picture.
+//! A conversation with a device. A wait holds neither the interpreter's lock nor the connection's
+//! own: one thread may take samples while another waits for a picture.
 
 use crate::convert::{self, MarkerNumbers, RestNumbers, SampleNumbers, TareNumbers};
 use crate::error::{Error, raised};
@@ -41,7 +41,7 @@ pub struct Talk {
     is_streaming: AtomicBool,
 }
 
-/// What [`Connection::look`] returns.
+/// The result of [`Connection::look`].
 type Look<'py> = (
     u32,
     f64,
@@ -224,7 +224,7 @@ impl Connection {
         self.with(py, move |link, _| link.set_down(down))
     }
 
-    /// Sets the shape of what presses: `needle`, `round:R`, `flat:R` or `unknown`, R in mm.
+    /// Sets the contact's shape: `needle`, `round:R`, `flat:R` or `unknown`, R in mm.
     fn set_contact(&self, py: Python<'_>, shape: &str, keep: bool) -> PyResult<()> {
         let shape = contact_shape::parse(shape).map_err(Error::new_err)?;
         let patience = self.patience;

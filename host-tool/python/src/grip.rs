@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// Longest wait for a finger before the other one is looked at.
+/// Longest wait for a finger before the other one's turn.
 const TURN: Duration = Duration::from_millis(1);
 
 /// Grip force and margin, N, each with its standard uncertainty; common force, N, and torque, N·m,
@@ -24,8 +24,8 @@ type HeldNumbers = (
     Option<([f64; 3], [f64; 3])>,
 );
 
-/// Time, s since 1970; names of the status bits of both fingers; whether both are touched; what
-/// they feel, and why that is not known.
+/// Time, s since 1970; names of the status bits of both fingers; whether both are touched; the
+/// grip, and why it is unknown.
 type GripNumbers = (
     f64,
     [Vec<&'static str>; 2],

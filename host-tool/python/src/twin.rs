@@ -1,5 +1,5 @@
-//! The simulated sensor in a program's own time: it is pressed as the program says, and gives the
-//! samples of the frames that are whole by then.
+//! The simulated sensor in a program's own time: the program presses it, and gets the samples of
+//! finished frames.
 
 use crate::convert::{self, SampleNumbers};
 use crate::error::{Error, raised};
@@ -21,7 +21,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Frames of the tare that it begins with.
 const TARE_FRAMES: u16 = 32;
-/// Time for the tare and what is untouched before it, µs.
+/// Time for the tare and the untouched frames before it, µs.
 const BEGINNING_US: u64 = 1_000_000;
 
 /// A simulated sensor.
@@ -40,9 +40,9 @@ struct Simulated {
 
 #[pymethods]
 impl Twin {
-    /// A sensor with a camera, `ov7725`, `ov5640` or `mt9v034`, told what presses it; nothing does
-    /// yet. The seed decides its noise, the number which unit it is of those that are drawn; it
-    /// goes by the model in the file. With `is_unit` it is the calibrated unit of that model.
+    /// An untouched sensor with a camera, `ov7725`, `ov5640` or `mt9v034`. The seed decides its
+    /// noise, the number selects a randomly drawn unit, and the file has its model. With `is_unit`
+    /// it is the calibrated unit of that model.
     #[new]
     fn start(
         py: Python<'_>,
@@ -228,7 +228,7 @@ impl Simulated {
         true
     }
 
-    /// Takes each frame when it is whole; what else the device says is left out.
+    /// Takes each frame when it is whole; other messages of the device are left out.
     fn advance(&mut self, to_us: u64) -> Vec<SampleNumbers> {
         let mut samples = Vec::new();
         while self.frame(to_us) {

@@ -173,7 +173,7 @@ class OnTheRig(unittest.TestCase):
             sensor.tare()
         self.assertEqual(list(sensor), [])
 
-    def test_a_lost_connection_is_told_and_ends_the_wait(self):
+    def test_a_lost_connection_is_reported_and_ends_the_wait(self):
         with Rig() as rig, hivtac.open(rig.port, timeout=PATIENCE) as sensor:
             next(sensor)
             rig.kill()

@@ -11,7 +11,7 @@ use hivtac_wire::message::DeviceHello;
 
 /// Distance between two limits that are tried.
 const STEP: usize = 4;
-/// Largest part of a picture that is of the dots' colour, for each dot: three times what it fills.
+/// Largest part of a picture in the dots' colour, for each dot: three times a dot's own.
 const DOT_PART: f64 = 0.0075;
 /// Fewest limits that must show the same number of blobs, for these to be objects instead of noise.
 const FEWEST: usize = 3;
@@ -73,8 +73,8 @@ pub struct Found {
 }
 
 impl Found {
-    /// The model's threshold if it separates, because only that one gives forces; else the chosen
-    /// one.
+    /// The model's threshold if it separates, because only that one gives forces; otherwise the
+    /// chosen one.
     pub fn wanted(&self) -> Threshold {
         self.model.unwrap_or(self.chosen)
     }

@@ -28,8 +28,8 @@ const PICTURES: usize = 3;
 /// Find the threshold that separates the dots from the film in the device's own pictures, show
 /// why, and set it
 ///
-/// It is half way between film and dots; or the model's, when that separates them, too, since
-/// there are forces only with that. The pixel format stays. Nothing should touch the film.
+/// It is the model's if that separates film and dots, since only that one gives forces; otherwise
+/// half way between them. The pixel format stays. Nothing should touch the film.
 ///
 /// Example: hivtac threshold auto --dry-run
 #[derive(Args)]

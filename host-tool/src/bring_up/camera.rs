@@ -1,4 +1,4 @@
-//! Checks board and camera: their identities, and whether the camera holds what was written to it.
+//! Checks board and camera: their identities, and whether registers read back as written.
 
 use super::complaints::hear;
 use super::device::reason;
@@ -58,8 +58,8 @@ fn silent(refused: Option<String>, complaint: Option<String>) -> Step {
     Step::new("camera", found, wrong, Value::Null)
 }
 
-/// Judges an inspection. Registers that have differed from what was written since the camera's
-/// set-up are reported, but not wrong.
+/// Judges an inspection. Registers that already differed at the camera's set-up are reported, but
+/// not wrong.
 pub fn judge(it: &Inspection, since_set_up: bool) -> Step {
     let different: Vec<_> = it.different.iter().map(different).collect();
     let (own, mut wrong) = match since_set_up {

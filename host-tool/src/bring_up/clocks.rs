@@ -90,7 +90,7 @@ pub fn judge(samples: &[Sample], frame_time_us: u32, mut complaints: Vec<String>
         ),
         _ if off(ratio, 0.5) => Some(
             "half the frames that there should be: the camera's clock \
-                                      loop does not multiply as it was told",
+                                      loop does not multiply as set",
         ),
         _ => Some(
             "the camera's clock is not what it should be: XCLK, or a camera with a crystal \

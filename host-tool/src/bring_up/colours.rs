@@ -1,4 +1,4 @@
-//! Checks the colours: the levels that the camera gives for white.
+//! Checks the colours: the camera's levels for white.
 
 use super::report::Step;
 use hivtac_host::frame::Frame;

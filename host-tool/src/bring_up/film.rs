@@ -23,7 +23,7 @@ pub fn judge(free: &Middle, covered: &Middle) -> Step {
     let wrong = (largest.abs() > LARGEST_CHANGE).then(|| {
         format!(
             "a hand over the film changes it by {percent:+.0} % (at most {:.0}): the film lets \
-             light through, or light comes in beside it; use an opaque film or a black skin, and \
+             light through, or light comes in around it; use an opaque film or a black skin, and \
              close the shell",
             100.0 * LARGEST_CHANGE
         )

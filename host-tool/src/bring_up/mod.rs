@@ -30,12 +30,12 @@ use person::Person;
 use report::{Report, Step};
 use serde_json::json;
 
-/// Look at everything about a new board, in the order in which things go wrong
+/// Check a new board step by step, the likeliest fault first
 ///
 /// USB, the camera and its registers, clocks, white, the markers as `focus` has them, whether the
 /// film keeps light out, tare and noise, and a finger's press; says what is wrong and what to do,
-/// and what a person has to do in between. Ends with the first thing on which others rest. The
-/// report is for your own notes, and to attach to a question.
+/// and asks for a person's help in between. Ends at the first fault that makes later steps
+/// meaningless. The report is for your own notes, and to attach to a question.
 ///
 /// Example: hivtac bring-up
 #[derive(Args)]

@@ -1,4 +1,4 @@
-//! Checks with a finger's presses that right is right and below is below.
+//! Checks the camera's orientation with a finger's presses.
 
 use super::report::Step;
 use crate::output::note;
@@ -27,11 +27,11 @@ pub fn step(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     link.request(Request::Start, patience, |_| ())?;
     let side = |name: &str| {
         format!(
-            "→ Look from behind the camera the way it looks. Press the film beside its middle, \
-             {name}, for half a second, and let go."
+            "→ Look along with the camera, from behind it. Press the film {name} its middle for \
+             half a second, and let go."
         )
     };
-    note(&side("on the right"));
+    note(&side("right of"));
     let right = press(link)?;
     let below = match right {
         Some(_) => {
@@ -44,7 +44,7 @@ pub fn step(link: &mut Link, patience: Duration) -> Result<Step, Failure> {
     Ok(judge(right, below))
 }
 
-/// The mean place of the next press; `None` if there is none in time. A press that has begun before
+/// The mean place of the next press; `None` if none comes in time. A press that has begun before
 /// does not count.
 fn press(link: &mut Link) -> Result<Option<Place>, Failure> {
     let end = Instant::now() + PATIENCE;

@@ -15,9 +15,9 @@ pub struct Step {
     /// Its name, one of [`STEPS`].
     step: &'static str,
     right: bool,
-    /// What was found.
+    /// The finding.
     found: String,
-    /// What is wrong and what to do; empty if the step is right.
+    /// Faults and remedies; empty if the step is right.
     wrong: Vec<String>,
     /// The measured values.
     figures: Value,
@@ -46,7 +46,7 @@ impl Step {
         self.right
     }
 
-    /// A line with what was found, and one for each fault.
+    /// A line with the finding, and one for each fault.
     pub fn text(&self) -> String {
         let verdict = if self.right { "right" } else { "WRONG" };
         let mut lines = vec![format!("{:<8} {verdict}  {}", self.step, self.found)];

@@ -51,8 +51,8 @@ fn a_register_that_lost_its_value_is_named() {
     );
     let own = camera::judge(&lost, true);
     says(&own, &[]);
-    let told = "since its set-up register 03 holds 00, 40 was written";
-    assert!(own.text().contains(told), "{}", own.text());
+    let reported = "since its set-up register 03 holds 00, 40 was written";
+    assert!(own.text().contains(reported), "{}", own.text());
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn white_is_neutral_and_neither_dark_nor_saturated() {
 }
 
 #[test]
-fn a_film_that_lets_light_through_is_told() {
+fn a_film_that_lets_light_through_is_reported() {
     let [free, same, brighter, redder] = [0x9492, 0x9492, 0x9CD3, 0xAC92].map(picture);
     let judge = |covered| film::judge(&Middle::of(&free), &Middle::of(covered));
     says(&judge(&same), &[]);

@@ -89,7 +89,7 @@ pub struct Clock {
 }
 
 impl Clock {
-    /// Notes the latency that the device tells of a frame, µs; 0 before its first frame.
+    /// Notes the latency of a frame, as the device reports it, µs; 0 before its first frame.
     pub fn latency(&mut self, latency_us: u32) {
         if latency_us == 0 {
             return;
@@ -149,13 +149,13 @@ impl Clock {
     }
 }
 
-/// A [`Clock`] for samples as they arrive. It goes by the clock that never jumps: its stamps follow
-/// a step of this computer's time at once.
+/// A [`Clock`] for samples as they arrive. It uses the monotonic clock, so its stamps follow a step
+/// of this computer's time at once.
 #[derive(Clone, Debug, Default)]
 pub struct LiveClock(Clock);
 
 impl LiveClock {
-    /// Notes the latency that the device tells, µs.
+    /// Notes the latency that the device reports, µs.
     pub fn latency(&mut self, latency_us: u32) {
         self.0.latency(latency_us);
     }

@@ -100,7 +100,7 @@ impl Dice {
     }
 }
 
-/// What happens on the way from the devices to the program.
+/// The way from the devices to the program.
 #[derive(Clone, Copy, Default)]
 struct Way {
     /// The computer is busy for half of each such time, s: then all samples come at its end.
@@ -187,7 +187,7 @@ impl Simulated {
         let exposed_s = self.next_s();
         let device_us = (f64::from(self.frame) * 6_405.3) as u64;
         self.frame += 1;
-        // One frame in fifty is looked at twice.
+        // One frame in fifty gets a second look.
         let again = if self.dice.part() < 0.02 { 1.5e-3 } else { 0.0 };
         let latency_s = 4_785e-6 + 60e-6 * self.dice.part() + again;
         let ready_s = exposed_s + latency_s;

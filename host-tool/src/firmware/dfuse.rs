@@ -41,7 +41,7 @@ pub enum Trouble {
     Lost(String),
     /// It did not answer in time.
     Late,
-    /// It refused a request, or answered what it should not.
+    /// It refused a request, or gave a wrong answer.
     Refused(String),
 }
 
@@ -191,7 +191,7 @@ impl<Io: Usb> Loader<Io> {
             .map(|_| ())
     }
 
-    /// Waits until the loader has done what it was sent.
+    /// Waits until the loader has finished a request.
     fn settle(&self) -> Result<(), Trouble> {
         let end = Instant::now() + PATIENCE;
         while Instant::now() < end {

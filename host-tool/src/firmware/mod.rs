@@ -1,5 +1,5 @@
 //! `hivtac update firmware`: checks an image, starts the device's own loader, writes the image by
-//! it, and looks which version came back.
+//! it, and reports the new version.
 
 mod carried;
 mod dfuse;
@@ -27,7 +27,7 @@ use std::time::{Duration, Instant};
 use usb::Found;
 use write::Progress;
 
-/// An ELF has much more than what is loaded, as its lines for a debugger.
+/// An ELF has much more than the loaded bytes, such as its lines for a debugger.
 const MOST_BYTES: u64 = 64 << 20;
 /// Time between two searches for the device.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
@@ -43,8 +43,8 @@ const LOOK_EVERY: Duration = Duration::from_millis(500);
 pub struct FirmwareArguments {
     #[command(flatten)]
     device: Device,
-    /// The .bin of a release, or the ELF that cargo builds; what this program came with when not
-    /// given
+    /// The .bin of a release, or the ELF that cargo builds; by default the firmware that came with
+    /// this program
     #[arg(value_name = "FILE")]
     file: Option<String>,
     /// Longest wait for the device's loader, and for the device to come back, s
@@ -178,11 +178,11 @@ fn report(
 ) -> Result<(), Failure> {
     let now = shown(&after.firmware);
     let was = before.map(|hello| shown(&hello.firmware));
-    let told = match &was {
+    let reported = match &was {
         Some(was) => format!("firmware {now}, was {was}"),
         None => format!("firmware {now}"),
     };
-    tell(json, &told, &json!({ "firmware": now, "was": was }))?;
+    tell(json, &reported, &json!({ "firmware": now, "was": was }))?;
     match now.ends_with(&format!(" {}", image.version())) {
         true => Ok(()),
         false => {
@@ -205,7 +205,7 @@ fn come_back(
     wait: Duration,
 ) -> Result<DeviceHello, Failure> {
     let end = Instant::now() + wait;
-    let mut told = false;
+    let mut reported = false;
     let is_same = |hello: &DeviceHello| before.is_none_or(|it| it.device_id == hello.device_id);
     while Instant::now() < end {
         stop::check()?;
@@ -214,7 +214,7 @@ fn come_back(
             Ok((_, hello)) if is_same(&hello) => return Ok(hello),
             Err(failure) if failure.kind == Kind::Version => return Err(failure),
             Err(failure) if failure.kind == Kind::Interrupted => return Err(failure),
-            Ok(_) if !std::mem::replace(&mut told, true) => {
+            Ok(_) if !std::mem::replace(&mut reported, true) => {
                 note("hivtac: another device is there; waiting for the one that was updated");
             }
             _ => {}

@@ -1,5 +1,5 @@
 //! A simulated loader: the protocol of AN3156 with the flash of an STM32H743, and faults on
-//! request. It knows only what the application note says.
+//! request.
 
 use super::dfuse::Trouble;
 use dfu_core::functional_descriptor::FunctionalDescriptor;

@@ -33,9 +33,9 @@ fn update(device: &Rc<RefCell<Device>>, image: &Image) -> Result<Vec<Progress>, 
         let kind = Kind::Lost;
         Failure::new(kind, why.to_string())
     })?;
-    let mut told = Vec::new();
-    write(loader, image, |progress| told.push(progress))?;
-    Ok(told)
+    let mut reported = Vec::new();
+    write(loader, image, |progress| reported.push(progress))?;
+    Ok(reported)
 }
 
 #[track_caller]
@@ -53,7 +53,7 @@ fn assert_has(device: &Rc<RefCell<Device>>, image: &Image) {
 #[test]
 fn only_the_sectors_of_the_program_are_written_and_it_is_started() {
     let device = device();
-    let told = update(&device, &newer()).unwrap();
+    let reported = update(&device, &newer()).unwrap();
     assert_has(&device, &newer());
     let sectors = [0, 1, 2].map(|nth| PROGRAM + nth * SECTOR_BYTES);
     assert_eq!(device.borrow().erased, sectors);
@@ -64,7 +64,7 @@ fn only_the_sectors_of_the_program_are_written_and_it_is_started() {
         Progress::Written(LENGTH, LENGTH),
         Progress::ReadBack,
     ];
-    assert_eq!(told, expected);
+    assert_eq!(reported, expected);
 }
 
 #[test]
@@ -74,8 +74,8 @@ fn a_device_without_a_first_stage_gets_it_first() {
     other.flash[..0x2_0000].fill(7);
     let other = Rc::new(RefCell::new(other));
     for device in [blank, other] {
-        let told = update(&device, &newer()).unwrap();
-        assert_eq!(told[0], Progress::FirstStage);
+        let reported = update(&device, &newer()).unwrap();
+        assert_eq!(reported[0], Progress::FirstStage);
         assert_has(&device, &newer());
         assert_eq!(device.borrow().erased[..2], [FIRST_STAGE, PROGRAM]);
     }
@@ -108,7 +108,7 @@ fn another_chip_is_refused() {
 }
 
 #[test]
-fn what_the_loader_refuses_is_told_with_its_place_and_it_works_again() {
+fn what_the_loader_refuses_is_reported_with_its_place_and_it_works_again() {
     let sector = PROGRAM + SECTOR_BYTES;
     let faults = [
         (Fault::EraseFails(sector), "erasing at 0x08040000"),
@@ -170,8 +170,8 @@ fn a_device_that_goes_at_any_request_is_lost_and_written_by_the_next_attempt() {
     assert!(ends > 20, "{ends}");
 }
 
-/// The first stage starts what is whole: the old program before the first erase, the new one after
-/// the last write, and the loader between them.
+/// The first stage starts a whole program: the old program before the first erase, the new one
+/// after the last write, and the loader between them.
 #[test]
 fn a_power_cut_at_any_operation_leaves_a_program_that_starts_or_the_loader() {
     let (mut old, mut none) = (0, 0);

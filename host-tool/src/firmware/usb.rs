@@ -1,4 +1,4 @@
-//! The USB of a microcontroller's own loader: found, opened, and its control transfers.
+//! The USB of a microcontroller's own loader: finds and opens it, and makes its control transfers.
 
 use super::dfuse::{Loader, Trouble};
 use dfu_core::functional_descriptor::FunctionalDescriptor;
@@ -25,7 +25,7 @@ const SETTLING: Duration = Duration::from_secs(2);
 
 /// A loader on the bus.
 pub struct Found {
-    /// What tells it from those that were there before.
+    /// Distinguishes it from loaders that were there before.
     pub id: DeviceId,
     info: DeviceInfo,
 }
@@ -150,7 +150,7 @@ impl UsbLoader {
         let descriptor = { extras }.find_map(|extra| FunctionalDescriptor::from_bytes(&extra));
         let descriptor = descriptor.and_then(Result::ok).unwrap_or(NO_LOADER);
         let (setting, name) = flash.unwrap_or_default();
-        // What is no loader of the right chip is refused by `Loader::new`.
+        // `Loader::new` refuses other devices and other chips' loaders.
         let protocol = DfuProtocol::new(&name, descriptor.dfu_version);
         let protocol = protocol.unwrap_or(DfuProtocol::Dfu);
         interface.set_alt_setting(setting).wait()?;

@@ -1,4 +1,4 @@
-//! Writes an image by a loader: what is written, in which order, and what is read back.
+//! Writes an image by a loader, and reads it back.
 
 use super::dfuse::{Loader, Trouble, Usb};
 use hivtac_host::failure::{Failure, Kind};

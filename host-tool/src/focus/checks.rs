@@ -17,7 +17,7 @@ const RIM_PX: f64 = 3.5;
 /// Widest rim in YUV422, where two pixels share a colour, px.
 const RIM_OF_PAIRS_PX: f64 = 4.0;
 /// Largest relative difference of a marker's width from the one that the optics give. It is half of
-/// what the sensing accepts; the other half is for threshold and light.
+/// the sensing's limit; the other half is for threshold and light.
 const WIDTH_PART: f64 = 0.19;
 /// Least margin of a marker's colour above its threshold, in levels. It is eight standard
 /// deviations (2.5 levels each) of the simulated camera's noise, which keeps every pixel inside a
@@ -55,7 +55,7 @@ pub struct Check {
     pub unit: &'static str,
     /// Whether it is fulfilled.
     pub right: bool,
-    /// What to do; empty if it is fulfilled.
+    /// The remedy; empty if it is fulfilled.
     pub advice: String,
 }
 

@@ -3,14 +3,14 @@
 use crate::frame::Frame;
 use crate::look;
 
-/// Least level of all channels of what a lamp's reflection shows, of 255: RGB565's last.
+/// Least level of all channels in a lamp's reflection, of 255: RGB565's last.
 const WHITE: u8 = 250;
 /// Fewest pixels of a reflection; a marker has 170 at 320 × 240.
 const FEWEST: usize = 8;
 /// Largest part of the picture that is a reflection, and no film that is too bright.
 const LARGEST_PART: f64 = 0.05;
 
-/// What to do against the reflections in a picture; `None` if there are none.
+/// The remedy for the reflections in a picture; `None` without any.
 pub fn advice(frame: &Frame) -> Option<String> {
     let levels = look::levels(frame);
     let pixels = levels.chunks_exact(3).enumerate();

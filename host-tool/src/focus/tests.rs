@@ -38,7 +38,7 @@ fn the_nominal_sensor_is_right_in_both_formats() {
 
 /// A blur that loses no frame is right; one that loses most frames is a fault.
 #[test]
-fn a_blurred_picture_is_told_by_its_rims() {
+fn a_blurred_picture_is_reported_by_its_rims() {
     for format in [Format::Rgb565, Format::Yuv422] {
         let blurred = |blur_px| {
             frame(|options| {
@@ -57,7 +57,7 @@ fn a_blurred_picture_is_told_by_its_rims() {
 
 /// A lens of F/2.8 that is focused too near.
 #[test]
-fn a_defocused_lens_is_told() {
+fn a_defocused_lens_is_reported() {
     let focused = |focus_mm| {
         frame(|options| {
             options.lens.aperture_mm = 0.75;
@@ -69,7 +69,7 @@ fn a_defocused_lens_is_told() {
 }
 
 #[test]
-fn a_turned_camera_is_told_with_the_way_back() {
+fn a_turned_camera_is_reported_with_the_way_back() {
     for (roll_deg, way) in [(8.0, " clockwise"), (-8.0, "counter-clockwise")] {
         let frame = frame(|options| options.mounting.roll_deg = roll_deg);
         assert_wrong(&frame, &["turn: ", way]);
@@ -81,7 +81,7 @@ fn a_turned_camera_is_told_with_the_way_back() {
 }
 
 #[test]
-fn a_shifted_camera_is_told_with_where_to() {
+fn a_shifted_camera_is_reported_with_where_to() {
     let off = frame(|options| options.mounting.shift_px = [12.0, -5.0]);
     assert_wrong(
         &off,
@@ -92,7 +92,7 @@ fn a_shifted_camera_is_told_with_where_to() {
 }
 
 #[test]
-fn too_little_and_too_much_light_are_told() {
+fn too_little_and_too_much_light_are_reported() {
     assert_wrong(
         &frame(|options| options.gain = 0.45),
         &["brightness", "more light"],
@@ -110,7 +110,7 @@ fn too_little_and_too_much_light_are_told() {
 }
 
 #[test]
-fn washed_out_colours_are_told() {
+fn washed_out_colours_are_reported() {
     let hazy = wrong(&frame(|options| {
         options.gain = 0.6;
         options.haze = 120.0;
@@ -123,14 +123,14 @@ fn washed_out_colours_are_told() {
 
 /// With a film 13 mm away, everything is smaller.
 #[test]
-fn a_film_too_far_away_is_told() {
+fn a_film_too_far_away_is_reported() {
     let small = wrong(&frame(|options| options.lens.pitch_um = Some(15.0)));
     assert!(small[0].starts_with("size: 0.8"), "{small:?}");
     assert!(small[0].contains("too far from the lens"), "{small:?}");
 }
 
 #[test]
-fn a_picture_without_four_markers_is_told() {
+fn a_picture_without_four_markers_is_reported() {
     let dark = wrong(&frame(|options| options.gain = 0.0));
     assert!(
         dark[0].contains("no marker is seen (image_dark"),
@@ -161,7 +161,7 @@ fn eight_dots_are_right_in_both_formats() {
 }
 
 #[test]
-fn faults_of_a_film_of_eight_dots_are_told() {
+fn faults_of_a_film_of_eight_dots_are_reported() {
     let blurred = eight(|options| options.lens.blur_px = 2.0);
     assert!(blurred[0].starts_with("rim of marker 0, 1, 2, 3, 4, 5, 6, 7:"));
     let turned = eight(|options| options.mounting.roll_deg = 8.0);
@@ -199,9 +199,9 @@ fn a_person_sees_a_table_with_the_limits() {
     assert!(lines[8].starts_with("  wrong    rim of marker"), "{text}");
 }
 
-/// LEDs of the camera's own board, on the markers and beside them.
+/// LEDs of the camera's own board, on the markers and next to them.
 #[test]
-fn leds_that_the_film_mirrors_are_told() {
+fn leds_that_the_film_mirrors_are_reported() {
     for board_mm in [5.0, 7.0, 9.0, 12.0, 18.0] {
         for format in [Format::Rgb565, Format::Yuv422] {
             let frame = frame(|options| {

@@ -55,12 +55,12 @@ impl Default for Geometry {
 #[serde(deny_unknown_fields)]
 struct GeometryFile {
     friction: Option<f64>,
-    fingers: [ToldPose; 2],
+    fingers: [FingerPose; 2],
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct ToldPose {
+struct FingerPose {
     translation_m: Vector,
     rotation_xyzw: [f64; 4],
 }
@@ -107,7 +107,7 @@ impl Geometry {
     }
 }
 
-impl ToldPose {
+impl FingerPose {
     fn pose(&self, which: &str) -> Result<Pose, String> {
         let [x, y, z, w] = self.rotation_xyzw;
         let length = self

@@ -75,7 +75,7 @@ pub fn line(grip: &Grip, names: &[String; 2]) -> String {
     )
 }
 
-/// A sentence for a person: what squeezes, what holds, and what both feel together.
+/// A sentence for a person: grip force, friction margin and common wrench.
 pub fn sentence(grip: &Grip, names: &[String; 2]) -> String {
     let [first, second] = names;
     let Ok(held) = &grip.held else {

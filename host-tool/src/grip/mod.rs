@@ -7,7 +7,7 @@
 //! - common wrench: F₁ + F₂ and c₁ × F₁ + c₂ × F₂, what the object does to both fingers. An object
 //!   that is held still shows its weight;
 //! - friction margin: the smaller one of μ N − T, of a finger pressed with N along its film's z and
-//!   pulled with T across: how much more may pull before the object slips.
+//!   pulled with T across: the pull that is left before the object slips.
 //!
 //! Standard uncertainties come from those of both forces and places, to first order.
 
@@ -59,7 +59,7 @@ pub struct Reading {
     pub came_ns: u64,
     /// Its status.
     pub status: Status,
-    /// Its force; `None` if there is none.
+    /// Its force, if any.
     pub felt: Option<Felt>,
 }
 
@@ -84,7 +84,7 @@ pub enum Cause {
     Silent(usize),
 }
 
-/// What two fingers feel at one time.
+/// The grip of two fingers at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grip {
     /// When, ns: the exposure of the first finger's frame.
@@ -93,7 +93,7 @@ pub struct Grip {
     pub came_ns: u64,
     /// The status of each finger.
     pub status: [Status; 2],
-    /// What they feel, or why it is not known.
+    /// The grip, or why it is unknown.
     pub held: Result<Held, Cause>,
 }
 
@@ -126,7 +126,7 @@ pub struct Held {
 }
 
 impl Held {
-    /// What two fingers feel with these forces.
+    /// The grip of two fingers with these forces.
     pub fn of(geometry: &Geometry, felt: [&Felt; 2]) -> Held {
         let [first, second] = [0, 1].map(|finger| {
             let sign = if finger == 0 { -0.5 } else { 0.5 };

@@ -18,8 +18,7 @@ pub struct Pair {
     waiting: VecDeque<Reading>,
     /// The second finger's, for as long as the first one may be late.
     second: VecDeque<Reading>,
-    /// When the first finger's last frame was exposed, or the second's first one if there is none,
-    /// ns.
+    /// When the first finger's last frame was exposed, or else the second's first one, ns.
     first_ns: Option<u64>,
 }
 
@@ -80,7 +79,7 @@ impl Pair {
             let after = self
                 .second
                 .partition_point(|it| it.stamp_ns < first.stamp_ns);
-            // Before the second finger's first sample there is nothing to tell yet.
+            // Before the second finger's first sample there is no grip.
             if let Some(before) = after.checked_sub(1) {
                 grips.push(self.grip(first, &self.second[before], &self.second[after]));
             }

@@ -26,10 +26,10 @@ fn all_near(found: Vector, wanted: Vector) {
     );
 }
 
-/// An object of 30 mN hangs, squeezed with 100 mN, 2 mm beside both films' middles along y. Down is
-/// y of the grip and of the first film, −y of the second. By hand: each film is pulled down by
-/// 15 mN, and the torques about x cancel but for nothing: −z₁ F_y − z₂ F_y = 0; about z there is
-/// none, as x is 0 everywhere; y F_z of one cancels that of the other.
+/// An object of 30 mN hangs, squeezed with 100 mN, 2 mm off both films' middles along y. Down is y
+/// of the grip and of the first film, −y of the second. By hand: each film is pulled down by 15 mN,
+/// and the torques about x cancel but for nothing: −z₁ F_y − z₂ F_y = 0; about z there is none, as
+/// x is 0 everywhere; y F_z of one cancels that of the other.
 #[test]
 fn a_hanging_object_shows_its_weight_and_what_squeezes_it() {
     let geometry = Geometry::default();
@@ -116,7 +116,7 @@ fn any_force() -> impl Strategy<Value = Felt> {
 }
 
 proptest! {
-    /// Both fingers turned together: what has a direction turns with them, the rest stays.
+    /// Both fingers turned together: vectors turn with them, numbers stay.
     #[test]
     fn a_common_turn_turns_vectors_alone(
         first in any_force(), second in any_force(),
@@ -205,7 +205,7 @@ fn frames_of_two_cameras_are_compared_at_one_time() {
 #[test]
 fn a_finger_that_refuses_or_is_silent_is_the_cause() {
     let names = ["thumb".to_owned(), "index".to_owned()];
-    let told = |grips: &[Grip]| {
+    let reported = |grips: &[Grip]| {
         let grip = grips.last().expect("a grip");
         assert_eq!(grip.contact(), None);
         assert!(lines::json(grip, &names).contains(r#""grip":null,"#));
@@ -215,10 +215,10 @@ fn a_finger_that_refuses_or_is_silent_is_the_cause() {
     assert_eq!(pair.push(1, reading(FRAME_NS)), []);
     assert_eq!(pair.push(1, reading(2 * FRAME_NS)), []);
     let first = pair.push(0, refused(FRAME_NS + 1));
-    assert_eq!(told(&first), "thumb: markers_missing");
+    assert_eq!(reported(&first), "thumb: markers_missing");
     pair.push(1, refused(3 * FRAME_NS));
     let second = pair.push(0, reading(2 * FRAME_NS + 1));
-    assert_eq!(told(&second), "index: markers_missing");
+    assert_eq!(reported(&second), "index: markers_missing");
     let both = second[0].status;
     assert!(both[0].contains(Status::CONTACT) && both[1].contains(Status::NOT_CALIBRATED));
     // The second finger says no more: after 0.1 s that is the cause.
@@ -226,12 +226,12 @@ fn a_finger_that_refuses_or_is_silent_is_the_cause() {
         .flat_map(|frame| pair.push(0, reading(frame * FRAME_NS + 1)))
         .collect();
     assert!(!silent.is_empty() && silent.len() < 27, "{}", silent.len());
-    assert_eq!(told(&silent), "index: no samples");
+    assert_eq!(reported(&silent), "index: no samples");
     // It is back, and the first one is gone.
     let back: Vec<Grip> = (30..60)
         .flat_map(|frame| pair.push(1, reading(frame * FRAME_NS)))
         .collect();
-    assert_eq!(told(&back), "thumb: no samples");
+    assert_eq!(reported(&back), "thumb: no samples");
     assert!(
         back.iter()
             .rev()

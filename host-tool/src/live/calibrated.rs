@@ -1,9 +1,8 @@
 //! The simulated sensor as a calibrated unit: its dots move as the unit's own model has it.
 //!
-//! A unit's model holds its film as it was mounted, stretched or not, and its camera: how the image
-//! of each dot moves under any press. The simulated camera shows dots that rest and move there. So
-//! its samples are what that unit says of a press, with noise. They do not show how well the model
-//! knows the unit: what it is wrong by is not in it.
+//! A unit's model holds its film as mounted, stretched or not, and its camera: how the image of
+//! each dot moves under any press. The simulated camera shows dots that rest and move there. So its
+//! samples are that unit's answers to a press, with noise. They lack the model's own errors.
 
 use super::camera::Kind;
 use super::hand::MOST_N;
@@ -113,7 +112,7 @@ impl Calibrated {
     }
 }
 
-/// The shift of a point along the film, mm, that moves its image by so many px.
+/// The shift of a point along the film, mm, that moves its image by `px`.
 fn on_film(camera: &Camera, [x, y, z]: [f64; 3], px: [f64; 2]) -> [f64; 2] {
     let at = |[right, down]: [f64; 2]| camera.project([x + right, y + down, z]);
     step(at([0.0; 2]), at, px)
@@ -211,7 +210,7 @@ mod tests {
         angles_deg: [4.0, -3.0],
     };
 
-    /// The built-in model, of a film that is so many times as stiff, as a stretched one is.
+    /// The built-in model, of a film that is `times` as stiff, as a stretched one is.
     fn stiffer(times: f32) -> &'static [u8] {
         let mut file = KIND.model(Layout::default()).to_vec();
         let stiffness = Model::parse(&file).unwrap().forward.unwrap().stiffness;

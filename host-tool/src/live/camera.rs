@@ -47,7 +47,7 @@ impl Kind {
         }
     }
 
-    /// What it sees of the nominal sensor.
+    /// The scene's options for the nominal sensor.
     pub fn options(self) -> Options {
         let options = Options::of(self.preset());
         match self {
@@ -101,7 +101,7 @@ impl Kind {
         }
     }
 
-    /// What a model must fit.
+    /// The camera and the unit that a model must fit.
     pub fn fitting(self, device_id: [u8; 12]) -> Fitting {
         let [width, height] = self.size();
         Fitting {
@@ -189,7 +189,7 @@ impl Camera {
         self.kind.limits().check(settings).is_ok()
     }
 
-    /// Applies settings that it [accepts](Self::accepts). What they leave open suits the light:
+    /// Applies settings that it [accepts](Self::accepts). Automatic values follow the light:
     /// exposure changes before gain.
     pub fn set(&mut self, settings: CameraSettings, light: f64) {
         self.settings = settings;

@@ -61,7 +61,7 @@ impl Force {
 pub struct NoCourse {
     /// The line, counted from 1.
     pub line: usize,
-    /// The reason, and what is possible.
+    /// The reason, and possible values.
     pub why: String,
 }
 
@@ -214,7 +214,7 @@ impl Course {
         Some([contact(0)?, contact(1)?])
     }
 
-    /// What the rows around a time have, on the way from one to the other.
+    /// The value at a time, interpolated between the rows around it.
     fn between(&self, time_s: f64, of: impl Fn(&Row) -> Option<Force>) -> Option<Force> {
         let length_s = self.rows.last().map_or(0.0, |row| row.time_s);
         let at_s = match length_s > 0.0 && time_s > 0.0 {

@@ -1,7 +1,7 @@
 //! The device: frames and a host's bytes in, messages out, as `docs/wire.md` says.
 //!
-//! It does at once what a chip does in several tasks, so nothing is ever busy for long. What it
-//! keeps, it keeps until it ends.
+//! One thread does the work of a chip's several tasks, so nothing is busy for long. Kept data last
+//! until the program ends.
 
 mod commands;
 mod tares;

@@ -1,4 +1,4 @@
-//! What the camera sees: the scene, its disturbances, and what presses it.
+//! Renders the camera's picture: the scene, its disturbances, and what presses it.
 
 use super::calibrated::CalibratedFilm;
 use super::camera::{Camera, Kind};
@@ -18,7 +18,7 @@ const GLARE: Patch = Patch {
 /// render.
 const DRIFT_EVERY: u32 = 64;
 
-/// What disturbs the camera's view.
+/// Disturbances of the camera's view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disturbances {
     /// A reflection on a marker.
@@ -39,7 +39,7 @@ impl Default for Disturbances {
     }
 }
 
-/// What presses without a hand.
+/// The press without a hand.
 #[derive(Clone, Debug)]
 pub enum Presses {
     /// The scene's own motion.
@@ -69,13 +69,13 @@ pub struct Eye {
     presses: Presses,
     /// Two fingers.
     following: [Following; 2],
-    /// What both do together, where that is known.
+    /// The film under both together, if known.
     pair: Option<PairFilm>,
     /// The film of a calibrated unit in place of the scene's.
     calibrated: Option<CalibratedFilm>,
 }
 
-/// What a scene as it is seen depends on.
+/// The values on which the rendered scene depends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Seen {
     format: Format,
@@ -88,7 +88,7 @@ struct Seen {
 pub enum NotSeen {
     /// Its frames have another size: its own, then the camera's.
     Size([u32; 2], [u16; 2]),
-    /// It says what the camera's settings say: the key.
+    /// A key of the scene that the camera's settings replace.
     Key(&'static str),
     /// The scene is impossible with the disturbances.
     Scene(SceneError),

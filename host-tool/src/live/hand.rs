@@ -12,8 +12,8 @@ pub const FARTHEST_MM: f64 = 4.0;
 /// Largest α and β, degrees: the calibrated range.
 pub const STEEPEST_DEG: f64 = 12.0;
 
-/// Time within which a press follows the hand, s: a screen tells a pointer's place some sixty times
-/// a second, and a finger does not jump.
+/// Time within which a press follows the hand, s: a screen reports a pointer's place some sixty
+/// times a second, and a finger does not jump.
 const FOLLOWS_S: f64 = 0.02;
 /// Force below which a released film is untouched, N.
 const UNTOUCHED_N: f64 = 1e-4;
@@ -40,7 +40,7 @@ pub struct Hand {
 }
 
 impl Hand {
-    /// A hand whose press is there in the next frame, as a simulation tells it: nothing follows.
+    /// A hand whose press is complete in the next frame, as for a simulation.
     pub fn at_once() -> Hand {
         Hand {
             is_at_once: true,
@@ -57,7 +57,7 @@ impl Hand {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner)[finger]
     }
 
-    /// The part of the way to what is wanted that a press goes in this time.
+    /// The part of the way to the wanted press that it goes in this time.
     fn part(&self, step_s: f64) -> f64 {
         match self.is_at_once {
             true => 1.0,
@@ -119,7 +119,7 @@ impl Following {
         self.now.is_some()
     }
 
-    /// What the finger does now; `None` if it presses nothing.
+    /// The finger's press now; `None` without one.
     pub fn touch(&self) -> Option<Press> {
         self.now
     }

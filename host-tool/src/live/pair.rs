@@ -1,9 +1,9 @@
 //! The film under two needles, as the sensing's own model has it.
 //!
-//! The film's tables have one contact. Under two it moves by the mean of two single motions, and
-//! the dots by what the network of `hivtac_sensor::force::forward::pair` adds. So the live twin
-//! shows what the sensing knows of two contacts, and not how well it knows that: for its errors
-//! `docs/results/touches.md` has finite elements.
+//! The film's tables have one contact. Under two, film and dots move by the mean of two single
+//! motions, and the dots also by the network of `hivtac_sensor::force::forward::pair`. So the live
+//! twin has the sensing's own model of two contacts, without its errors; `docs/results/touches.md`
+//! has those, by finite elements.
 
 use super::hand::{MOST_N, Press};
 use hivtac_sensor::force::forward::pair::{Both, Interaction};
@@ -18,7 +18,7 @@ const STEP_MM: f64 = 0.01;
 /// Corrections of a dot's shift, each from the slopes where the last one led.
 const CORRECTIONS: usize = 2;
 
-/// What two contacts on a film with these dots do together.
+/// The film with these dots under two contacts.
 #[derive(Clone, Debug)]
 pub struct PairFilm {
     forward: Forward<'static>,
@@ -128,8 +128,8 @@ impl PairFilm {
     }
 }
 
-/// The shift along the film, mm, that moves an image by so many px, from the slopes of `at`: where
-/// the image is after a shift, `here` without one.
+/// The shift along the film, mm, that moves an image by `px`, from the slopes of `at`, the image's
+/// place after a shift; `here` is its place without one.
 pub(super) fn step(here: [f64; 2], at: impl Fn([f64; 2]) -> [f64; 2], px: [f64; 2]) -> [f64; 2] {
     let slope = |there: [f64; 2]| [0, 1].map(|axis| (there[axis] - here[axis]) / STEP_MM);
     let [a, c] = slope(at([STEP_MM, 0.0]));
@@ -148,7 +148,7 @@ fn load(touch: Press) -> Option<Load> {
     load.with_offset_mm(touch.place_mm).ok()
 }
 
-/// The sum of two touches as one load in their middle, for the truth; no load if there is none.
+/// The sum of two touches as one load in their middle, for the truth; no load without any.
 pub fn sum(touches: [Press; 2]) -> Load {
     let sum = || {
         let [first, second] = touches.map(|touch| load(touch).map(|load| load.vector_n()));
@@ -214,10 +214,10 @@ mod tests {
     #[test]
     fn two_fingers_are_two_contacts() {
         let samples = samples(200);
-        let told = |sample: &&Sample| sample.status.contains(Status::TWO_CONTACTS);
-        let first = samples.iter().position(|sample| told(&sample)).unwrap();
+        let reported = |sample: &&Sample| sample.status.contains(Status::TWO_CONTACTS);
+        let first = samples.iter().position(|sample| reported(&sample)).unwrap();
         assert!((20..180).contains(&first), "{first}");
-        assert!(samples[first..].iter().all(|sample| told(&sample)));
+        assert!(samples[first..].iter().all(|sample| reported(&sample)));
         let last = samples.last().unwrap();
         let mut contacts = last.each_contact().to_vec();
         contacts.sort_by_key(|contact| contact.place.unwrap().x);

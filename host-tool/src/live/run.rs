@@ -99,7 +99,7 @@ pub struct Frames {
     missed: bool,
 }
 
-/// What is to do at a time.
+/// The task at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Due {
     /// The next frame is whole after this time, µs.
@@ -121,7 +121,7 @@ impl Frames {
         }
     }
 
-    /// What is to do. Frames that came too late are left out, and must be counted.
+    /// The next task. Frames that came too late are left out, and must be counted.
     pub fn due(&mut self, camera: &Camera, now_us: u64) -> Due {
         let frame_us = u64::from(camera.frame_us());
         // A frame is whole when the next one begins.
@@ -181,7 +181,7 @@ impl Clock {
         Clock { shared, frames }
     }
 
-    /// Takes frames in real time until `stop` says so. `tell` hears of each frame's true press
+    /// Takes frames in real time until `stop` is true. Calls `tell` with each frame's true press
     /// before its sample can be read.
     pub fn run(&mut self, stop: impl Fn() -> bool, mut tell: impl FnMut(FrameTruth)) {
         while !stop() {

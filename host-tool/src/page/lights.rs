@@ -26,7 +26,7 @@ pub struct Light {
     pub level: Level,
     /// Its meaning.
     pub meaning: &'static str,
-    /// What to do; empty if nothing is necessary.
+    /// The remedy; empty if nothing is necessary.
     pub advice: &'static str,
 }
 
@@ -134,7 +134,7 @@ fn words(bit: Status) -> (&'static str, &'static str) {
             "take a new tare when forces matter",
         ),
         Status::REST_MOVED => (
-            "the untouched film was seen beside its rest position",
+            "the untouched film was seen off its rest position",
             "leave the film alone for a minute, or take a new tare",
         ),
         Status::WEIGHT_UNKNOWN => (

@@ -13,7 +13,7 @@ use serde::Deserialize;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::time::Duration;
 
-/// What a device must do.
+/// An order to a device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     /// Take the rest position.
@@ -30,7 +30,7 @@ pub enum Order {
     StopRecording,
     /// Take a frame.
     Picture,
-    /// Set the shape of what presses.
+    /// Set the contact's shape.
     Contact(ContactShape),
     /// Keep the settings in use through restarts.
     Keep,
@@ -38,13 +38,13 @@ pub enum Order {
     Press(Fingers),
 }
 
-/// What an order asks of a device.
+/// The device's command for an order.
 pub struct DeviceCommand {
     /// The command.
     pub request: Request,
     /// Longest wait for its reply.
     pub patience: Duration,
-    /// What is said once it is done.
+    /// The message once it is done.
     pub done: String,
 }
 
@@ -143,8 +143,7 @@ struct Written {
 
 /// Reads an order and the index of its sensor.
 ///
-/// # Errors
-/// The text says what is invalid.
+/// # Errors The text names the invalid part.
 pub fn parse(body: &[u8]) -> Result<(usize, Order), String> {
     let written: Written = serde_json::from_slice(body).map_err(|error| error.to_string())?;
     let order = match written.order.as_str() {

@@ -13,7 +13,7 @@ pub struct Press {
     pub angles_deg: [f64; 2],
 }
 
-/// What each of two fingers presses; `None` releases the film.
+/// The press of each of two fingers; `None` releases the film.
 pub type Fingers = [Option<Press>; 2];
 
 /// Presses a simulated film.

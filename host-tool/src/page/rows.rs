@@ -63,7 +63,7 @@ struct Samples {
 }
 
 /// A sample: sequence number, frame, device time (µs), status; then its force or `null`, and the
-/// two contacts that the force is the sum of, if they are told apart.
+/// two contacts that the force is the sum of, if they are resolved.
 #[derive(Serialize)]
 struct Row(u32, u32, u64, u32, Option<Value>, Vec<Value>);
 

@@ -30,7 +30,7 @@ pub struct SensorState {
     pub threshold: Limits,
     /// The threshold that the model was made for.
     pub model_threshold: Option<Limits>,
-    /// The shape of what presses, as `hivtac settings` writes it; `None` until the device sent it.
+    /// The contact's shape, as `hivtac settings` writes it; `None` until the device sent it.
     pub contact: Option<String>,
     /// Samples a second.
     pub rate_hz: Option<f64>,
@@ -48,7 +48,7 @@ pub struct SensorState {
     pub lines: Vec<String>,
     /// The coverage of free presses, while these are recorded.
     pub coverage: Option<Coverage>,
-    /// What this sensor and another feel together, for a person; `None` without a grip.
+    /// The grip of this sensor and another, for a person; `None` without one.
     pub grip: Option<String>,
 }
 
@@ -76,7 +76,7 @@ pub struct Coverage {
     pub maps: Vec<Map>,
     /// The present press, for a person.
     pub now: String,
-    /// The coverage, and what to do next, for a person.
+    /// The coverage and the next action, for a person.
     pub line: String,
 }
 

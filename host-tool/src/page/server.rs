@@ -48,7 +48,7 @@ pub struct Sensor {
     pub feed: Arc<Feed>,
     /// The queue of its orders; `None` if the page only shows it.
     pub orders: Option<SyncSender<Posted>>,
-    /// What presses its film, if it is simulated in this program.
+    /// The hand that presses its film, if it is simulated in this program.
     pub hand: Option<Hand>,
 }
 

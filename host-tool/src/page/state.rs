@@ -27,9 +27,9 @@ pub struct State {
     /// The device's newest counters.
     pub stats: Option<Stats>,
     lines: VecDeque<String>,
-    /// The shape of what presses; `None` until the device sent its settings.
+    /// The contact's shape; `None` until the device sent its settings.
     pub contact_shape: Option<ContactShape>,
-    /// What this sensor and another feel together, for a person; `None` without a grip.
+    /// The grip of this sensor and another, for a person; `None` without one.
     pub grip: Option<String>,
 }
 
@@ -189,8 +189,11 @@ mod tests {
         state.trouble("pulled".to_owned());
         assert_eq!(json(&state)["trouble"], "pulled");
         state.take(&sample(9, 2));
-        let told = json(&state);
-        assert_eq!((&told["trouble"], &told["lost"]), (&().into(), &7.into()));
+        let reported = json(&state);
+        assert_eq!(
+            (&reported["trouble"], &reported["lost"]),
+            (&().into(), &7.into())
+        );
     }
 
     #[test]
@@ -203,10 +206,10 @@ mod tests {
                 text: "\u{202e}x".try_into().unwrap(),
             }));
         }
-        let told = json(&state);
-        assert_eq!(told["board"], r"<b>\u{1b}[2J");
-        assert_eq!(told["name"], r"\u{9b}thumb");
-        assert_eq!(told["lines"].as_array().unwrap().len(), LINES);
-        assert_eq!(told["lines"][0], r"device, 0.000 s, info: \u{202e}x");
+        let reported = json(&state);
+        assert_eq!(reported["board"], r"<b>\u{1b}[2J");
+        assert_eq!(reported["name"], r"\u{9b}thumb");
+        assert_eq!(reported["lines"].as_array().unwrap().len(), LINES);
+        assert_eq!(reported["lines"][0], r"device, 0.000 s, info: \u{202e}x");
     }
 }

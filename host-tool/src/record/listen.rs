@@ -14,7 +14,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(100);
 const SILENCE: Duration = Duration::from_secs(10);
 
 /// A message of a sensor.
-pub struct Heard {
+pub struct Arrival {
     /// The sensor's index, from 0.
     pub sensor: usize,
     /// The receive time.
@@ -40,21 +40,21 @@ pub fn listen_to_all(
     links: &mut [Link],
     patience: Duration,
     duration: Option<Duration>,
-    keep: impl FnOnce(&Receiver<Heard>) -> Result<(), Failure>,
+    keep: impl FnOnce(&Receiver<Arrival>) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     let is_over = AtomicBool::new(false);
     let until = &Until {
         duration,
         is_over: &is_over,
     };
-    let (said, heard) = mpsc::channel();
+    let (sender, arrivals) = mpsc::channel();
     std::thread::scope(|scope| {
         let each = links.iter_mut().enumerate();
         let threads: Vec<_> = each
             .map(|(sensor, link)| {
-                let said = said.clone();
+                let sender = sender.clone();
                 scope.spawn(move || {
-                    let result = listen(link, sensor, patience, until, &said);
+                    let result = listen(link, sensor, patience, until, &sender);
                     if result.is_err() {
                         until.is_over.store(true, Ordering::Relaxed);
                     }
@@ -62,8 +62,8 @@ pub fn listen_to_all(
                 })
             })
             .collect();
-        drop(said);
-        let kept = keep(&heard);
+        drop(sender);
+        let kept = keep(&arrivals);
         is_over.store(true, Ordering::Relaxed);
         let results = threads.into_iter().map(|thread| match thread.join() {
             Ok(result) => result,
@@ -79,12 +79,12 @@ fn listen(
     sensor: usize,
     patience: Duration,
     until: &Until,
-    heard: &Sender<Heard>,
+    arrivals: &Sender<Arrival>,
 ) -> Result<(), Failure> {
     let hand_over = |message| {
         let at = Instant::now();
         // The receiver is gone when the file could not be written.
-        let _ = heard.send(Heard {
+        let _ = arrivals.send(Arrival {
             sensor,
             at,
             message,

@@ -3,7 +3,7 @@
 mod listen;
 mod table;
 
-pub use listen::{Heard, listen_to_all};
+pub use listen::{Arrival, listen_to_all};
 
 use crate::device::{Devices, seconds};
 use crate::grip_command::{GripArguments, Paired};
@@ -32,7 +32,7 @@ use table::Table;
 /// Time between two flushes and between two lines of progress.
 const FLUSH_EVERY: Duration = Duration::from_secs(1);
 
-/// Record everything that one or several devices say, with both clocks, until Ctrl-C
+/// Record every message of one or several devices, with both clocks, until Ctrl-C
 ///
 /// FILE.mcap has ROS 2's profile: `ros2 bag play`, Foxglove and PlotJuggler read it, and
 /// `hivtac replay`. FILE.csv has a row a sample, with units in its header. Until its end it is
@@ -51,7 +51,7 @@ pub struct RecordArguments {
     /// End after this number of seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     seconds: Option<Duration>,
-    /// At the end, what became of it as one JSON object
+    /// At the end, the counts as one JSON object
     #[arg(long)]
     json: bool,
 }
@@ -160,7 +160,7 @@ impl Sensor {
         unit_number(&self.hello.device_id)
     }
 
-    /// Prints what was recorded of it, with its name if there are several sensors.
+    /// Prints its counts, with its name if there are several sensors.
     fn tell(&self, of: usize) {
         if of > 1 {
             note(&format!("{} {}:", self.unit(), shown(&self.hello.name)));
@@ -232,7 +232,7 @@ impl Recording {
         })
     }
 
-    /// Also keeps what the first two devices feel together.
+    /// Also records the grip of the first two devices.
     fn add_grip(&mut self, paired: Option<Paired>) -> Result<(), Failure> {
         let (Sink::Bag(bag), Some(Paired { pair, names })) = (&mut self.sink, paired) else {
             return Ok(());
@@ -244,17 +244,17 @@ impl Recording {
     /// Keeps all messages until the end; a failure of one device ends the recording.
     fn follow(&mut self, links: &mut [Link], arguments: &RecordArguments) -> Result<(), Failure> {
         let patience = arguments.devices.timeout;
-        listen_to_all(links, patience, arguments.seconds, |heard| {
-            self.keep_all(heard)
+        listen_to_all(links, patience, arguments.seconds, |arrivals| {
+            self.keep_all(arrivals)
         })
     }
 
     /// Keeps the messages until all senders are gone.
-    fn keep_all(&mut self, heard: &Receiver<Heard>) -> Result<(), Failure> {
+    fn keep_all(&mut self, arrivals: &Receiver<Arrival>) -> Result<(), Failure> {
         let mut flushed = Instant::now();
         loop {
-            match heard.recv_timeout(FLUSH_EVERY.saturating_sub(flushed.elapsed())) {
-                Ok(heard) => self.keep(&heard)?,
+            match arrivals.recv_timeout(FLUSH_EVERY.saturating_sub(flushed.elapsed())) {
+                Ok(arrival) => self.keep(&arrival)?,
                 Err(RecvTimeoutError::Timeout) => (),
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
@@ -270,12 +270,12 @@ impl Recording {
     ///
     /// # Errors
     /// When the disk is full or gone.
-    pub fn keep(&mut self, heard: &Heard) -> Result<(), Failure> {
-        let Heard {
+    pub fn keep(&mut self, arrival: &Arrival) -> Result<(), Failure> {
+        let Arrival {
             sensor,
             at,
             message,
-        } = heard;
+        } = arrival;
         let tally = &mut self.sensors[*sensor].tally;
         match message {
             DeviceMessage::Sample(sample) => drop(tally.sample(sample)),
@@ -343,8 +343,7 @@ impl Recording {
         if let Err(failure) = &result
             && failure.kind == Kind::Input
         {
-            // The disk is full or gone, and nothing more can be written. What was flushed can be
-            // read.
+            // The disk is full or gone, and nothing more can be written. Flushed data can be read.
             drop(sink);
             tell_counts();
             return result;

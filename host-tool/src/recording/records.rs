@@ -1,7 +1,7 @@
 //! Reads the records of an MCAP file, past damaged parts.
 //!
-//! A chunk begins with a header whose lengths must agree, and has a checksum. Where records cannot
-//! be followed, the next such header is looked for.
+//! A chunk begins with a header whose lengths must agree, and has a checksum. After damaged records
+//! it searches for the next such header.
 
 use std::fmt::{self, Display, Formatter};
 use std::io::{self, Read, Seek, SeekFrom};
@@ -184,7 +184,7 @@ impl Records {
         })
     }
 
-    /// Goes on at the next chunk after what is sure; at the end if there is none.
+    /// Goes on at the next chunk after the last sound record, or at the end.
     fn look_for_chunk(&mut self, why: &str) -> io::Result<Vec<Record<'static>>> {
         let from = self.sure;
         let mut at = from;
@@ -215,8 +215,8 @@ impl Records {
         self.damage.push(Damage { from, to, why });
     }
 
-    /// Where the chunk ends that begins here; `None` if none does. Its opcode is not looked at: its
-    /// lengths say more.
+    /// The end of the chunk that begins here; `None` if none does. It checks the chunk's lengths,
+    /// not its opcode.
     fn chunk_end(&mut self, at: u64) -> io::Result<Option<u64>> {
         let bytes = self.bytes(at, HEAD + CHUNK_HEADER + 4)?;
         let Some((_, length)) = head(&bytes) else {

@@ -1,8 +1,8 @@
 //! Reads messages of another release by the types that its recording carries.
 //!
-//! The types are those of `postcard-schema` as JSON, which names each field and variant. What has
-//! the same name in this release is taken, what it does not know is left out, and what it knows and
-//! the recording has not is what `Default` says (`docs/wire.md`, "Versions").
+//! The types are those of `postcard-schema` as JSON, which names each field and variant. Fields
+//! with the same name in this release are taken, unknown ones are left out, and missing ones get
+//! their `Default` (`docs/wire.md`, "Versions").
 
 use hivtac_wire::decoder;
 use hivtac_wire::message::{DeviceMessage, PROTOCOL_VERSION};
@@ -25,7 +25,7 @@ pub fn ours() -> String {
 pub struct Types(Value);
 
 impl Types {
-    /// Reads what [`ours`] wrote in any release; `None` if it is something else.
+    /// Reads the text that [`ours`] wrote in any release; `None` for any other.
     pub fn parse(text: &str) -> Option<Types> {
         serde_json::from_str(text).ok().map(Types)
     }

@@ -18,7 +18,7 @@ pub enum Channel {
     Markers,
     /// Whether something touches the film.
     Contact,
-    /// Whether what touches the film slips.
+    /// Whether the contact slips.
     Slip,
     /// Names of the status bits that are set.
     Status,
@@ -112,7 +112,7 @@ impl GripChannel {
     }
 }
 
-/// The messages of a grip, each as CDR: one for each channel, in their order. What is not known is
+/// The messages of a grip, each as CDR: one for each channel, in their order. Unknown numbers are
 /// NaN. `frame` is the grip's.
 pub fn grip_messages(grip: &Grip, frame: &str, names: &[String; 2]) -> Vec<(GripChannel, Vec<u8>)> {
     let held = grip.held.as_ref().ok();

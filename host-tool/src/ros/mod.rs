@@ -219,7 +219,7 @@ pub struct Diagnosis {
     pub level: Level,
     /// The device's name.
     pub name: String,
-    /// Its state, and what to do.
+    /// Its state, and the remedy.
     pub message: String,
     /// The device's serial number.
     pub hardware_id: String,

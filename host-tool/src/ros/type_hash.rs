@@ -1,4 +1,4 @@
-//! Hashes of the types of messages, by which `rmw_zenoh_cpp` tells versions of a type apart.
+//! Hashes of the types of messages, by which `rmw_zenoh_cpp` distinguishes versions of a type.
 //!
 //! They are those of ROS 2 Jazzy and later (REP 2016); `tests/python/test_zenoh.py` has them
 //! computed by another program.

@@ -24,7 +24,7 @@ pub fn diagnose(state: &State, since: Option<Status>, not_published: u64) -> Dia
     }
 }
 
-/// The worst severity, and what to do.
+/// The worst severity, and its remedy.
 fn verdict(trouble: Option<&str>, since: Option<Status>) -> (Level, String) {
     if let Some(trouble) = trouble {
         return (Level::Error, shown(trouble));
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn all_of_the_worst_that_was_there_is_told() {
+    fn all_of_the_worst_that_was_there_is_reported() {
         let warning = Status::NOT_CALIBRATED | Status::TARE_MISSING | Status::CONTACT;
         let (level, message) = verdict(None, Some(warning));
         assert_eq!(level, Level::Warn);

@@ -46,11 +46,11 @@ const LAST_DOMAIN: u16 = 232;
 
 /// Serve forces to other programs, as a node of ROS 2, for Foxglove or Rerun, until Ctrl-C
 ///
-/// For a hivtac that was built with it: `cargo install --path host-tool --features
-/// ros2,foxglove`, or with `zenoh`, where RMW_IMPLEMENTATION is rmw_zenoh_cpp. Prints `ready` and
-/// where; goes on after a lost connection, which diagnostics tell. Topics of the node, each below
-/// its name: `wrench`, `place`, `contacts`, `markers`, `contact`, `slip`, `status`; service `tare`;
-/// and `/diagnostics`. Those of several sensors are below /NODE/SENSOR, those of a grip below
+/// For a hivtac that was built with it: `cargo install --path host-tool --features ros2,foxglove`,
+/// or with `zenoh`, where RMW_IMPLEMENTATION is rmw_zenoh_cpp. Prints `ready` and the addresses;
+/// goes on after a lost connection, which diagnostics show. Topics of the node, each below its
+/// name: `wrench`, `place`, `contacts`, `markers`, `contact`, `slip`, `status`; service `tare`; and
+/// `/diagnostics`. Those of several sensors are below /NODE/SENSOR, those of a grip below
 /// /NODE/grip. Rerun needs no such build, but Python with `hivtac[rerun]`.
 ///
 /// Example: hivtac serve --ros2 --foxglove

@@ -1,4 +1,4 @@
-//! The interface to a program's outlet, which ROS 2 and Foxglove share.
+//! The interface that ROS 2 and Foxglove share for samples and states.
 
 use super::sensor::{NextDown, TareOrder};
 use hivtac_host::ros::channel::{Channel, Frames, GripChannel};

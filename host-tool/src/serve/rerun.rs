@@ -24,7 +24,7 @@ pub fn run(arguments: &ServeArguments) -> Result<(), Failure> {
     become_it(command.args(&arguments.rerun_options))
 }
 
-/// The Python beside this program, as a wheel has it, else that of the path.
+/// The Python next to this program, as in a wheel, otherwise that of the path.
 fn python() -> PathBuf {
     let name = format!("python{}", if cfg!(windows) { ".exe" } else { "3" });
     let beside = std::env::current_exe().map(|program| program.with_file_name(&name));

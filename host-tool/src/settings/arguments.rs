@@ -19,7 +19,7 @@ use hivtac_terms::units::{
 use hivtac_wire::settings::Name;
 use temporal::Change;
 
-/// Show, save, give back or forget what the device keeps through restarts
+/// Show, change, save or reset what the device keeps through restarts
 #[derive(Subcommand)]
 pub enum SettingsCommand {
     /// Show name, threshold, tare and limits in use, and which of them are kept
@@ -32,7 +32,7 @@ pub enum SettingsCommand {
         #[arg(long)]
         json: bool,
     },
-    /// Give the device something of yours to keep
+    /// Set and keep a setting
     #[command(subcommand)]
     Set(SetCommand),
     /// Save the settings in use in a file
@@ -53,7 +53,7 @@ pub enum SettingsCommand {
     Import {
         #[command(flatten)]
         target: Target,
-        /// What `export` made
+        /// A file of `export`
         #[arg(value_name = "FILE.json")]
         file: String,
     },
@@ -69,7 +69,7 @@ pub enum SettingsCommand {
 
 #[derive(Subcommand)]
 pub enum SetCommand {
-    /// A name to tell it from others, by which `info` shows it
+    /// The device's name, by which `--device` selects it
     ///
     /// Example: hivtac settings set name thumb
     Name {
@@ -79,7 +79,7 @@ pub enum SetCommand {
         #[arg(value_name = "NAME", value_parser = name)]
         name: Name,
     },
-    /// From what force on something touches the film, and until what
+    /// The forces at which a contact begins and ends
     ///
     /// A contact also begins only with three times the force's standard uncertainty, and ends below
     /// half of that.
@@ -106,23 +106,23 @@ pub enum SetCommand {
         /// Distance, µm, 1 to 5000; 60 by default
         #[arg(long, value_name = "UM", group = "limit")]
         distance: Option<u32>,
-        /// In what time at most, ms, 10 to 100; 50 by default
+        /// Longest time for it, ms, 10 to 100; 50 by default
         #[arg(long, value_name = "MS", group = "limit")]
         within: Option<u32>,
         /// Least force along the film over that into it, 0 to 2; 0.1 by default
         #[arg(long, value_name = "RATIO", value_parser = small_thousandths, group = "limit")]
         ratio: Option<u16>,
     },
-    /// What is sent in place of each frame's own force
+    /// The filter of forces
     ///
-    /// Contact and slip are of each frame's own force all the same.
+    /// Contact and slip use each frame's own, unfiltered force.
     #[command(subcommand)]
     Filter(FilterCommand),
-    /// Whether the rest position follows what drifts while nothing touches the film
+    /// Whether the rest position follows drift while nothing touches the film
     ///
     /// A force below the contact's that grows no faster than the rate is taken for drift, and
     /// missing in every force from then on: by the total at most. With the usual limits it grows by
-    /// less than 2 µN a second, and takes 0.04 mN of small forces and up to 1 mN of 100 mN.
+    /// less than 2 µN a second, and takes 0.08 mN of small forces and up to 2 mN of 100 mN.
     #[command(subcommand)]
     Rezero(RezeroCommand),
     /// When the board's output pin is high, without a host
@@ -133,11 +133,11 @@ pub enum SetCommand {
     Output(OutputCommand),
     /// Where gravity pulls on the film
     ///
-    /// The film hangs by its own weight: turned over, it looks pressed by some mN. A sensor that is
-    /// told which way it is held takes that into account, from the next tare on; `none` where it is
-    /// turned and nobody tells how, which the uncertainties then include; `fixed`, as a new device
-    /// has it, where it stays as it was when the tare was taken. x is to the right and y down in
-    /// the image, z away from the camera; the length does not matter.
+    /// The film hangs by its own weight: turned over, it looks pressed by some mN. A sensor that
+    /// knows how it is held corrects for that, from the next tare on. `none` is for one that is
+    /// turned without notice, which the uncertainties then include. `fixed`, the default, is for
+    /// one that stays as it was at its tare. x is to the right and y down in the image, z away from
+    /// the camera; the length does not matter.
     ///
     /// Example: hivtac settings set down 0 0 -1
     Down {
@@ -152,8 +152,8 @@ pub enum SetCommand {
     ///
     /// How the film moves depends on it. `needle` is a tip like the model's. `round:R` is a soft or
     /// rounded tip and `flat:R` a rigid face, R being the radius of its contact in mm, 0.25 to 4.
-    /// `unknown`, as a new device has it, is any of these up to 4 mm, which the uncertainties then
-    /// include. It holds until the device restarts, with --keep longer.
+    /// `unknown`, the default, is any of these up to 4 mm, which the uncertainties then include. It
+    /// holds until the device restarts, with --keep longer.
     ///
     /// Example: hivtac settings set contact flat:2 --keep
     Contact {
@@ -167,7 +167,7 @@ pub enum SetCommand {
         #[arg(long)]
         keep: bool,
     },
-    /// How much the film remembers of its loads
+    /// How much the film creeps under its loads
     ///
     /// A held load is seen as if it grew by two parts of itself, within half a second and within
     /// 20 s. After a release, the same parts of the load stay in the film. The guide to calibration
@@ -184,8 +184,8 @@ pub enum SetCommand {
     },
     /// How long the camera exposes each row
     ///
-    /// Automatic, it finds what the light needs when it starts and with `hivtac expose`, and then
-    /// stays. At a lower rate there is time for a longer one.
+    /// If automatic, it is set for the light at the start and by `hivtac expose`, and then fixed. A
+    /// lower rate allows a longer one.
     ///
     /// Example: hivtac settings set exposure 2.5
     Exposure {
@@ -195,9 +195,9 @@ pub enum SetCommand {
         #[arg(value_name = "MS", value_parser = camera::exposure)]
         time: Wanted<Microseconds>,
     },
-    /// How much the camera amplifies what it exposed
+    /// How much the camera amplifies
     ///
-    /// Automatic as the exposure, and only when that alone is not enough.
+    /// If automatic, it is set with the exposure, and above 1 only if that does not suffice.
     ///
     /// Example: hivtac settings set gain 1.5
     Gain {
@@ -271,7 +271,7 @@ pub enum RezeroCommand {
         /// How far in a second, px, 0.001 to 0.1; 0.005 by default
         #[arg(long, value_name = "PX", value_parser = small_thousandths)]
         rate: Option<u16>,
-        /// How far in all, px, 0.001 to 0.25; 0.1 by default
+        /// How far in all, px, 0.001 to 0.25; 0.2 by default
         #[arg(long, value_name = "PX", value_parser = small_thousandths)]
         total: Option<u16>,
     },

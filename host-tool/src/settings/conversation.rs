@@ -148,7 +148,7 @@ impl Conversation {
         self.tell_set("down", &text_of_down(report.down), true)
     }
 
-    /// Sets the shape of what presses, and keeps it if `is_kept`.
+    /// Sets the contact's shape, and keeps it if `is_kept`.
     pub fn set_contact_shape(&mut self, shape: ContactShape, is_kept: bool) -> Result<(), Failure> {
         self.send(Request::SetContactShape(shape))?;
         if is_kept {
@@ -161,7 +161,7 @@ impl Conversation {
         self.tell_set("contact", &text_of_shape(shape), is_kept)
     }
 
-    /// Prints what was set, and whether it was kept.
+    /// Prints the new setting, and whether it was kept.
     fn tell_set(&self, name: &str, text: &str, is_kept: bool) -> Result<(), Failure> {
         let and_kept = if is_kept { " and kept" } else { "" };
         let line = format!("{name} set{and_kept}: {text}");

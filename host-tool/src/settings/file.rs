@@ -47,7 +47,7 @@ pub struct File {
     /// The direction of gravity, if known.
     #[serde(default, with = "DownJson")]
     pub down: Down,
-    /// The shape of what presses.
+    /// The contact's shape.
     #[serde(default, with = "ContactShapeJson")]
     pub contact_shape: ContactShape,
 }
@@ -233,8 +233,7 @@ impl File {
 
 /// Reads a file of settings.
 ///
-/// # Errors
-/// What is wrong with it, and where.
+/// # Errors Its fault, and where.
 pub fn read(path: &str) -> Result<File, Failure> {
     let bytes = read_at_most(path, LONGEST_FILE).map_err(|error| Failure::of_file(path, error))?;
     let bytes = bytes.ok_or_else(|| Failure::of_file(path, "too long for a file of settings"))?;

@@ -1,7 +1,7 @@
 //! `hivtac settings`: shows, changes, exports, imports and resets what a device keeps.
 
-/// Makes a module for `#[serde(with)]` of a value that may be missing, by what writes and reads it
-/// when it is there.
+/// Makes a module for `#[serde(with)]` of an optional value, from the functions that write and read
+/// a present one.
 macro_rules! optional_json {
     ($module:ident, $type:ty, $json:literal) => {
         mod $module {

@@ -113,7 +113,7 @@ impl Inside {
         })
     }
 
-    /// Runs it until the program is interrupted; `tell` hears of each frame's true press.
+    /// Runs it until the program is interrupted; calls `tell` with each frame's true press.
     pub fn run(mut self, tell: impl FnMut(FrameTruth)) {
         self.clock.run(stop::requested, tell);
     }

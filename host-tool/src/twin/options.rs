@@ -14,7 +14,7 @@ use hivtac_twin::units;
 use hivtac_twin::{Layout, Scene};
 use std::ops::RangeInclusive;
 
-/// What is simulated.
+/// The simulated sensor.
 #[derive(Args, Default, PartialEq)]
 pub struct Simulated {
     /// What presses the film: rest, static, demo, sweep, press, drag, grasp, catch, vibration; or a
@@ -72,7 +72,7 @@ enum CameraName {
     Mt9v034,
 }
 
-/// What presses when the arguments do not say it.
+/// The press when the arguments name none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Before {
     /// The demo's wandering tip.
@@ -82,7 +82,7 @@ pub enum Before {
 }
 
 impl Simulated {
-    /// Makes the device and what its camera sees.
+    /// Makes the device and its camera's view.
     ///
     /// # Errors
     /// When the scene or a file cannot be used.

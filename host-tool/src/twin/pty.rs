@@ -1,7 +1,7 @@
 //! The serial port as a pseudo-terminal.
 //!
-//! This program holds the terminal's other side open, too: else the system would reset it, and end
-//! the bytes, with each host that leaves. A host that comes says hello, which ends the conversation
+//! This program also holds the terminal's other side open: otherwise the system would reset the
+//! terminal and end the stream with each host that leaves. A new host's hello ends the conversation
 //! of the one before it.
 
 use hivtac_host::failure::Failure;

@@ -1,4 +1,4 @@
-//! What the page says of two fingers that grip together: the newest grip of their samples.
+//! The page's view of two fingers that grip together: the newest grip of their samples.
 
 use crate::grip_command::Paired;
 use hivtac_host::clock::{Arrival, LiveClock};

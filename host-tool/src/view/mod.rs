@@ -50,7 +50,7 @@ pub struct ViewArguments {
     #[command(flatten)]
     grip: GripArguments,
     /// A simulated sensor in place of a device: the page presses its film, and shows the true press
-    /// beside what the sensor says
+    /// next to the sensor's answer
     #[cfg(feature = "twin")]
     #[arg(long, conflicts_with_all = ["port", "grip"])]
     twin: bool,

@@ -17,7 +17,7 @@ use std::time::{Duration, Instant};
 /// Time between two updates of the state.
 const TELL_EVERY: Duration = Duration::from_millis(250);
 
-/// A device and what is known of it.
+/// A device and its state.
 pub struct Owner {
     address: Address,
     patience: Duration,
@@ -160,7 +160,7 @@ impl Owner {
         Ok(Answer::Done(command.done))
     }
 
-    /// Asks which settings are in use. A device that does not tell them is shown without.
+    /// Asks for the settings in use. A device that does not answer is shown without.
     fn ask_settings(&mut self, link: &mut Link) -> Result<(), Failure> {
         match self.request(link, Request::GetSettings, self.patience) {
             Err(failure) if failure.kind == Kind::Refused => Ok(()),

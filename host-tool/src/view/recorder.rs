@@ -1,6 +1,6 @@
 //! The page's record button: writes one file at a time while the page is shown.
 
-use crate::record::{Heard, Recording};
+use crate::record::{Arrival, Recording};
 use hivtac_host::failure::Failure;
 use hivtac_host::page;
 use hivtac_host::shown::{shown, unit_number};
@@ -56,7 +56,7 @@ impl Recorder {
         let Some(under_way) = &mut self.under_way else {
             return;
         };
-        let mut result = under_way.recording.keep(&Heard {
+        let mut result = under_way.recording.keep(&Arrival {
             sensor: 0,
             at: Instant::now(),
             message: message.clone(),

@@ -106,7 +106,7 @@ fn a_board_on_which_all_is_right_is_so() {
 }
 
 #[test]
-fn a_camera_upside_down_is_told_by_two_presses() {
+fn a_camera_upside_down_is_reported_by_two_presses() {
     let (finished, report) = bring_up(&board([[-2_500, 200], [-100, -2_000]]));
     assert_eq!(finished.code, Some(9), "{finished:?}");
     assert!(finished.stdout.contains("upside down"), "{finished:?}");

@@ -271,7 +271,7 @@ fn a_tare_is_taken_refused_or_not_answered() {
     assert_eq!(
         mute.stderr,
         "hivtac: the device did not answer \"tare\" within 10.5 s; it may do it all the same: wait \
-         10 s and try again; when it repeats, `hivtac info` tells whether it restarts\n"
+         10 s and try again; when it repeats, `hivtac info` shows whether it restarts\n"
     );
 }
 
@@ -384,7 +384,7 @@ fn the_help_lists_the_exit_codes() {
 }
 
 #[test]
-fn shells_are_told_what_completes_a_command() {
+fn shells_are_reported_what_completes_a_command() {
     for (shell, words) in [
         ("bash", "complete -F _hivtac"),
         ("zsh", "#compdef hivtac"),
@@ -403,7 +403,7 @@ fn shells_are_told_what_completes_a_command() {
 /// Each command prints one object with its result for programs.
 #[test]
 fn commands_tell_programs_what_they_did() {
-    let told = |arguments: &[&str]| {
+    let reported = |arguments: &[&str]| {
         let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| device.serve())]);
         let done = run(&[arguments, &["--json", "--port", &device.port]].concat());
         assert_eq!(
@@ -414,19 +414,22 @@ fn commands_tell_programs_what_they_did() {
         assert_eq!(done.stdout.lines().count(), 1, "{}", done.stdout);
         serde_json::from_str::<serde_json::Value>(&done.stdout).unwrap()
     };
-    let tare = told(&["tare", "--frames", "8", "--keep"]);
+    let tare = reported(&["tare", "--frames", "8", "--keep"]);
     assert_eq!((&tare["frames"], &tare["kept"]), (&8.into(), &true.into()));
     assert_eq!(tare["moved"]["farthest_px"], 20_316.0 / 65_536.0);
-    assert_eq!(told(&["expose"]), serde_json::json!({ "exposed": true }));
-    let threshold = told(&["threshold", "--model"]);
+    assert_eq!(
+        reported(&["expose"]),
+        serde_json::json!({ "exposed": true })
+    );
+    let threshold = reported(&["threshold", "--model"]);
     assert_eq!(threshold["threshold"]["saturation_low"], 100);
     assert_eq!(threshold["kept"], false);
-    let name = told(&["settings", "set", "name", "index"]);
+    let name = reported(&["settings", "set", "name", "index"]);
     assert_eq!(name, serde_json::json!({ "name": "index", "kept": true }));
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("thumb.json");
     let file = file.to_str().unwrap();
-    assert_eq!(told(&["settings", "export", file])["file"], file);
-    assert_eq!(told(&["settings", "import", file])["tare"], true);
-    assert_eq!(told(&["settings", "reset"])["kept"], false);
+    assert_eq!(reported(&["settings", "export", file])["file"], file);
+    assert_eq!(reported(&["settings", "import", file])["tare"], true);
+    assert_eq!(reported(&["settings", "reset"])["kept"], false);
 }

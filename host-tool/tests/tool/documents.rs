@@ -88,9 +88,9 @@ fn every_pattern_of_the_led_has_its_meaning() {
     let text = root_file("docs/troubleshooting.md");
     let text = section(&text, "The LED");
     for (pattern, meaning) in rows {
-        let [_, told, _] = row(text, pattern);
+        let [_, reported, _] = row(text, pattern);
         let meaning = meaning.trim_end_matches(" |").split(": `").next().unwrap();
-        assert_eq!(told, meaning, "{pattern}");
+        assert_eq!(reported, meaning, "{pattern}");
     }
 }
 

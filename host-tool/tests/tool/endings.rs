@@ -46,11 +46,11 @@ fn a_pulled_cable_is_an_error_after_the_summary() {
 /// With two programs on one port, the second gets the reason of its refusal, and the first goes on.
 #[test]
 fn a_second_program_on_a_port_is_refused() {
-    let (go_on, told) = std::sync::mpsc::channel();
+    let (go_on, reported) = std::sync::mpsc::channel();
     let device = FakeDevice::on_pty(Box::new(move |device| {
         device.until_start();
         device.send(sample(1, 1));
-        told.recv().unwrap();
+        reported.recv().unwrap();
         device.send(sample(2, 2));
         device.serve();
     }));

@@ -1,5 +1,5 @@
-//! Tests an update of the firmware as far as it goes without USB: what is refused before the device
-//! is asked, and a loader that does not appear. `src/firmware/tests.rs` has the rest.
+//! Tests a firmware update without USB: files that are refused at once, and a loader that does not
+//! appear. `src/firmware/tests.rs` has the rest.
 
 use crate::fake::*;
 use crate::run::*;
@@ -99,8 +99,9 @@ fn an_image_for_another_board_is_refused_and_the_device_goes_on() {
     let file = image(&directory, "another board");
     let run = run(&["update", "firmware", &file, "--port", &device.port]);
     assert_eq!(run.code, Some(1));
-    let told = "for the board another board, and the device is a fake board; give the firmware for";
-    assert!(run.stderr.contains(told), "{}", run.stderr);
+    let reported =
+        "for the board another board, and the device is a fake board; give the firmware for";
+    assert!(run.stderr.contains(reported), "{}", run.stderr);
 }
 
 #[test]
@@ -118,13 +119,13 @@ fn a_file_that_is_no_image_is_refused_before_the_device_is_asked() {
         (cut, "cut: it has"),
         (&unsealed, "give the ELF itself"),
     ];
-    for (bytes, told) in cases {
+    for (bytes, reported) in cases {
         let directory = tempfile::tempdir().unwrap();
         let path = file(&directory, bytes);
         let run = run(&["update", "firmware", &path, "--port", "tcp:127.0.0.1:1"]);
         assert_eq!(run.code, Some(1));
         assert!(run.stderr.contains(&path), "{}", run.stderr);
-        assert!(run.stderr.contains(told), "{}", run.stderr);
+        assert!(run.stderr.contains(reported), "{}", run.stderr);
     }
 }
 

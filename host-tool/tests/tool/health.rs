@@ -32,7 +32,7 @@ fn a_good_device_passes_its_self_test() {
 }
 
 #[test]
-fn problems_are_told_with_code_and_advice() {
+fn problems_are_reported_with_code_and_advice() {
     let run = run(&["self-test", "--port", &ill().port]);
     assert_eq!(run.code, Some(9));
     let problems: Vec<_> = run

@@ -124,23 +124,23 @@ fn every_finding_of_a_self_test_is_named_with_its_code() {
         let mut cells = table
             .lines()
             .filter(|line| line.starts_with(&format!("| {code} |")));
-        let told = cells
+        let reported = cells
             .next()
             .unwrap_or_else(|| panic!("the page lacks {line}"));
         let name = rest.split(':').next().unwrap();
         assert!(
-            told.starts_with(&format!("| {code} | `{name}` |")),
-            "{told}: {line}"
+            reported.starts_with(&format!("| {code} | `{name}` |")),
+            "{reported}: {line}"
         );
         codes.push(code.to_owned());
     }
     assert_eq!(codes, first_cells(table));
 }
 
-/// Each kind of failure of the page, and no other, is told by `hivtac info`; also a low supply that
+/// `hivtac info` shows each kind of failure of the page, and no other; also a low supply that
 /// resets nothing.
 #[test]
-fn every_kind_of_failure_is_told_by_its_name() {
+fn every_kind_of_failure_is_reported_by_its_name() {
     let page = page();
     let table = first_cells(section(&page, "What `hivtac info` shows of a failure"));
     let mut named: Vec<_> = table.iter().flat_map(|cell| cell.split(", ")).collect();
@@ -252,7 +252,8 @@ fn every_exit_code_is_provoked() {
     }
 }
 
-/// Each pattern of the LED, and what the tests of the flashed program in the rig expect of it.
+/// Each pattern of the LED, and the name by which the tests of the flashed program in the rig
+/// expect it.
 const PATTERNS: [(&str, &str); 6] = [
     ("breathes, 4 s", "Pattern::Breathes(4.0)"),
     ("blinks once a second", "Pattern::Flashes(1, 1.0)"),
@@ -269,15 +270,15 @@ const PATTERNS: [(&str, &str); 6] = [
 #[test]
 fn every_pattern_of_the_led_is_seen_in_the_rig() {
     let page = page();
-    let told = first_cells(section(&page, "The LED"));
-    assert_eq!(told, PATTERNS.map(|(pattern, _)| pattern));
+    let reported = first_cells(section(&page, "The LED"));
+    assert_eq!(reported, PATTERNS.map(|(pattern, _)| pattern));
     let tests = root_file("twin/rig/tests/led.rs");
     for (pattern, expected) in PATTERNS {
         assert!(tests.contains(expected), "no test expects {pattern}");
     }
 }
 
-/// What the page quotes with the tool's name before it, and what provokes it.
+/// A message that the page quotes, with the tool's name before it.
 fn saying(quoted: &str) -> String {
     match quoted {
         "cannot open /dev/ttyACM0: there is no such port" => {
@@ -311,7 +312,7 @@ fn saying(quoted: &str) -> String {
     }
 }
 
-/// What a second program on a port says.
+/// The message of a second program on a port.
 fn taken() -> String {
     let device = FakeDevice::on_pty(streaming(samples(0..1)));
     let mut first = start(&["monitor", "--json", "--port", &device.port]);

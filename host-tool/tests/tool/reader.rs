@@ -97,7 +97,7 @@ fn a_wait_has_an_end_and_takes_what_is_there() {
 }
 
 #[test]
-fn a_lost_connection_is_told_after_the_last_sample() {
+fn a_lost_connection_is_reported_after_the_last_sample() {
     let device = FakeDevice::on_tcp([Box::new(|device: &mut Conversation| {
         assert!((0..3).all(|_| device.answer_one()));
         device.send(sample(0, 0));

@@ -9,11 +9,11 @@ use std::time::Duration;
 
 /// A device that sends samples with these numbers, one every 5 ms, and its counters; then waits.
 fn paced(numbers: Vec<u32>) -> Script {
-    paced_and_told(numbers, |_| ())
+    paced_and_counted(numbers, |_| ())
 }
 
 /// The same device; it calls `tell` with the number of each sample that it sent.
-fn paced_and_told(numbers: Vec<u32>, tell: impl Fn(u32) + Send + 'static) -> Script {
+fn paced_and_counted(numbers: Vec<u32>, tell: impl Fn(u32) + Send + 'static) -> Script {
     Box::new(move |device| {
         while let Some(message) = device.next() {
             if let hivtac_wire::message::HostMessage::Command(command) = &message
@@ -118,9 +118,9 @@ fn what_was_recorded_is_played_as_it_came() {
         port,
     ]);
     assert_eq!(recorded.code, Some(0), "{recorded:?}");
-    let told: Value = serde_json::from_str(&recorded.stdout).unwrap();
+    let reported: Value = serde_json::from_str(&recorded.stdout).unwrap();
     assert_eq!(
-        [&told["file"], &told["whole"], &told["samples"]],
+        [&reported["file"], &reported["whole"], &reported["samples"]],
         [&json!(file), &json!(true), &json!(37)]
     );
     assert!(
@@ -196,8 +196,8 @@ fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
     let recorded = run(&["record", &file, "--port", &device.port]);
     assert_eq!(recorded.code, Some(5), "{recorded:?}");
     let partial = format!("{file}.partial");
-    let told = format!("what came until then is in {partial}");
-    assert!(recorded.stderr.contains(&told), "{recorded:?}");
+    let reported = format!("what came until then is in {partial}");
+    assert!(recorded.stderr.contains(&reported), "{recorded:?}");
     assert!(!std::path::Path::new(&file).exists());
     assert!(replayed(&[&partial], "30").into_iter().eq(0..30));
 }
@@ -206,12 +206,12 @@ fn a_pulled_cable_leaves_a_recording_that_plays_under_its_partial_name() {
 fn ctrl_c_ends_a_recording_cleanly() {
     let folder = Folder::new();
     let file = folder.path("a.csv");
-    let (told, sent) = std::sync::mpsc::channel();
+    let (reported, sent) = std::sync::mpsc::channel();
     // The receiver of the last numbers is gone.
     let tell = move |number| {
-        let _ = told.send(number);
+        let _ = reported.send(number);
     };
-    let device = FakeDevice::on_tcp([paced_and_told((0..100).collect(), tell)]);
+    let device = FakeDevice::on_tcp([paced_and_counted((0..100).collect(), tell)]);
     let mut recording = start(&["record", &file, "--port", &device.port]);
     while sent.recv_timeout(Duration::from_secs(20)).unwrap() < 50 {}
     signal(recording.child().id(), "INT");
@@ -243,7 +243,7 @@ fn a_full_disk_is_called_full() {
     assert!(said.contains(&words), "{said}");
 }
 
-/// Files may have a few thousand bytes here: what was flushed before is whole.
+/// Files may have a few thousand bytes here: data flushed before are whole.
 #[test]
 fn a_full_disk_ends_a_recording_with_what_fits() {
     let folder = Folder::new();
@@ -287,9 +287,9 @@ fn several_sensors_are_recorded_into_one_file_and_played_one_by_one() {
     let index = another(2, "index", (100..120).collect());
     let recorded = record_all(&[&thumb, &index], &file);
     assert_eq!(recorded.code, Some(0), "{recorded:?}");
-    let told: Value = serde_json::from_str(&recorded.stdout).unwrap();
-    let samples = [0, 1].map(|sensor| told["sensors"][sensor]["samples"].clone());
-    assert_eq!(samples, [json!(30), json!(20)], "{told}");
+    let reported: Value = serde_json::from_str(&recorded.stdout).unwrap();
+    let samples = [0, 1].map(|sensor| reported["sensors"][sensor]["samples"].clone());
+    assert_eq!(samples, [json!(30), json!(20)], "{reported}");
     for (device, numbers) in [("thumb", 0..30), ("00010203040506070809 0A02", 100..120)] {
         let device = device.replace(' ', "");
         let played = replayed(

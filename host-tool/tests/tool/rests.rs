@@ -65,18 +65,18 @@ fn calibrated() -> Vec<u8> {
 }
 
 fn stretched() -> Unit {
-    let told: Value = serde_json::from_str(FILM).unwrap();
-    let glued_mm: [[f64; 2]; 4] = serde_json::from_value(told["glued_mm"].clone()).unwrap();
+    let reported: Value = serde_json::from_str(FILM).unwrap();
+    let glued_mm: [[f64; 2]; 4] = serde_json::from_value(reported["glued_mm"].clone()).unwrap();
     let mut options = Options {
         glued_mm: glued_mm.into(),
         mounting: Mounting {
-            shift_px: serde_json::from_value(told["shift_px"].clone()).unwrap(),
-            roll_deg: told["roll_deg"].as_f64().unwrap(),
+            shift_px: serde_json::from_value(reported["shift_px"].clone()).unwrap(),
+            roll_deg: reported["roll_deg"].as_f64().unwrap(),
         },
         ..Options::default()
     };
-    options.lens.pitch_um = told["pitch_um"].as_f64();
-    let states = told["states"].as_array().unwrap().iter();
+    options.lens.pitch_um = reported["pitch_um"].as_f64();
+    let states = reported["states"].as_array().unwrap().iter();
     Unit {
         name: "stretched",
         model: STRETCHED.to_vec(),
@@ -86,13 +86,13 @@ fn stretched() -> Unit {
 }
 
 /// A force, N, and the film under it.
-fn state(told: &Value) -> (f64, Pressed) {
-    let force_n: [f64; 3] = serde_json::from_value(told["force_n"].clone()).unwrap();
-    let centres_mm: [[f64; 2]; 4] = serde_json::from_value(told["centres_mm"].clone()).unwrap();
-    let discs: [[[f64; 3]; 3]; 4] = serde_json::from_value(told["discs"].clone()).unwrap();
+fn state(reported: &Value) -> (f64, Pressed) {
+    let force_n: [f64; 3] = serde_json::from_value(reported["force_n"].clone()).unwrap();
+    let centres_mm: [[f64; 2]; 4] = serde_json::from_value(reported["centres_mm"].clone()).unwrap();
+    let discs: [[[f64; 3]; 3]; 4] = serde_json::from_value(reported["discs"].clone()).unwrap();
     let pressed = Pressed {
         force_n,
-        touches_mm: serde_json::from_value(told["touches_mm"].clone()).unwrap(),
+        touches_mm: serde_json::from_value(reported["touches_mm"].clone()).unwrap(),
         centres_mm: centres_mm.into(),
         discs: discs
             .map(|[moved_mm, along_x, along_y]| DiscMotion {

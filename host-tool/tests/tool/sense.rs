@@ -139,7 +139,7 @@ fn small_blobs_are_shown_on_request() {
     assert_eq!((blobs(&[]), blobs(&["--min-area", "1"])), (0, 1));
 }
 
-/// A blob says by what it is no marker.
+/// A blob says why it is no marker.
 #[test]
 fn a_blob_that_is_no_marker_says_why() {
     let folder = Folder::new();
@@ -172,7 +172,7 @@ fn a_blob_that_is_no_marker_says_why() {
     );
 }
 
-/// A fifth dot beside the film is left out by a region, and by a mask.
+/// A fifth dot next to the film is left out by a region, and by a mask.
 #[test]
 fn what_is_not_looked_at_is_left_out() {
     let folder = Folder::new();
@@ -337,7 +337,7 @@ fn a_mono_cameras_model_reads_grey_and_coloured_pictures_by_luma() {
     assert_eq!(found[0], found[1]);
 }
 
-/// Nothing passes the threshold in either; what to do is not the same.
+/// Nothing passes the threshold in either, but the remedies differ.
 #[test]
 fn a_white_picture_is_not_called_dark() {
     let folder = Folder::new();
@@ -357,7 +357,7 @@ fn a_white_picture_is_not_called_dark() {
 
 /// Four things that each could be a marker, but do not lie as markers do.
 #[test]
-fn the_rule_is_told_by_which_blobs_are_no_markers() {
+fn the_rule_is_reported_by_which_blobs_are_no_markers() {
     let folder = Folder::new();
     let mut image = RgbImage::from_pixel(320, 240, Rgb([128; 3]));
     for [left, top] in [[40, 60], [70, 60], [200, 150], [230, 60]] {

@@ -82,7 +82,7 @@ fn settings_as_json() {
 }
 
 #[test]
-fn settings_of_another_version_are_told() {
+fn settings_of_another_version_are_reported() {
     let script: Script = Box::new(|device| {
         device.settings.found = Found::AnotherVersion;
         device.serve();
@@ -327,7 +327,7 @@ fn a_limit_out_of_its_range_changes_nothing() {
 }
 
 #[test]
-fn a_re_zeroed_rest_position_is_told() {
+fn a_re_zeroed_rest_position_is_reported() {
     let script = || -> Script {
         Box::new(|device| {
             device.settings.rezeroed = Px(3 << 12);
@@ -345,7 +345,7 @@ fn a_re_zeroed_rest_position_is_told() {
     assert!(shown.contains(&line), "{shown}");
 }
 
-/// These commands print what `docs/using.md` shows.
+/// These commands print the lines of `docs/using.md`.
 #[test]
 fn the_guide_shows_what_setting_prints() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -415,8 +415,8 @@ fn exposure_gain_and_rate_are_set_one_by_one_and_kept() {
     assert_eq!(amplified.gain, Some(Sixteenths(24)));
     let (slower, text) = camera_changed(&["settings", "set", "rate", "39", "--json"]);
     assert_eq!(slower.rate, Rate::Quarter);
-    let told: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(told["text"], "39 frames a second");
+    let reported: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(reported["text"], "39 frames a second");
     let (found, text) = camera_changed(&["settings", "set", "exposure", "auto"]);
     assert_eq!(found, automatic);
     assert_eq!(
@@ -479,18 +479,18 @@ fn down_changed(arguments: &[&str]) -> String {
     };
     let expected = [Request::Keep(only_down), Request::GetSettings];
     assert_eq!(commands(&device), expected);
-    let is_told = arguments.len() == 6;
+    let is_vector = arguments.len() == 6;
     assert_eq!(
         run.stderr.contains("take it anew"),
-        is_told,
+        is_vector,
         "{}",
         run.stderr
     );
     run.stdout
 }
 
-/// The shape of what presses that a device received, and the tool's output. It is kept only when
-/// asked for.
+/// The contact's shape that a device received, and the tool's output. It is kept only when asked
+/// for.
 fn shape_set(arguments: &[&str]) -> (ContactShape, String) {
     let (commands, text) = sent(arguments);
     let [Request::SetContactShape(shape), kept @ ..] = &commands[..] else {
@@ -514,10 +514,10 @@ fn what_presses_is_set_and_kept_when_asked_for() {
     assert_eq!(text, "contact set: needle, a tip like the model's\n");
     let (shape, text) = shape_set(&[&set[..], &["flat:2.5", "--keep", "--json"]].concat());
     assert_eq!(shape, ContactShape::Flat(Micrometres(2_500)));
-    let told: Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(told["setting"], "contact");
-    assert_eq!(told["kept"], true);
-    assert_eq!(told["text"], "flat, a rigid face of 2.5 mm radius");
+    let reported: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(reported["setting"], "contact");
+    assert_eq!(reported["kept"], true);
+    assert_eq!(reported["text"], "flat, a rigid face of 2.5 mm radius");
 }
 
 #[test]

@@ -123,16 +123,16 @@ fn picture_and_raw_frame_are_the_same_to_the_sensing() {
         "--json",
     ]);
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""));
-    let told: Value = serde_json::from_str(&run.stdout).unwrap();
+    let reported: Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!(
-        (&told["frame"], &told["picture"]),
+        (&reported["frame"], &reported["picture"]),
         (&31.into(), &png.into())
     );
-    assert_eq!(told["markers"][2]["x"], 1.5);
-    assert_eq!(told["status"][0], "tare_missing");
+    assert_eq!(reported["markers"][2]["x"], 1.5);
+    assert_eq!(reported["status"][0], "tare_missing");
     let found = sense(&pam);
     assert!(found["force"].is_object(), "{found}");
-    assert_eq!(found, sense(told["picture"].as_str().unwrap()));
+    assert_eq!(found, sense(reported["picture"].as_str().unwrap()));
     assert!(std::fs::read(&pam).unwrap().ends_with(&bytes));
     let areas = found["markers"].as_array().unwrap().iter();
     let areas: u64 = areas.map(|marker| marker["area"].as_u64().unwrap()).sum();
@@ -145,7 +145,7 @@ fn picture_and_raw_frame_are_the_same_to_the_sensing() {
 }
 
 #[test]
-fn a_person_is_told_of_the_frame() {
+fn a_person_is_reported_of_the_frame() {
     let folder = TempDir::new().unwrap();
     let png = path(&folder, "a.png");
     let yuv = Threshold::Yuv422(Yuv422::RED);

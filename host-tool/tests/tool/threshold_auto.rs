@@ -56,20 +56,20 @@ fn a_dry_run_sets_nothing() {
     let port = &device.port;
     let run = run(&["threshold", "auto", "--dry-run", "--json", "--port", port]);
     assert_eq!((run.code, run.stderr.as_str()), (Some(0), ""), "{run:?}");
-    let told: Value = serde_json::from_str(&run.stdout).unwrap();
+    let reported: Value = serde_json::from_str(&run.stdout).unwrap();
     assert_eq!(
-        (&told["set"], &told["is_of_model"]),
+        (&reported["set"], &reported["is_of_model"]),
         (&false.into(), &true.into())
     );
-    let level = |name: &str, which: &str| told[name][which].as_u64().unwrap();
-    let chosen = told["half_way"]["saturation_low"].as_u64().unwrap();
+    let level = |name: &str, which: &str| reported[name][which].as_u64().unwrap();
+    let chosen = reported["half_way"]["saturation_low"].as_u64().unwrap();
     assert!(
         level("film", "high") < chosen && chosen < level("dots", "low"),
-        "{told}"
+        "{reported}"
     );
     assert!(
-        (0.005..0.015).contains(&told["passed"].as_f64().unwrap()),
-        "{told}"
+        (0.005..0.015).contains(&reported["passed"].as_f64().unwrap()),
+        "{reported}"
     );
     assert_eq!(orders(&device), []);
 }

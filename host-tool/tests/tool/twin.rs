@@ -65,7 +65,7 @@ impl Twin {
         run(&[arguments, &["--port", &self.port, "--timeout", "10"]].concat())
     }
 
-    /// Runs a command that must succeed; returns what it prints.
+    /// Runs a command that must succeed; returns its output.
     fn done(&self, arguments: &[&str]) -> String {
         let run = self.run(arguments);
         assert_eq!(run.code, Some(0), "{arguments:?}: {}", run.stderr);
@@ -138,7 +138,7 @@ fn a_twin_answers_as_a_device_does() {
 }
 
 #[test]
-fn a_twin_keeps_what_it_is_told_to_keep() {
+fn a_twin_keeps_what_it_is_reported_to_keep() {
     let twin = Twin::of(&["--scene", "rest"]);
     twin.done(&["tare", "--keep"]);
     let settings = twin.done(&["settings", "get"]);
@@ -318,7 +318,7 @@ fn disturbances_are_seen() {
     );
 }
 
-/// Another unit has its own number, and a rest position beside the model's.
+/// Another unit has its own number, and another rest position than the model's.
 #[test]
 fn units_are_drawn_by_their_number() {
     let place = |unit: &str| {
@@ -369,7 +369,7 @@ fn a_recorded_course_is_pressed_again() {
 
 /// A course with both of two contacts, as `monitor --csv` writes them, presses with both.
 #[test]
-fn a_course_of_two_contacts_is_told_as_two() {
+fn a_course_of_two_contacts_is_reported_as_two() {
     let folder = tempfile::tempdir().unwrap();
     let course = text(&folder, "course.csv");
     let of = |number: u32| {
@@ -469,8 +469,8 @@ fn a_twin_has_no_loader() {
     assert_eq!(twin.json(&["info"])["board"], "twin + ov7725");
 }
 
-/// Two fingers press an object from both sides as `PRESSED` says: what squeezes is the force
-/// straight in, and what pulls both is the part along x; the second finger's y is turned over.
+/// Two fingers press an object from both sides as `PRESSED` says: the force straight in squeezes,
+/// and the part along x pulls both; the second finger's y is turned over.
 #[test]
 fn two_twins_are_a_grip() {
     let (thumb, _) = Twin::pressed(&[]);
@@ -522,7 +522,7 @@ fn two_twins_are_a_grip() {
     assert!(shown.stderr.contains("latency: p50"), "{}", shown.stderr);
 }
 
-/// The first finger's page says what both feel together.
+/// The first finger's page shows the grip of both.
 #[test]
 fn two_twins_are_a_grip_on_the_page() {
     let [(thumb, _), (index, _)] = [Twin::pressed(&[]), Twin::pressed(&[])];
@@ -533,10 +533,10 @@ fn two_twins_are_a_grip_on_the_page() {
     let squeezed = "grip of thumb and index: 1";
     let says = |state: &Value| state["grip"].as_str().map(str::to_owned);
     let is_known = |state: &Value| says(state).is_some_and(|it| it.starts_with(squeezed));
-    let told = says(&view.events().state(0, is_known)).unwrap();
+    let reported = says(&view.events().state(0, is_known)).unwrap();
     assert!(
-        told.contains(" mN; margin ") && told.contains(" mN; together "),
-        "{told}"
+        reported.contains(" mN; margin ") && reported.contains(" mN; together "),
+        "{reported}"
     );
     assert_eq!(view.events().state(1, |_| true)["grip"], Value::Null);
 }
@@ -577,7 +577,7 @@ fn a_grip_is_recorded_beside_its_sensors() {
     assert!(recorded_forces.len() > 20, "{}", recorded_forces.len());
     let units = [&twin, &other].map(|it| it.json(&["info"])["device_id"].clone());
     let forces = forces_of_both(&recorded, &units.map(|it| it.as_str().unwrap().to_owned()));
-    // By their bits: what is not known is NaN.
+    // By their bits: unknown numbers are NaN.
     let bits = |forces: Vec<f64>| forces.into_iter().map(f64::to_bits).collect::<Vec<_>>();
     assert_eq!(bits(forces), bits(recorded_forces));
 }
@@ -594,7 +594,7 @@ fn numbers_of(file: &str, topic: &str) -> Vec<f64> {
     of_topic.map(|message| number(message).unwrap()).collect()
 }
 
-/// The grip forces that come of what a file has of two sensors.
+/// The grip forces by a file's samples of two sensors.
 fn forces_of_both(file: &str, units: &[String; 2]) -> Vec<f64> {
     let mut all = Vec::new();
     for (finger, unit) in units.iter().enumerate() {

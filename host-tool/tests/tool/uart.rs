@@ -1,4 +1,4 @@
-//! Tests what reads a device's UART: a line on which it only sends, whoever listens.
+//! Tests readers of a device's UART, on which it only sends.
 
 use crate::fake::*;
 use crate::run::*;

@@ -94,7 +94,7 @@ fn an_update_as_json() {
 }
 
 #[test]
-fn a_model_that_the_device_refuses_is_told_with_its_reason() {
+fn a_model_that_the_device_refuses_is_reported_with_its_reason() {
     let device = device(ModelSource::BuiltIn, 1, Outcome::AnotherSensor);
     let run = run(&["update", "model", MODEL, "--port", &device.port]);
     assert_eq!(run.code, Some(6));

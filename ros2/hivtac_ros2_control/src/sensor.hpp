@@ -1,4 +1,4 @@
-// A sensor of ros2_control: newest force at each read, NaN when there is none, a service for a
+// A sensor of ros2_control: newest force at each read, NaN without one, a service for a
 // tare.
 #pragma once
 

@@ -1,4 +1,4 @@
-//! Computes the force that explains the markers best, with the film run forwards.
+//! Computes the force that explains the markers best, by the forward model.
 
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
@@ -17,7 +17,7 @@ use hivtac_terms::units::{
     MicroNewtons, Micrometres, Px, SignedMicrometres, UnsignedMicroNewtons, UnsignedMilliDegrees,
 };
 
-/// Where a unit's markers rest, and what follows from that before the first frame.
+/// A unit's rest position, with the values derived from it before the first frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Resting {
     pub(super) mounting: Mounting,
@@ -40,8 +40,8 @@ const UNEXPLAINED_BLURRED: f32 = 5.0;
 /// parts of it; and of the place, µm.
 const OF_USE: (u32, u32, u32) = (10_000, 5, 1_500);
 /// A contact of unknown or wide shape this near to a marker, mm, moves it in ways that the tables
-/// of shapes do not have: by these factors the uncertainties of direction, |F| and place are too
-/// small. Chosen on presses beside markers (`hivtac-studies contacts --near-dots --seed 11`).
+/// of shapes do not have. The uncertainties of direction, |F| and place grow by these factors.
+/// Chosen on presses near markers (`hivtac-studies contacts --near-dots --seed 11`).
 const BESIDE_MM: f32 = 2.0;
 const BESIDE: [u32; 3] = [3, 4, 3];
 /// The same for a layout without a table of shapes or of widths, wherever it is pressed. Chosen on
@@ -296,8 +296,8 @@ impl Resting {
     }
 
     /// Returns whether a force that one contact explains badly may be given. The contact must not
-    /// be known to be a needle: what a needle leaves over is a fault. And the uncertainties,
-    /// widened by what is left over, must be of use.
+    /// be known to be a needle, whose residual shows a fault. And the uncertainties, widened by the
+    /// residual, must be of use.
     fn may_be_loose(&self, force: &Force) -> bool {
         let (direction, magnitude, place) = OF_USE;
         self.shape != ContactShape::Needle
@@ -358,7 +358,7 @@ impl Resting {
         (force, status)
     }
 
-    /// [`Self::estimate`] and [`Self::told`] in one, for a frame whose noise is as modelled.
+    /// [`Self::estimate`] and [`Self::force_and_status`] in one, for a frame whose noise is as modelled.
     pub fn force(
         &self,
         forward: &Forward<'_>,

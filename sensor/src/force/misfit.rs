@@ -1,11 +1,11 @@
-//! Measures how far pressed markers are from where any contact moves them.
+//! Measures errors of the markers' centres that change from place to place, by the residuals of
+//! presses.
 //!
-//! Some errors of a marker's centre stay for as long as the marker does: those of a camera whose
-//! pixels see one colour each, of a film through which the room is seen, and of whatever the model
-//! has otherwise than the unit. Two successive frames do not show them
-//! ([noise](super::NoiseLevel)). But they change once the markers have moved by some pixels, and a
-//! contact explains only five of the coordinates. So the mean of what presses at many places left
-//! unexplained is their variance.
+//! Some errors of a marker's centre last as long as the marker rests. They come from a camera whose
+//! pixels see one colour each, a film that shows the room, or differences of model and unit. Two
+//! successive frames do not show them ([noise](super::NoiseLevel)). But they change once the
+//! markers have moved by some pixels, and a contact explains only five of the coordinates. So the
+//! mean squared residual of presses at many places is their variance.
 
 use crate::force::forward::{Estimate, Markers, residual};
 use hivtac_terms::marker::Marker;
@@ -16,15 +16,15 @@ const APART_PX: f32 = 1.0;
 /// Presses of the mean, and of how many the model's word counts at first.
 const PRESSES: u8 = 32;
 const FIRST_PRESSES: u8 = 4;
-/// What presses leave unexplained is not all of the error: a contact explains the rest. By this
-/// factor the variance to expect is larger than the mean. That of the model's own unit is 0.7, and
-/// nearly always stays below 1 over this.
+/// A contact explains a part of the error, so the residual of presses is too small: the expected
+/// variance is this factor times the mean. For the model's own unit the mean is 0.7, and nearly
+/// always below 1 over this.
 const MARGIN: f32 = 1.25;
 /// Largest variance that is accepted, relative to the modelled one, and of a single press relative
 /// to the mean. Beyond it the residual no longer separates a needle from something else.
 const LARGEST: f32 = 4.0;
 
-/// What presses left unexplained up to now.
+/// Residuals of the presses until now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Misfit {
     /// Mean variance of the residual, relative to the modelled one.
@@ -51,7 +51,7 @@ impl Misfit {
         (MARGIN * self.variance).clamp(1.0, LARGEST)
     }
 
-    /// Call before a frame is measured. What was seen of it before is forgotten.
+    /// Call before a frame is measured. Discards an earlier measurement of the same frame.
     pub fn begin(&mut self) {
         self.now = None;
     }
@@ -109,15 +109,15 @@ mod tests {
     }
 
     #[test]
-    fn honest_presses_leave_the_variance_as_modelled() {
+    fn undisturbed_presses_leave_the_variance_as_modelled() {
         assert_eq!(after(0, 2.0, 1.0), 1.0);
         assert_eq!(after(100, 2.0, 0.7), 1.0);
     }
 
     #[test]
     fn what_presses_leave_is_known_after_a_few_and_limited() {
-        let told = after(8, 2.0, 2.4);
-        assert!((2.0..3.0).contains(&told), "{told}");
+        let reported = after(8, 2.0, 2.4);
+        assert!((2.0..3.0).contains(&reported), "{reported}");
         assert_eq!(after(1_000, 2.0, f32::MAX), LARGEST);
     }
 
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(after(100, 0.001, 2.4), after(1, 0.001, 2.4));
     }
 
-    /// What was measured ahead, and not at the end, does not count.
+    /// A press measured ahead counts only if it is the frame's last measurement.
     #[test]
     fn a_press_that_is_measured_anew_is_forgotten() {
         let mut misfit = Misfit::NONE;

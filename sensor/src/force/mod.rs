@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! 4 markers → 11 features → quantized MLP → (α, β, |F|) → force + status
-//!                              └→ first guess → film run forwards → force, place + status
+//!                              └→ first guess → forward model → force, place + status
 //! ```
 //!
 //! | module | subject |
@@ -10,7 +10,7 @@
 //! | `features`, `rest` | the paper's eleven numbers, and those of the untouched film |
 //! | `model`, `layer`, `packing` | the model file |
 //! | `network`, `rescale` | the quantized network |
-//! | `forward` | the film run forwards, and Gauss–Newton steps on it |
+//! | `forward` | the forward model of the film, and Gauss–Newton steps on it |
 //! | `contact`, `explained`, `noise`, `misfit`, `place` | the answer: force, uncertainty, status |
 //! | `kernels` | the hottest loops, in assembly for Cortex-M4 and M7 |
 //!

@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn an_input_at_its_limit_is_told() {
+    fn an_input_at_its_limit_is_reported() {
         let mut spec = spec(&[11, 3]);
         spec.input.mean = spec.rest.features;
         spec.input.multipliers = [1; FEATURES];
@@ -345,9 +345,14 @@ mod tests {
             rect_center: (Px(x), Px(0)),
             ..Features::default()
         };
-        let told = |x| check(&spec, &at(x), &at(0)).input_saturated;
-        assert!(!told(2 * 32_766) && told(2 * 32_767) && told(-2 * 32_768) && told(i32::MAX));
-        assert!(!told(-2 * 32_767));
+        let reported = |x| check(&spec, &at(x), &at(0)).input_saturated;
+        assert!(
+            !reported(2 * 32_766)
+                && reported(2 * 32_767)
+                && reported(-2 * 32_768)
+                && reported(i32::MAX)
+        );
+        assert!(!reported(-2 * 32_767));
     }
 
     proptest! {

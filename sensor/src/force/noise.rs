@@ -1,10 +1,10 @@
-//! Measures how noisy frames are, from what the film leaves unexplained in two successive frames.
+//! Measures the noise of frames, by the residuals of two successive frames.
 //!
 //! N markers have 2·N coordinates, and a load explains five of them. The others, three of four
-//! markers, are left over, whatever the load is. An object on the film or a model error leaves
-//! nearly the same there in two successive frames, 6 ms apart; noise leaves independent values. So
+//! markers, are residuals, whatever the load is. An object on the film or a model error gives
+//! nearly the same residuals in two successive frames, 6 ms apart; noise gives independent ones. So
 //! half the squared difference of two frames is the variance of noise alone. It shows little light,
-//! a high gain or flickering specks, but no force, not even a fast one.
+//! a high gain or flickering specks, but not even a fast force.
 
 use super::misfit::Misfit;
 use crate::force::forward::{Column, Estimate, residual, square};
@@ -24,10 +24,10 @@ const LASTING_SCATTER: f32 = 0.15;
 /// A shift of a marker, px, that noise may seem to make (seen: 0.008). It is less than the noise of
 /// a marker's place.
 const EVEN_PX: f32 = 0.01;
-/// The shift is known to a factor of this: it depends on colours that were not looked at, and on
-/// how sharp the marker's edge is.
+/// The shift is uncertain by this factor: it depends on unknown colours and on the sharpness of the
+/// marker's edge.
 const UNKNOWN_COLOUR: f32 = 1.25;
-/// What shows through the film and makes a marker this uncertain, 0.03 px, disturbs a frame.
+/// A frame is disturbed if light through the film makes a marker this uncertain, 0.03 px.
 const DISTURBED: Px = Px(1_966);
 /// Largest variance that is accepted, relative to the modelled one. Beyond it the residual no
 /// longer separates good frames from bad. A camera with 4 times the noise reaches 7.
@@ -42,7 +42,7 @@ pub struct FrameNoise {
     pub blur: Px,
     /// Another one, of markers whose motion changes (`Motion::unsteadiness`).
     pub motion: Px,
-    /// Another one, of markers beside which something shows through the film.
+    /// Another one, of markers next to which something shows through the film.
     pub beside: Px,
 }
 
@@ -55,7 +55,7 @@ impl FrameNoise {
         beside: Px(0),
     };
 
-    /// Whether what shows through the film is more than noise.
+    /// Whether light through the film disturbs it.
     pub fn is_disturbed(&self) -> bool {
         self.beside >= DISTURBED
     }
@@ -75,9 +75,9 @@ pub struct NoiseLevel {
     lasting: f32,
     /// Uncertainty of the current frame's markers by their motion.
     motion: Px,
-    /// And by what shows through the film beside them.
+    /// And by light through the film next to them.
     beside: Px,
-    /// What stays for as long as the markers do.
+    /// Errors that last as long as the markers rest.
     misfit: Misfit,
 }
 
@@ -109,8 +109,8 @@ impl NoiseLevel {
         self.motion = motion;
     }
 
-    /// Sets the square of the largest shift of a marker of the current frame, px², by what shows
-    /// through the film beside it. Not inlined, so that it stays out of the near memory.
+    /// Sets the square of the largest shift of a marker of the current frame, px², by light through
+    /// the film next to it. Not inlined, so that it stays out of the near memory.
     #[inline(never)]
     pub fn set_beside(&mut self, shift_px2: f32) {
         let more = shift_px2 - EVEN_PX * EVEN_PX;
@@ -134,8 +134,8 @@ impl NoiseLevel {
         variance.clamp(1.0, LARGEST)
     }
 
-    /// Call before the blobs of a frame are measured. What was [seen](Self::saw) of the same frame
-    /// before more blobs came is forgotten.
+    /// Call before the blobs of a frame are measured. Discards what was [seen](Self::saw) of the
+    /// same frame before more blobs came.
     pub fn begin_measurement(&mut self) {
         self.now = None;
         self.misfit.begin();
@@ -149,7 +149,7 @@ impl NoiseLevel {
     }
 
     /// Takes a press of a frame with this expected `noise`, which explains the markers. While their
-    /// motion changes, the press says nothing of what stays.
+    /// motion changes, the press does not show lasting errors.
     pub fn saw_press(&mut self, noise: FrameNoise, estimate: &Estimate, markers: &[Marker]) {
         if noise.motion == Px(0) && noise.beside == Px(0) {
             self.misfit.saw(noise.times, estimate, markers);
@@ -236,9 +236,9 @@ mod tests {
         for times in [1.8f32, 3.0] {
             let (mut level, mut state) = (NoiseLevel::AS_MODELLED, 2);
             for k in 0..FOLLOWING {
-                let told = pushed(&mut level, &left(&mut state, times, 3.0));
-                let is_near = (0.6 * times..1.5 * times).contains(&told);
-                assert!(k < 32 || is_near, "{k}: {told} for {times}");
+                let reported = pushed(&mut level, &left(&mut state, times, 3.0));
+                let is_near = (0.6 * times..1.5 * times).contains(&reported);
+                assert!(k < 32 || is_near, "{k}: {reported} for {times}");
             }
             for _ in 0..64 {
                 pushed(&mut level, &left(&mut state, 1.0, 3.0));
@@ -253,8 +253,8 @@ mod tests {
     fn noise_a_little_larger_is_known_after_a_while() {
         let (mut level, mut state) = (NoiseLevel::AS_MODELLED, 4);
         for k in 0..FOLLOWING {
-            let told = pushed(&mut level, &left(&mut state, 1.4, 3.0));
-            assert!(k < 512 || told > 1.25, "{k}: {told}");
+            let reported = pushed(&mut level, &left(&mut state, 1.4, 3.0));
+            assert!(k < 512 || reported > 1.25, "{k}: {reported}");
         }
     }
 
@@ -266,8 +266,8 @@ mod tests {
             pushed(&mut level, &left(&mut state, 1.0, 0.0));
         }
         for jump in [8.0, 500.0] {
-            let told = pushed(&mut level, &left(&mut state, 1.0, jump));
-            assert!(told < 1.3, "{told}");
+            let reported = pushed(&mut level, &left(&mut state, 1.0, jump));
+            assert!(reported < 1.3, "{reported}");
         }
         // The frame after a pause has no predecessor to compare with.
         level.forget_frame();
@@ -284,8 +284,8 @@ mod tests {
         ) {
             let mut level = NoiseLevel::AS_MODELLED;
             for left in frames {
-                let told = pushed(&mut level, &Column::of(left));
-                prop_assert!((1.0..=LARGEST.sqrt()).contains(&told), "{told}");
+                let reported = pushed(&mut level, &Column::of(left));
+                prop_assert!((1.0..=LARGEST.sqrt()).contains(&reported), "{reported}");
             }
         }
     }

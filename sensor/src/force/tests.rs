@@ -254,7 +254,7 @@ fn trust_in_a_place() {
     spec.uncertainty.knots[0].place = Micrometres(800);
     let bytes = spec.encode().unwrap();
     let model = Model::parse(&bytes).unwrap();
-    let told = |newtons: i32, place: [i32; 2]| {
+    let reported = |newtons: i32, place: [i32; 2]| {
         let values = [0, 0, -newtons];
         let output = Output {
             place,
@@ -262,24 +262,24 @@ fn trust_in_a_place() {
         };
         of_outputs(&model, &output)
     };
-    let (force, status) = told(100_000, [-4_250, 4_250]);
+    let (force, status) = reported(100_000, [-4_250, 4_250]);
     let place = force.place.unwrap();
     assert_eq!((place.x.0, place.y.0, place.sigma.0), (-4_250, 4_250, 120));
     assert_eq!(of_contact(status), Status::OK);
     for place in [[-4_251, 0], [0, 4_251], [i32::MIN, i32::MAX]] {
         assert_eq!(
-            of_contact(told(100_000, place).1),
+            of_contact(reported(100_000, place).1),
             Status::PLACE_OUT_OF_RANGE
         );
     }
-    let (weak, status) = told(2_048, [9_000, 0]);
+    let (weak, status) = reported(2_048, [9_000, 0]);
     assert_eq!(weak.place.unwrap().sigma.0, 758);
     assert!(
         status.contains(Status::PLACE_OUT_OF_RANGE)
             == is_contact(weak.magnitude, weak.magnitude_sigma)
     );
     assert!(
-        !told(1_000, [9_000, 0])
+        !reported(1_000, [9_000, 0])
             .1
             .contains(Status::PLACE_OUT_OF_RANGE)
     );

@@ -1,4 +1,5 @@
-//! Tells two contacts in a frame that one does not explain, and follows them from frame to frame.
+//! Resolves two contacts in a frame that one does not explain, and follows them from frame to
+//! frame.
 
 use super::explained::{Resting, of_vector, rounded};
 use super::{Force, FrameNoise, trust};
@@ -15,7 +16,7 @@ const FORGOTTEN: u8 = 16;
 /// Frames between two looks for others that explain them as well.
 const LOOK_EVERY: u8 = 64;
 
-/// The size of a contact beside the other's below which it may have ended.
+/// The ratio of a contact's size to the other's below which it may have ended.
 const ENDED: f32 = 0.2;
 
 /// Two contacts that explain a frame together.
@@ -30,11 +31,11 @@ pub struct TwoContacts {
     pub status: Status,
 }
 
-/// What frames before tell of two contacts.
+/// Two contacts as known from earlier frames.
 #[derive(Clone, Copy, Debug)]
 pub struct Pairs {
     known: Option<PairEstimate>,
-    /// Frames since they explained one, and since others were looked for.
+    /// Frames since these explained one, and since the last search for others.
     missed: u8,
     looked: u8,
     /// A search under way, and the markers for which it looks.
@@ -44,7 +45,7 @@ pub struct Pairs {
     searches: bool,
 }
 
-/// How much may be done for a frame that one contact does not explain, and what is known of it.
+/// The work allowed for a frame that one contact does not explain, and the data about it.
 #[derive(Clone, Copy, Debug)]
 pub struct Means {
     /// Steps.
@@ -63,7 +64,7 @@ impl Pairs {
         searches: false,
     };
 
-    /// Takes a frame that one contact explains, or none at all.
+    /// Takes a frame that one contact explains, or that shows none.
     pub fn miss(&mut self) {
         self.search = None;
         self.pass();
@@ -116,13 +117,13 @@ impl Pairs {
         Some(estimate).filter(|estimate| estimate.is_explained() && estimate.solved.is_some())
     }
 
-    /// Whether contacts must be looked for: none are known, or others may be there as well.
+    /// Whether to search for contacts: none are known, or there may be others.
     fn must_look(&self) -> bool {
         let is_sure = |known: &PairEstimate| known.is_only || self.looked < LOOK_EVERY;
         self.search.is_none() && (self.missed > 0 || !self.known.as_ref().is_some_and(is_sure))
     }
 
-    /// Takes what a search found.
+    /// Takes the result of a search.
     fn take(&mut self, found: Option<Found>) {
         self.search = None;
         self.looked = 0;

@@ -1,19 +1,19 @@
-//! Looks at the film beside a marker: what shows through it there, on one side, shifts the marker.
+//! Compares the film on both sides of a marker: light through the film on one side shifts the
+//! marker.
 //!
-//! The weights of a marker's soft edge assume one film all around. Behind a film that lets light
-//! through, a fingertip or a red thing gives the film beside the marker weight of its own, and
-//! another brightness: pixels that the marker covers in part then weigh more or less than that
-//! part. So each pixel beside a blob has a *pull*: how far it moves the edge of a marker, up to a
-//! constant. A difference of pull between two sides shifts the centroid by what
-//! [`Beside::shift_px2`] tells. It does not know of what surrounds a marker evenly, which shifts
-//! nothing.
+//! The weights of a marker's soft edge assume an even film around it. Behind a film that lets light
+//! through, a fingertip or a red thing changes redness and brightness of the film next to the
+//! marker. Pixels that the marker covers in part then weigh more or less than that part. So each
+//! pixel next to a blob has a *pull*: how far it moves the edge of a marker, up to a constant. A
+//! difference of pull between two sides shifts the centroid ([`Beside::shift_px2`]). An even
+//! surrounding shifts nothing.
 
 use crate::markers::runs::Run;
 
 /// Steps of pull per pixel by which the edge moves: the weight of a pixel that a marker covers
 /// wholly.
 const PER_PX: f32 = 95.0;
-/// How far beside a run the film is seen, px: the lens smears a marker's edge less.
+/// Distance from a run at which the film is seen, px: more than the lens smears a marker's edge.
 const FAR_PX: u16 = 2;
 /// Pull by brightness, of 5 bits: −15.5 times its natural logarithm, and a constant. A film twice
 /// as bright on one side moves the edge there by 0.11 px, because weights are ratios to the red.
@@ -22,7 +22,7 @@ const BY_LEVEL: [u8; 32] = [
     3, 2, 2, 1, 1, 0,
 ];
 
-/// What weighs more is no film: a speck or another thing of a marker's colour, apart from it.
+/// Pixels of more weight are no film: a speck or another thing of a marker's colour.
 const MOST_WEIGHT: u8 = 64;
 
 /// Returns the pull of a pixel with this weight and brightness, of 5 bits: 0 to 160.
@@ -42,8 +42,8 @@ pub(super) fn by_weight(weight: u8) -> u8 {
     }
 }
 
-/// Sums of the pull beside the runs of a blob, of its even rows. Of a blob larger than any marker
-/// they may be modulo 2³².
+/// Sums of the pull next to the runs of a blob, of its even rows. For a blob larger than any marker
+/// they may wrap at 2³².
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Beside {
     /// On both sides.
@@ -62,7 +62,7 @@ impl Beside {
         by_row: 0,
     };
 
-    /// Returns whether the film beside this row is looked at: half of them are enough.
+    /// Returns whether the film next to this row is used: half of the rows suffice.
     #[inline(always)]
     pub(super) fn is_looked_at(y: u16) -> bool {
         y.is_multiple_of(2)
@@ -92,7 +92,7 @@ impl Beside {
     /// halves, right and left, they see nearly all, and of two halves above and below just half.
     pub fn shift_px2(&self, area: u32, [y0, y1]: [u16; 2]) -> f32 {
         let rows = (y0 + y0 % 2, y1 - y1 % 2);
-        // Twice the middle of the even rows: a constant pull then counts for nothing.
+        // Twice the middle of the even rows: a constant pull then cancels.
         let below = 2 * i64::from(self.by_row)
             - i64::from(self.both) * (i64::from(rows.0) + i64::from(rows.1));
         let area = area.max(1) as f32;
@@ -105,7 +105,7 @@ impl Beside {
     }
 }
 
-/// The columns beside a run in which the film is seen; `None` left of the picture.
+/// The columns next to a run in which the film is seen; `None` left of the picture.
 #[inline(always)]
 pub(super) fn columns(run: Run) -> (Option<u16>, u16) {
     (run.x0.checked_sub(FAR_PX), run.x1 + FAR_PX)

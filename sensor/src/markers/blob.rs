@@ -43,7 +43,7 @@ pub struct Blob {
     pub weight_x: u64,
     /// Σw·y.
     pub weight_y: u64,
-    /// What is beside it; [`Beside::NONE`] if pixels are not weighed.
+    /// The film next to it; [`Beside::NONE`] if pixels are not weighed.
     pub beside: Beside,
     /// Leftmost column.
     pub x0: u16,

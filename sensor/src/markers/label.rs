@@ -128,7 +128,7 @@ impl<const BLOBS: usize> Labeller<BLOBS> {
         }
     }
 
-    /// Looks beside the runs of row `y`, the last one that was pushed.
+    /// Adds the film next to the runs of row `y`, the last one that was pushed.
     #[inline(always)]
     pub fn look_beside(&mut self, y: u16, beside: impl Fn(Run) -> [u8; 2]) {
         let (_, Row { edges, labels }) = last_two(&mut self.rows, self.last);

@@ -1,4 +1,4 @@
-//! Names the markers that a frame does not show.
+//! The markers that a frame does not show.
 
 use hivtac_terms::marker::MOST_MARKERS;
 

@@ -9,7 +9,7 @@
 //! | `tables`, `formats`, `screen` | which pixels pass the threshold, and their weights |
 //! | `mask`, `dilate`, `history`, `runs` | rows of bits, and runs of them |
 //! | `label`, `moments`, `blob` | 8-connected runs, summed up |
-//! | `beside` | what shows through the film beside a blob |
+//! | `beside` | differences of the film on both sides of a blob |
 //! | `scanner` | from rows to blobs, as rows arrive |
 //! | `lost` | markers that a frame does not show |
 //! | `majority` | removes specks and holes from rows of bits |

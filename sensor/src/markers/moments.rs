@@ -40,7 +40,7 @@ pub struct Moments {
     weight: u32,
     weight_x: u64,
     weight_y: u64,
-    /// What is beside its even rows.
+    /// The film next to its even rows.
     pub beside: Beside,
     x0: u16,
     y0: u16,

@@ -14,7 +14,7 @@ const PIXELS_PER_RUN: u32 = 64;
 /// Runs that any frame may have.
 const FEWEST_RUNS: u32 = 64;
 
-/// What a frame looks like and how its markers are found.
+/// A frame's size and format, and how its markers are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Settings {
     /// Lens, frame size and markers.

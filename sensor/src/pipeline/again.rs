@@ -3,9 +3,9 @@
 //! If all rows of the frame are available once more, they are scanned with a mask that follows the
 //! light and has its specks removed
 //! ([`ScanSettings::cleaned`](crate::markers::scanner::ScanSettings)). The same rules judge the
-//! result, and the contact must explain all coordinates of the markers, which are less
-//! certain. So there is a second look only with a film run forwards. If the second look fails, the
-//! frame stays refused for its first reason.
+//! result, and the contact must explain all coordinates of the markers, which are less certain. So
+//! there is a second look only with a forward model. If the second look fails, the frame stays
+//! refused for its first reason.
 //!
 //! A second look gives a false marker a second chance to pass, and larger uncertainties explain
 //! more. So its result counts only if it also shows that specks or little light disturb the frame,

@@ -8,8 +8,8 @@
 use super::{Measurement, Prepared, Sensor};
 use crate::markers::tables::Table;
 
-/// With more blobs beside the markers, nothing is computed ahead; that bounds how often it is done
-/// in vain.
+/// With more blobs in addition to the markers, nothing is computed ahead, which bounds the wasted
+/// work.
 const MOST_BESIDE: usize = 4;
 
 /// The result of computing ahead.

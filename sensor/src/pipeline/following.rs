@@ -103,12 +103,13 @@ mod tests {
     fn shows_drift(sensor: &mut Sensor<'_>) {
         let mut unexplained = frame(None, TENTH);
         unexplained.status |= Status::UNEXPLAINED;
-        let told = (0..200).map(|number| sensor.follow(moment(number), &unexplained).tells_rest);
-        assert_eq!(told.filter(|told| *told).count(), 1);
+        let reported =
+            (0..200).map(|number| sensor.follow(moment(number), &unexplained).tells_rest);
+        assert_eq!(reported.filter(|reported| *reported).count(), 1);
     }
 
     #[test]
-    fn re_zeroing_can_be_off_and_is_told_when_it_moved() {
+    fn re_zeroing_can_be_off_and_is_reported_when_it_moved() {
         let at_rest = frame(Some(pressed(500, 100)), Px(3_000));
         let rezeroing = Rezero {
             after: Milliseconds(1_000),
@@ -135,7 +136,7 @@ mod tests {
     /// No force explains the untouched frames, but they show the drift. Neither a press nor a new
     /// model discards it; a tare does.
     #[test]
-    fn a_rest_that_moved_is_told_until_the_next_tare() {
+    fn a_rest_that_moved_is_reported_until_the_next_tare() {
         let mut sensor = tared();
         assert_eq!(sensor.rest_seen(), None);
         shows_drift(&mut sensor);

@@ -1,4 +1,4 @@
-//! Adapts to the way the sensor is held: the film hangs by its own weight.
+//! Adapts to the way the sensor is held, which changes the film's sag by its own weight.
 
 use super::Sensor;
 use crate::force::forward::{Gravity, Turned};
@@ -8,8 +8,8 @@ use crate::rezero::Tare;
 use hivtac_terms::down::{Direction, Down};
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
-    /// Sets what is known of gravity from the next frame on; call it between two frames. The
-    /// history of earlier frames is kept: a finger that turns goes on gripping.
+    /// Sets gravity, as far as known, from the next frame on; call it between two frames. The
+    /// history of earlier frames is kept, since a finger may turn while it grips.
     pub fn set_down(&mut self, down: Down) {
         if self.down != down {
             self.down = down;
@@ -19,7 +19,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
     }
 
-    /// What is known of gravity.
+    /// Gravity as far as known.
     pub fn down(&self) -> Down {
         self.down
     }

@@ -236,7 +236,7 @@ proptest! {
 
     /// A disc next to the four, larger, smaller or of their size, never moves them.
     #[test]
-    fn a_fifth_disc_is_told_apart_or_refused(
+    fn a_fifth_disc_is_distinguished_or_refused(
         x in 0.0..320.0f64,
         y in 0.0..240.0f64,
         diameter in 3.0..60.0f64,

@@ -59,7 +59,7 @@ pub struct Measurement {
     pub features: Option<Features>,
     /// The force; `None` exactly if `status` has a bit of [`Status::NO_FORCE`].
     pub force: Option<Force>,
-    /// The two contacts whose sum it is, if two press and are told apart; otherwise empty
+    /// The two contacts whose sum it is, if two press and are resolved; otherwise empty
     /// ([`Sensor::follow_two_contacts`]).
     pub contacts: ContactList,
 }
@@ -101,15 +101,15 @@ struct Prepared {
     finder: Finder,
     /// `None` without a rest position to compare with.
     trust: Option<Trust>,
-    /// `None` without a film run forwards.
+    /// `None` without a forward model.
     resting: Option<Resting>,
     /// The status bits that every frame has, whatever it shows.
     standing: Status,
     /// The rest position that frames are measured against.
     rest: Option<Rest>,
-    /// What the previous frame of a film of another layout showed.
+    /// The previous frame's result, for a film of another layout.
     before: placed::Before,
-    /// What this one shows, as far as its blobs are known.
+    /// This frame's result, from the blobs known until now.
     now: Option<placed::Before>,
 }
 
@@ -245,7 +245,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.prepare();
     }
 
-    /// Sets the shape of what presses from the next frame on; call it between two frames. A radius
+    /// Sets the contact's shape from the next frame on; call it between two frames. A radius
     /// outside [`ContactShape::RADII`] counts as [`ContactShape::Unknown`]. Initially it is
     /// [`ContactShape::Needle`].
     pub fn set_contact_shape(&mut self, shape: ContactShape) {
@@ -267,7 +267,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// The shape of what presses, as far as it is known.
+    /// The contact's shape, as far as known.
     pub fn contact_shape(&self) -> ContactShape {
         self.contact_shape
     }
@@ -403,8 +403,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         self.measurement(found)
     }
 
-    /// Forgets what a measurement ahead of the last blobs has left for later frames. They know of
-    /// no second look, which may come too late.
+    /// Discards the state that a measurement ahead of the last blobs left for later frames. They do
+    /// not use a second look, which may come too late.
     fn begin_measurement(&mut self) {
         if matches!(self.look, Look::Again) {
             return;
@@ -415,7 +415,7 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
         }
     }
 
-    /// Keeps what the frame's measurement has left for later frames.
+    /// Keeps the state that the frame's measurement left for later frames.
     fn end_measurement(&mut self) {
         self.noise.end_frame();
         if let Some(prepared) = self.prepared.as_mut()
@@ -587,11 +587,11 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
                 if !is_again {
                     self.noise.saw(noise, &estimate.left);
                 }
-                let told = resting.force_and_status(forward, &model.range, noise, &estimate);
-                if !is_again && is_a_press(told.1) {
+                let reported = resting.force_and_status(forward, &model.range, noise, &estimate);
+                if !is_again && is_a_press(reported.1) {
                     self.noise.saw_press(noise, &estimate, markers);
                 }
-                told
+                reported
             }
             None => force::of_outputs(model, &output),
         };
@@ -606,8 +606,8 @@ impl<'m, const BLOBS: usize, T: Table> Sensor<'m, BLOBS, T> {
     }
 }
 
-/// Returns the markers as [`Motion::at_the_middle`] does, and tells `noise` how uncertain their
-/// motion makes them.
+/// Returns the markers as [`Motion::at_the_middle`] does, and adds the uncertainty by their motion
+/// to `noise`.
 fn at_the_middle(
     motion: &Motion,
     noise: &mut NoiseLevel,

@@ -1,9 +1,9 @@
 //! Measures a film with another layout than the square of four dots.
 //!
-//! The rest position tells which marker is which, and the film run forwards explains them all.
-//! Five markers and more are more than a contact needs. So one or two may be lost: without an image
-//! of their own, or left out because no contact explains them with the others. The force goes on
-//! from the others ([`Status::MARKER_LOST`]), with its own uncertainty.
+//! The rest position identifies each marker, and the forward model explains them all. Five or more
+//! markers are redundant, so one or two may be lost: without an image of their own, or left out
+//! because no contact explains them with the others. The force then comes from the others
+//! ([`Status::MARKER_LOST`]), with its own uncertainty.
 
 use super::again::BLUR;
 use super::{Look, Measurement, Prepared, Sensor, at_the_middle, is_a_press};
@@ -28,7 +28,7 @@ const SUSPECTS: usize = 3;
 /// explained: in each second one something. All of it takes longer than a frame.
 const ATTEMPTS: u8 = 2 * (SUSPECTS as u8 + 3);
 
-/// What the previous frame showed: where the steps of the next one begin.
+/// The previous frame's result, where the steps of the next one begin.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Before {
     /// The load that explained its markers; `None` if no load did.
@@ -50,7 +50,7 @@ struct Refused {
     count: u8,
 }
 
-/// What is tried of a frame that follows one which no load explains.
+/// The attempts at a frame that follows an unexplained one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Attempt {
     /// Steps from the load of the frame before, and nothing else.
@@ -81,7 +81,7 @@ impl Before {
         self.is_disturbed || count == 0 || count % ATTEMPTS == 2
     }
 
-    /// What to try next; `None` after a frame that a load explained.
+    /// The next attempt; `None` after a frame that a load explained.
     fn attempt(&self) -> Option<(Pose, Attempt)> {
         let Refused { load, count } = self.refused?;
         let attempt = match count % ATTEMPTS {
@@ -251,7 +251,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     }
 }
 
-/// The markers of a frame, and what they are measured by.
+/// The markers of a frame, with the settings for their measurement.
 struct Seen<'a> {
     forward: &'a Forward<'a>,
     resting: &'a Resting,

@@ -178,7 +178,7 @@ fn a_calibrated_unit_is_not_called_uncalibrated() {
 
 /// At rest the force is all Fz; the second number is its uncertainty.
 #[test]
-fn a_contact_is_told_from_two_millinewtons_on_when_they_are_certain() {
+fn a_contact_is_reported_from_two_millinewtons_on_when_they_are_certain() {
     for (press, sigma, expected) in [
         (100_000, 800, true),
         (2_000, 600, true),
@@ -197,8 +197,8 @@ fn a_contact_is_told_from_two_millinewtons_on_when_they_are_certain() {
             },
             |sensor| {
                 let seen = shifted(0.0, 0.0).feed(sensor);
-                let told = seen.status.contains(Status::CONTACT);
-                assert_eq!(told, expected, "{press} µN ± {sigma} µN: {seen:?}");
+                let reported = seen.status.contains(Status::CONTACT);
+                assert_eq!(reported, expected, "{press} µN ± {sigma} µN: {seen:?}");
             },
         );
     }
@@ -380,7 +380,7 @@ fn frames_that_are_not_whole_give_no_force() {
 }
 
 #[test]
-fn too_many_blobs_are_told() {
+fn too_many_blobs_are_reported() {
     let mut picture = shifted(0.0, 0.0);
     for index in 0..80 {
         picture.disc(

@@ -2,13 +2,13 @@
 //! peeled off.
 //!
 //! Three markers have six coordinates, a contact has five unknowns. One redundant coordinate is
-//! left: what displaces a second marker is hardly noticed. So such a force has
-//! [`Status::MARKER_LOST`]. Its measurement has neither markers nor features, so it is no frame for
-//! a tare, for re-zeroing, or for the noise level.
+//! left, which hardly shows a displaced second marker. So such a force has [`Status::MARKER_LOST`].
+//! Its measurement has neither markers nor features, so tare, re-zeroing and noise level do not use
+//! it.
 //!
-//! It needs a rest position of this unit, which tells which three are seen, and a film run
-//! forwards. A frame that three markers do not explain stays refused for its first reason, as does
-//! a contact near the lost marker: the others hardly see it.
+//! It needs a forward model, and a rest position of this unit, which identifies the three. A frame
+//! that three markers do not explain stays refused for its first reason, as does a contact near the
+//! lost marker: the others hardly see it.
 
 use super::{Measurement, Sensor, at_the_middle};
 use crate::markers::lost::Lost;

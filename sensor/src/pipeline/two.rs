@@ -1,7 +1,7 @@
-//! Tells two contacts in a frame that one does not explain.
+//! Resolves two contacts in a frame that one does not explain.
 //!
-//! To find them takes many times as long as a force. A device does it in parts: it looks for them
-//! over some frames, and then follows them with one step a frame.
+//! Finding them takes many times as long as a force. A device does it in parts, over some frames,
+//! and then follows them with one step a frame.
 
 use super::again::Look;
 use super::{Measurement, Prepared, Sensor};
@@ -16,9 +16,9 @@ use hivtac_terms::units::Px;
 
 impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     /// Returns the two needles that explain a measurement of this sensor which is
-    /// [`Status::UNEXPLAINED`]. Returns `None` if two do not explain it either; if a marker is
-    /// lost; if [what presses](Self::set_contact_shape) is not known to be a needle; or if two
-    /// contacts on this layout are not known. Known is the layout `8v`.
+    /// [`Status::UNEXPLAINED`]. Returns `None` if two do not explain it either, a marker is lost,
+    /// the [contact](Self::set_contact_shape) is not known to be a needle, or the layout is not
+    /// `8v`.
     pub fn two_contacts(&self, measurement: &Measurement) -> Option<TwoContacts> {
         let seen = Seen {
             model: self.model.as_ref()?,
@@ -52,7 +52,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
     }
 }
 
-/// What measurements are made by.
+/// The settings for a measurement.
 struct Seen<'a, 'm> {
     model: &'a Model<'m>,
     prepared: &'a Prepared,

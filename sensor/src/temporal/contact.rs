@@ -61,7 +61,7 @@ mod tests {
             let seen = frame(Some(force), Px(0));
             contact.follow(&ContactLimits::default(), time_us, &seen)
         });
-        frames.map(|told| told.unwrap()).collect()
+        frames.map(|reported| reported.unwrap()).collect()
     }
 
     #[test]
@@ -92,8 +92,8 @@ mod tests {
         for (bit, expected) in [(Status::OK, false), (Status::CONTACT, true)] {
             seen.status |= bit;
             let mut contact = Contact::NONE;
-            let told = contact.follow(&ContactLimits::default(), 0, &seen);
-            assert_eq!(told, Some(expected));
+            let reported = contact.follow(&ContactLimits::default(), 0, &seen);
+            assert_eq!(reported, Some(expected));
         }
     }
 
@@ -106,8 +106,8 @@ mod tests {
             let mut contact = Contact::NONE;
             assert_eq!(contact.follow(&limits, 0, &first), Some(true));
             assert_eq!(contact.follow(&limits, 50_000, &none), None);
-            let told = contact.follow(&limits, later_us, &between);
-            assert_eq!(told, Some(expected), "{later_us}");
+            let reported = contact.follow(&limits, later_us, &between);
+            assert_eq!(reported, Some(expected), "{later_us}");
         }
     }
 }

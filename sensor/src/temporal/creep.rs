@@ -1,4 +1,4 @@
-//! Removes from each force what the film remembers of its earlier loads.
+//! Subtracts from each force the film's creep by its earlier loads.
 //!
 //! A linear viscoelastic film responds like an elastic one to F + Σ part · q. Each q follows the
 //! load F with its own time constant (a Prony series of two terms: Park and Schapery, *Int. J.

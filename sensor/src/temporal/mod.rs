@@ -1,5 +1,4 @@
-//! Follows forces from frame to frame: the film's memory of its loads, contact, slip, the filter,
-//! and the output pin.
+//! Follows forces from frame to frame: creep, contact, slip, the filter, and the output pin.
 //!
 //! Every decision uses the frames' own times, so it is the same at any frame rate and across lost
 //! frames. State and work are bounded. Contact and slip depend on each frame's own force, not on

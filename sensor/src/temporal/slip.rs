@@ -12,12 +12,11 @@
 //!
 //! with the smaller |F| of the two frames, ΔF the vector between their forces, and σ the place's
 //! stated uncertainty. The places of a frame whose markers change their motion are less certain
-//! than those of the steady frames beside it: for either frame, that difference of σ is added.
-//! It must also have moved by three times the noise of the frames between: the
-//! mean length of the place's second differences, which are 0 in a steady motion. A slip begins
-//! with the second such frame in a row: when a force begins to change, a rolling shutter gives one
-//! frame whose markers do not move as before. While it slips, three fifths of the distance are
-//! enough.
+//! than those of its steady neighbours: for either frame, that difference of σ is added. It must
+//! also have moved by three times the noise of the frames between: the mean length of the place's
+//! second differences, which are 0 in a steady motion. A slip begins with the second such frame in
+//! a row: when a force begins to change, a rolling shutter gives one frame whose markers do not
+//! move as before. While it slips, three fifths of the distance are enough.
 
 use super::SlipLimits;
 use crate::force::Force;
@@ -293,7 +292,7 @@ mod tests {
     /// little of the unit.
     #[test]
     fn what_the_model_does_not_know_does_not_slip() {
-        let told = |sigma: u32| {
+        let reported = |sigma: u32| {
             let mut slip = Slip::NONE;
             (0..40).any(|k: i32| {
                 let force = at(
@@ -309,14 +308,14 @@ mod tests {
                 slip.follow(&LIMITS, 6_405 * k as u64, Some(&force), Some(true))
             })
         };
-        assert!(!told(250));
-        assert!(told(3), "a model that knows the place");
+        assert!(!reported(250));
+        assert!(reported(3), "a model that knows the place");
     }
 
     /// A hit: for two frames the place is 200 µm off, as their stated uncertainty allows.
     #[test]
     fn places_of_uncertain_frames_do_not_slip() {
-        let told = |sigma: u32| {
+        let reported = |sigma: u32| {
             let mut slip = Slip::NONE;
             (0..40).any(|k: i32| {
                 let is_hit = k == 20 || k == 21;
@@ -329,19 +328,19 @@ mod tests {
                 slip.follow(&LIMITS, 6_405 * k as u64, Some(&force), Some(true))
             })
         };
-        assert!(told(5));
-        assert!(!told(150));
+        assert!(reported(5));
+        assert!(!reported(150));
     }
 
     #[test]
     fn noise_does_not_slip() {
         let mut slip = Slip::NONE;
         // 100 µm from frame to frame.
-        let told = (0..60).any(|k: u64| {
+        let reported = (0..60).any(|k: u64| {
             let x = if k.is_multiple_of(2) { 100 } else { 0 };
             slip.follow(&LIMITS, 6_405 * k, Some(&at(x, PULLED)), Some(true))
         });
-        assert!(!told);
+        assert!(!reported);
     }
 
     #[test]
@@ -386,8 +385,8 @@ mod tests {
                 };
                 let force = Force { place: Some(place), ..force };
                 let touched = [None, Some(false), Some(true)][usize::from(touched)];
-                let told = slip.follow(&limits, time_us, Some(&force), touched);
-                prop_assert!(!told || touched == Some(true));
+                let reported = slip.follow(&limits, time_us, Some(&force), touched);
+                prop_assert!(!reported || touched == Some(true));
                 prop_assert!(slip.count <= FRAMES);
             }
         }

@@ -138,15 +138,15 @@ fn settings_that_are_none_change_nothing_and_others_begin_anew() {
 #[test]
 fn what_a_film_may_remember_is_no_contact() {
     let mut temporal = Temporal::new();
-    let mut told = |number: u32, force: i32| {
+    let mut reported = |number: u32, force: i32| {
         let mut seen = frame(Some(pressed(force, 100)), Px(0));
         seen.status |= Status::CONTACT;
         let followed = temporal.follow(moment(number), &seen);
         followed.status.contains(Status::CONTACT)
     };
-    assert!((0..9_400).all(|number| told(number, 100_000)));
-    assert!(!told(9_400, 4_000));
-    assert!(told(9_401, 30_000));
+    assert!((0..9_400).all(|number| reported(number, 100_000)));
+    assert!(!reported(9_400, 4_000));
+    assert!(reported(9_401, 30_000));
 }
 
 /// The mean place of two contacts moves with their forces, though neither does.

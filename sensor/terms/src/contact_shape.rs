@@ -1,8 +1,8 @@
-//! Defines the shape of what presses the film, as far as it is known.
+//! Defines the shape of what presses the film, as far as known.
 
 use crate::units::Micrometres;
 
-/// The shape of what presses. Displacements, and what is uncertain of them, depend on it.
+/// The contact's shape. Displacements and their uncertainty depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",

@@ -1,6 +1,6 @@
 //! Defines which way the sensor is held: where gravity pulls on its film.
 
-/// What is known of gravity on a sensor.
+/// Gravity on a sensor, as far as known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(
     feature = "wire",

@@ -38,15 +38,15 @@ pub struct Force {
     pub torque: Option<Torque>,
 }
 
-/// Most contacts that are told apart.
+/// Most contacts that are resolved.
 pub const MOST_CONTACTS: usize = 2;
 
 /// The contacts that a frame's force is the sum of, if there are several.
 pub type ContactList = List<Force, MOST_CONTACTS>;
 
 /// Returns each contact of a frame with this status, each with its force and place. Two are the
-/// `parts` of the frame's force, one is that force itself. There is none without a force or a
-/// contact, or if two contacts are not told apart.
+/// `parts` of the frame's force, one is that force itself. The result is empty without a force or a
+/// contact, or if two contacts are not resolved.
 pub fn contacts<'a>(
     status: Status,
     force: Option<&'a Force>,

@@ -66,7 +66,7 @@ impl<T: Copy + Default, const MOST: usize> List<T, MOST> {
         }
     }
 
-    /// The item with this index; the default if there is none.
+    /// The item with this index, or the default.
     #[inline]
     pub fn at(&self, index: usize) -> T {
         self.get(index).copied().unwrap_or_default()
@@ -84,7 +84,7 @@ impl<T: Copy + Default, const MOST: usize> List<T, MOST> {
         (self.count == N).then(|| self.array())
     }
 
-    /// A list of what `change` makes of each item.
+    /// A list of `change` applied to each item.
     #[inline]
     pub fn map<U: Copy + Default>(&self, mut change: impl FnMut(T) -> U) -> List<U, MOST> {
         let mut list = List::defaults(self.count);

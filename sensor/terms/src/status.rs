@@ -57,7 +57,7 @@ bits! {
     MODEL_MISMATCH = 15, "model_mismatch";
     /// Something touches the film ([`ContactLimits`](crate::temporal::ContactLimits)).
     CONTACT = 16, "contact";
-    /// What touches the film slips ([`SlipLimits`](crate::temporal::SlipLimits)).
+    /// The contact slips ([`SlipLimits`](crate::temporal::SlipLimits)).
     SLIP = 17, "slip";
     /// The direction is outside the range that the model was calibrated for: too much force along
     /// the film for the force into it.
@@ -69,8 +69,8 @@ bits! {
     /// Re-zeroing has moved the rest position from where it was taken.
     REZEROED = 21, "rezeroed";
     /// The frame has specks or little light, and its markers were found by a second look; or the
-    /// film beside a marker looks different on one side, by what shows through it or mirrors on it.
-    /// The standard uncertainties are larger.
+    /// film next to a marker looks different on one side, by light through it or a reflection. The
+    /// standard uncertainties are larger.
     FRAME_DISTURBED = 22, "frame_disturbed";
     /// The untouched film was last seen away from its rest position; standard uncertainties include
     /// that.
@@ -80,7 +80,7 @@ bits! {
     /// include it.
     WEIGHT_UNKNOWN = 24, "weight_unknown";
     /// One contact explains the markers' positions badly, so standard uncertainties are widened by
-    /// what is left over.
+    /// the residual.
     LOOSELY_EXPLAINED = 25, "loosely_explained";
     /// A marker is not seen, or is plainly faulty. The force is that of the others; with four
     /// markers nothing checks it.
@@ -89,7 +89,7 @@ bits! {
     /// layout than the model's.
     ANOTHER_LAYOUT = 27, "another_layout";
     /// Two contacts press: the force is their sum, its place their mean by their forces. Each is
-    /// known if they are told apart.
+    /// known if they are resolved.
     TWO_CONTACTS = 28, "two_contacts";
 }
 

@@ -1,5 +1,5 @@
-//! Defines how forces are processed from frame to frame: contact, slip, filter, re-zeroing, and the
-//! film's memory. Their limits are settings that a device keeps.
+//! Defines how forces are processed from frame to frame: contact, slip, filter, re-zeroing, and
+//! creep. Their limits are settings that a device keeps.
 
 use crate::units::{
     Micrometres, MilliPx, Milliseconds, Permille, SmallPermille, UnsignedMicroNewtons,

@@ -1,4 +1,4 @@
-//! Presses by objects that are no needles, by the full solver, and what the sensing makes of them.
+//! The sensing's answers to presses by objects other than needles, solved by finite elements.
 
 mod objects;
 mod reading;
@@ -24,12 +24,11 @@ use objects::{KINDS, Kind, Press, presses};
 use reading::Reader;
 use row::Row;
 
-/// Press the film with discs, faces, pads, cylinders and balls, and see what the sensor makes of
-/// it.
+/// Press the film with discs, faces, pads, cylinders and balls, and measure the sensor's errors.
 #[derive(Args)]
 pub struct Contacts {
-    /// A weights file with its film: of a network that tells places, or of another layout of dots,
-    /// whose results are printed and no page.
+    /// A weights file with its film: of a network with places, or of another layout of dots, whose
+    /// results are printed and no page.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Presses of each kind.
@@ -47,7 +46,7 @@ pub struct Contacts {
     /// Print one JSON object.
     #[arg(long)]
     json: bool,
-    /// Press only beside dots, where they bend most.
+    /// Press only near dots, where they bend most.
     #[arg(long)]
     near_dots: bool,
 }
@@ -130,7 +129,7 @@ fn rows_of<'a>(
     Ok(rows)
 }
 
-/// What the sensor is told of what presses.
+/// The sensor's setting of the contact's shape.
 #[derive(Clone, Copy)]
 enum Setting {
     /// Nothing.

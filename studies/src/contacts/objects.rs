@@ -1,4 +1,4 @@
-//! Draws objects that press the film, and solves what they do to it, with the truth.
+//! Draws objects that press the film, and solves the film under them, with the truth.
 
 use anyhow::{Context, Result};
 use hivtac_shell::{Body, Ends, Equilibrium, Film, Patch, Shape};
@@ -16,7 +16,7 @@ use crate::press::{ANGLE_DEG, REACH_MM, seeded};
 const FORCES_N: [f64; 2] = [0.02, 0.25];
 /// The largest tilt of a face, degrees.
 const TILT_DEG: f64 = 5.0;
-/// How far from a dot's centre presses beside a dot are at most along x and along y, mm.
+/// Largest distance of presses near a dot from its centre, along x and along y, mm.
 const BESIDE_MM: f64 = 1.5;
 /// Radii of flat faces, of cylinders and of balls, mm.
 const FACES_MM: [f64; 2] = [1.0, 3.0];
@@ -65,7 +65,7 @@ pub const KINDS: [Kind; 13] = [
     Kind::TurnedDisc([1.0, 2.5]),
 ];
 
-/// What presses.
+/// The object that presses.
 enum Object {
     /// A pressure that is known before.
     Patch(Patch),
@@ -78,7 +78,7 @@ enum Object {
 pub struct Press {
     /// The object's kind.
     pub kind: Kind,
-    /// Its shape, if the sensor can be told.
+    /// Its shape, if the sensor has a setting for it.
     pub shape: Option<ContactShape>,
     /// The film under it.
     pub state: Equilibrium,
@@ -91,9 +91,9 @@ pub struct Press {
     pub centre_mm: [f64; 2],
 }
 
-/// Solves presses of all kinds on a film, so many of each, on all threads. They come by kind, in
-/// the order of [`KINDS`], each kind in the order of its draws, anywhere or beside dots only. A
-/// press is left out if the contact reaches too far for the solver; it is told on stderr.
+/// Solves presses of all kinds on a film, `of_each` of each, on all threads. They come by kind, in
+/// the order of [`KINDS`], each kind in the order of its draws, anywhere or near dots only. A press
+/// whose contact reaches too far for the solver is left out, and named on stderr.
 pub fn presses(film: &Film, of_each: u32, seed: u64, near_dots: bool) -> Vec<Press> {
     let draws = KINDS
         .into_iter()
@@ -154,7 +154,7 @@ impl Kind {
     }
 
     /// Draws press `number` of this kind and solves it: the same for the same seed, however many
-    /// are drawn. Its place is anywhere within [`REACH_MM`], or [beside a dot](beside_a_dot).
+    /// are drawn. Its place is anywhere within [`REACH_MM`], or [near a dot](beside_a_dot).
     ///
     /// # Errors
     /// If the film finds no rest under it.

@@ -53,7 +53,7 @@ impl<'m> Reader<'m> {
     }
 
     /// Returns the sensor's measurements of the frames of the press with this number, with each of
-    /// these settings of what presses. All settings see the same frames.
+    /// these contact settings. All settings see the same frames.
     ///
     /// # Errors
     /// If the model does not fit the frames.
@@ -97,7 +97,7 @@ mod tests {
     use hivtac_shell::Design;
     use std::path::Path;
 
-    /// A needle that presses hard beside a dot bends it more than anything else.
+    /// A needle that presses hard near a dot bends it more than anything else.
     #[test]
     #[ignore = "10 s: frames with rims by the film"]
     fn a_dot_that_a_needle_bends_is_still_a_marker() {

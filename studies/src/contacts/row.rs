@@ -16,7 +16,7 @@ use crate::press::{Judged, judged};
 /// The stated 95 % of a torque, in standard uncertainties.
 const TORQUE_BOUND: f64 = 1.960;
 
-/// What the sensor made of the frames of a kind of presses.
+/// The sensor's answers to the frames of a kind of presses.
 #[derive(Debug, Default, Serialize)]
 pub struct Row {
     kind: String,

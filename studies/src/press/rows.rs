@@ -23,7 +23,7 @@ pub struct Errors {
     within: [u32; 3],
 }
 
-/// What a force states of its direction (degrees), |F| (mN) and place (µm).
+/// A force's stated uncertainties of direction (degrees), |F| (mN) and place (µm).
 pub struct Judged {
     /// Errors; that of |F| is positive if it is too large.
     pub errors: [f64; 3],
@@ -33,7 +33,7 @@ pub struct Judged {
 
 /// Compares a force with the true one, N, and its place, mm; a force without a place is an error.
 pub fn judged(force: &Force, truth_n: [f64; 3], truth_mm: [f64; 2]) -> Result<Judged> {
-    let place = force.place.context("the model tells no places")?;
+    let place = force.place.context("the model gives no places")?;
     let found_n = force.cartesian.map(|part| f64::from(part.0) * 1e-6);
     let [x, y] = [place.x, place.y].map(|part| f64::from(part.0));
     Ok(Judged {

@@ -16,11 +16,11 @@ use crate::press::REACH_MM;
 const CAMERAS: [(Preset, u16, u16); 2] = [(Preset::Ov7725, 320, 240), (Preset::Mt9v034, 160, 152)];
 /// Presses along each axis, from −[`REACH_MM`] to it, for the film's lowest surface.
 const PRESSES: i32 = 4;
-/// Distances from the middle at which that surface is told: the first, the step and their number,
-/// mm.
+/// Distances from the middle at which that surface is printed: the first, the step and their
+/// number, mm.
 const STEP_MM: f64 = 1.0;
 const STEPS: i32 = 14;
-/// Directions in which it is looked at.
+/// Number of directions in which it is measured.
 const RAYS: i32 = 24;
 
 /// Arguments of `scene dimensions`.

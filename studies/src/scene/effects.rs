@@ -1,5 +1,5 @@
-//! `scene effects`: what a film that lets light through, LEDs that mirror themselves, and the
-//! pixels of a colour camera cost.
+//! `scene effects`: the errors by a film that lets light through, by mirrored LEDs, and by the
+//! pixels of a colour camera.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -41,10 +41,10 @@ pub struct Effects {
     json: bool,
 }
 
-/// An effect: its group, what is switched, and the options of the tare and of the presses.
+/// An effect: its group, its switch, and the options of the tare and of the presses.
 type Effect = (&'static str, String, Options, Options);
 
-/// What one effect costs.
+/// The errors by one effect.
 #[derive(Serialize)]
 struct Row {
     effect: &'static str,
@@ -133,8 +133,8 @@ fn none() -> Vec<Effect> {
     vec![("none", "the usual scene".into(), usual.clone(), usual)]
 }
 
-/// Options of a film that lets this part of the light through, in a room of this brightness, of
-/// which a camera exposed the picture with its gain, or this one.
+/// Options of a film that lets this part of the light through, in a room of this brightness. The
+/// camera finds its gain, or has this one.
 fn through(transmission: f64, brightness: f64, gain: Option<f64>) -> Options {
     let seen = 1.0 - transmission + transmission * brightness;
     Options {

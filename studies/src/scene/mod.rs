@@ -9,7 +9,7 @@ mod tolerances;
 use anyhow::Result;
 use clap::Subcommand;
 
-/// Look at the simulated sensor: its frames, its lengths and what each of these costs.
+/// The simulated sensor: its frames, its lengths, and the errors by each of these.
 #[derive(Subcommand)]
 pub enum SceneCommand {
     /// Render one frame of a scene as a PNG picture.

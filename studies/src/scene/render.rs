@@ -30,8 +30,7 @@ pub struct RenderArgs {
     /// Draw a cross at the true centroid of every marker, and its identity.
     #[arg(long)]
     overlay: bool,
-    /// Seconds from the beginning of the scene; if not given 0, and for hard cases what their sheet
-    /// shows.
+    /// Seconds from the beginning of the scene; 0 by default, for hard cases as on their sheet.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     at: Option<f64>,
     /// The frame's number: it selects the noise.

@@ -1,4 +1,4 @@
-//! `scene tolerances`: what each dimension of the kit costs when it is off by its tolerance.
+//! `scene tolerances`: the errors by each dimension of the kit at its tolerance.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -32,7 +32,7 @@ const TIP_MM: f64 = 0.5;
 /// Arguments of `scene tolerances`.
 #[derive(Args)]
 pub struct Tolerances {
-    /// A weights file of a network that tells places, with its film.
+    /// A weights file of a network with places, with its film.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Presses on each unit.
@@ -57,7 +57,7 @@ struct Built {
     jig: Jig,
 }
 
-/// A dimension: its name, how far it is off, and a unit with it so.
+/// A dimension: its name, its error, and a unit with that error.
 type Dimension = (&'static str, &'static str, fn(&mut Built));
 
 /// The dimensions of units with the film of the simulated sensor's tables, and none.

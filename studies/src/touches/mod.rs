@@ -1,4 +1,4 @@
-//! Two contacts at once on a layout of more dots, and what is neither one nor two.
+//! The sensing's answers to two contacts at once on a layout of more dots, and to other presses.
 
 mod presses;
 mod row;
@@ -27,12 +27,12 @@ use crate::press::{normal, seeded};
 use presses::{Kind, Press};
 use row::{OtherRow, Outcome, PairRow};
 
-/// Noise of each coordinate of a centroid, px: what the simulated camera's frames have.
+/// Noise of each coordinate of a centroid, px, as in the simulated camera's frames.
 const NOISE_PX: f64 = 0.011;
 /// Fineness of the mesh: dots are within 0.002 px of a mesh of half the cells' size.
 const FINENESS: f64 = 1.0;
 
-/// The network of two contacts, and the bytes at its end that say what it leaves.
+/// The network of two contacts, and the number of bytes at its end that hold its errors.
 const NETWORK: &[u8] = include_bytes!("../../../sensor/data/pairs-8v.bin");
 const LEFT_BYTES: usize = 4 * 16 * 17 / 2;
 /// Frames of each press of one needle or ball.
@@ -64,7 +64,7 @@ pub struct Touches {
     json: bool,
 }
 
-/// The sensor's film run forwards, with centroids in place of frames.
+/// The sensor's forward model, with centroids in place of frames.
 struct Bench<'a> {
     forward: Forward<'a>,
     mounting: Mounting,

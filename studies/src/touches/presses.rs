@@ -1,4 +1,4 @@
-//! The presses: one, two and three needles, and what is no needle.
+//! The presses: one, two and three needles, and other objects.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -30,7 +30,7 @@ const BALLS_MM: [f64; 2] = [1.0, 2.0];
 const EDGE_MM: [f64; 2] = [6.0, 0.4];
 const DISC_MM: f64 = 2.0;
 
-/// What presses.
+/// The kind of press.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {
     /// One needle.
@@ -54,7 +54,7 @@ pub enum Kind {
 
 /// A press.
 pub struct Press {
-    /// Needles: places, mm, and forces, N. None for what is no needle.
+    /// Needles: places, mm, and forces, N; empty for other objects.
     pub needles: Vec<([f64; 2], [f64; 3])>,
     patches: Vec<(Patch, [f64; 3])>,
 }
@@ -76,7 +76,7 @@ impl Kind {
             .chain(others)
     }
 
-    /// Whether it is one needle or ball, of which there are many presses.
+    /// Whether it is one needle or ball, which get many presses.
     pub fn is_single(self) -> bool {
         matches!(self, Kind::One | Kind::Ball(_))
     }

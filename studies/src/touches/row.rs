@@ -1,4 +1,4 @@
-//! What becomes of the frames of a kind of press.
+//! Sums up the answers to the frames of a kind of press.
 
 use hivtac_calibration::evaluation::errors::angle_deg;
 use hivtac_sensor::force::forward::Strength;
@@ -7,18 +7,18 @@ use serde::Serialize;
 
 use super::presses::{Kind, Press};
 
-/// 95 of 100 normal errors are within this many standard uncertainties; of two axes, within so many
-/// of what is stated of both.
+/// 95 of 100 normal errors are within this many standard uncertainties; of two axes, of the
+/// uncertainty stated for both.
 const WITHIN_95: [f64; 3] = [1.960, 1.731, 2.448];
 
-/// What the sensor makes of a frame.
+/// The sensor's answer to a frame.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// Whether one contact explains it, and whether one explains all dots but one only.
     is_one: [bool; 2],
     /// Whether two do.
     is_two: bool,
-    /// Whether these are told apart.
+    /// Whether these are resolved.
     are_apart: bool,
     /// Errors of both and of their sum, if two needles press and two are found.
     errors: Option<[Error; 3]>,
@@ -37,32 +37,32 @@ struct Error {
 #[derive(Serialize)]
 pub struct PairRow {
     name: String,
-    /// Percentages: taken for one contact; for one if a dot is left out; refused; told apart.
+    /// Percentages: taken for one contact; for one if a dot is left out; refused; resolved.
     missed: f64,
     without_a_dot: f64,
     refused: f64,
     apart: f64,
     /// Of each contact: root mean square and 90th percentile of direction, degrees, |F|, mN, and
-    /// place, mm, of those that are told apart.
+    /// place, mm, of those that are resolved.
     each: Option<[[f64; 2]; 3]>,
     /// Of their sum: root mean squares, of all pairs that are found.
     sum: Option<[f64; 3]>,
     /// Percentages within the stated 95 %: direction, |F| and place of each, direction and |F| of
     /// the sum.
     within: Option<[f64; 5]>,
-    /// Of each contact that is told apart, root mean squares of what is stated, and of what noise
-    /// alone would leave, as in `each`.
+    /// Of each resolved contact, root mean squares of the stated uncertainty, and of that by noise
+    /// alone, as in `each`.
     stated: Option<[f64; 3]>,
     by_noise: Option<[f64; 3]>,
 }
 
-/// The results for what is no pair.
+/// The results for other presses than pairs.
 #[derive(Serialize)]
 pub struct OtherRow {
     name: String,
     frames: usize,
-    /// Percentages: taken for one contact; for one if a dot is left out; for two; told as two, as
-    /// no dot need be left out; refused.
+    /// Percentages: taken for one contact; for one if a dot is left out; for two; reported as two,
+    /// as no dot need be left out; refused.
     one: f64,
     without_a_dot: f64,
     two: f64,
@@ -178,7 +178,7 @@ impl Error {
 
 impl PairRow {
     /// The head of the table.
-    pub const HEAD: &str = "| forces | apart | missed | a dot left out | refused | told apart | \
+    pub const HEAD: &str = "| forces | apart | missed | a dot left out | refused | resolved | \
                             direction of each (90 %) | \\|F\\| of each | place of each | \
                             sum: direction, \\|F\\| | within the stated 95 %: each; sum |\n\
                             |--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n";
@@ -232,7 +232,7 @@ impl PairRow {
     pub const BOUNDS: &str = "| forces | apart | error of each | stated σ | σ by noise alone |\n\
                               |--:|--:|--:|--:|--:|\n";
 
-    /// A line of that table; empty if none are told apart.
+    /// A line of that table; empty if none are resolved.
     pub fn bounds(&self) -> String {
         let parts = self.each.zip(self.stated).zip(self.by_noise);
         parts.map_or(String::new(), |((each, stated), by_noise)| {
@@ -281,7 +281,7 @@ impl PairRow {
 impl OtherRow {
     /// The head of the table.
     pub const HEAD: &str = "| press | frames | one contact | a dot left out | two contacts | \
-                            told as two | refused |\n|---|--:|--:|--:|--:|--:|--:|\n";
+                            reported as two | refused |\n|---|--:|--:|--:|--:|--:|--:|\n";
 
     /// The results of a kind.
     pub fn of(kind: Kind, outcomes: &[Outcome]) -> OtherRow {

@@ -58,7 +58,7 @@ fn equals<'c>(
     among.iter().filter(near).copied().collect()
 }
 
-/// Text about what comes nearest to limits of time, and to a limit of the error.
+/// Text about the configurations nearest to limits of time, and to a limit of the error.
 fn nearest(all: &[Configuration]) -> Option<String> {
     let fastest = all.iter().min_by_key(|c| c.modelled_cycles)?;
     let by_error = |c: &&Configuration| (1e6 * c.limit_error_deg()) as u64;

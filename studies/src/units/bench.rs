@@ -53,7 +53,7 @@ pub enum Bench {
     ByHand,
 }
 
-/// How far the loads of ten are from what the jig is taken to give.
+/// The differences of ten loads from the jig's nominal ones.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Jig {
     /// Distance of each bore from its place, mm, in a direction drawn for each.

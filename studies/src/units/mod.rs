@@ -22,8 +22,8 @@ pub use bench::{Bench, Jig};
 /// Draw units as people build them; measure them with a tare alone, and after they were calibrated.
 #[derive(Args)]
 pub struct Units {
-    /// A weights file with its film: of a network that tells places, or of another layout of dots,
-    /// whose results are printed and no page.
+    /// A weights file with its film: of a network with places, or of another layout of dots, whose
+    /// results are printed and no page.
     #[arg(long, default_value = WEIGHTS)]
     weights: PathBuf,
     /// Units drawn.

@@ -108,8 +108,8 @@ impl World {
     }
 
     fn step(&mut self, input: &mut Unstructured<'_>) -> Result<()> {
-        let mut told = Vec::new();
-        let tell = &mut |event| told.push(event);
+        let mut reported = Vec::new();
+        let tell = &mut |event| reported.push(event);
         match input.int_in_range(0..=9)? {
             0 => self.next_edge(input.int_in_range(1..=3)?),
             1 => self.years_pass(),
@@ -131,7 +131,7 @@ impl World {
             8 => self.set_up(input.arbitrary()?),
             _ => self.follow(input)?,
         }
-        self.events.extend(told);
+        self.events.extend(reported);
         Ok(())
     }
 

@@ -1,4 +1,4 @@
-//! Tests with the corpus of each attack: inputs that reached deep, and those that once found a
+//! Tests with the corpus of each attack: inputs of high coverage, and those that once found a
 //! fault.
 
 use std::collections::BTreeSet;

@@ -1,4 +1,5 @@
-//! Documents list all that the sources hold, and lead where they say; no text is too wide.
+//! Tests that documents list what the sources hold, that their links are valid, and that no line is
+//! too wide.
 
 mod dependencies;
 mod links;

@@ -22,9 +22,9 @@ fn no_line_is_too_wide() {
     assert!(wide.is_empty(), "more than {WIDEST} columns: {wide:#?}");
 }
 
-/// The lines of a file that are too wide, from 1. Rows of tables, addresses, fenced blocks and what
-/// programs wrote into a document may be: breaking these is impossible or makes them worse. Of
-/// Rust, comments are read: what rustfmt leaves of the rest it cannot break.
+/// The lines of a file that are too wide, from 1. Rows of tables, addresses, fenced blocks and
+/// generated text may be: breaking these is impossible or makes them worse. In Rust only comments
+/// are checked: rustfmt breaks the rest where it can.
 fn too_wide(name: &str, text: &str) -> Vec<usize> {
     let may_be = match name.ends_with(".md") {
         true => fenced_or_written(text),

@@ -33,7 +33,7 @@ use crate::peripherals::iwdg::Iwdg;
 use crate::peripherals::mdma::Mdma;
 use crate::peripherals::otg::{Blocks, SharedCore};
 use crate::rules::Rules;
-use crate::uart_line::{Heard, Listener};
+use crate::uart_line::{Listener, UartByte};
 use crate::usb_host::SharedHost;
 
 /// The board's supply, mV.
@@ -271,11 +271,11 @@ impl Chip {
         &self.output.0
     }
 
-    /// Returns what came over the UART for samples.
-    pub fn uart_heard(&self) -> &[Heard] {
+    /// Returns the bytes of the UART for samples.
+    pub fn uart_bytes(&self) -> &[UartByte] {
         let peer = self.part.usart[board::UART].peer();
         let listener = peer.and_then(|peer| (peer as &dyn Any).downcast_ref::<Listener>());
-        listener.map_or(&[], |listener| &listener.heard)
+        listener.map_or(&[], |listener| &listener.bytes)
     }
 
     /// Returns the count of words that the firmware wrote into full USB FIFOs.

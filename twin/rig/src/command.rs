@@ -39,7 +39,7 @@ pub struct Arguments {
     /// test-picture; or a scene file (FILE.toml), which has seed and preset of its own.
     #[arg(long, default_value = "demo")]
     scene: String,
-    /// Decides the noise, where the demo starts, and what the camera's data sheets leave open.
+    /// Decides the noise, the demo's start, and values that the camera's data sheets leave open.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// The board.
@@ -90,7 +90,7 @@ pub struct Arguments {
     /// A scripted host instead of a client: the same bytes every time. Lines of `MS ACTION`.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["tcp", "pty"])]
     script: Option<PathBuf>,
-    /// Write what the device sent to the scripted host.
+    /// Write the bytes that the device sent to the scripted host.
     #[arg(long, value_name = "FILE", requires = "script")]
     out: Option<PathBuf>,
     /// Something that goes wrong, KIND[@MS[-MS]] in virtual time: camera-absent, camera-wrong-id,
@@ -234,7 +234,7 @@ impl Arguments {
         Ok((program, Some(port)))
     }
 
-    /// Opens what the client uses; by default a TCP port with the serial port.
+    /// Opens the client's ports; by default a TCP port with the serial port.
     fn open(&self) -> anyhow::Result<(Box<dyn Plug>, Port)> {
         if let Some(wanted) = self.usbip {
             let server = Server::listen(wanted)?;
@@ -281,7 +281,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_port_is_told_in_one_line() {
+    fn a_port_is_reported_in_one_line() {
         let tcp = Port {
             tcp: Some(4000),
             ..Port::default()

@@ -189,8 +189,8 @@ impl Faults {
             .any(|fault| (fault.from_ns..fault.until_ns).contains(&now_ns))
     }
 
-    /// Returns the next instant after `now_ns` at which a fault of this kind begins or ends; `None`
-    /// if there is none.
+    /// Returns the next instant after `now_ns` at which a fault of this kind begins or ends, if
+    /// any.
     pub fn next_change(&self, kind: Kind, now_ns: u64) -> Option<u64> {
         let instants = self
             .of(kind)

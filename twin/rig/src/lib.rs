@@ -14,12 +14,12 @@
 //! | [`command`], [`run`], [`report`] | one run from arguments to outcome |
 //! | [`chip`], [`board`], [`machine`], `dma_requests`, [`mpu`], `translations` | the microcontroller; which pins and clocks reach the camera and USB |
 //! | [`peripherals`] | its camera interface, USB core, MDMA, flash, ROM, watchdog and clock recovery |
-//! | [`camera`], [`frame_source`], `control_bus` | the sensor; what it looks at; what goes wrong on its control bus |
+//! | [`camera`], [`frame_source`], `control_bus` | the sensor; its pictures; faults of its control bus |
 //! | [`usb_host`], [`link`], [`usbip`], [`script`] | the host; who uses its serial port, or the device itself |
-//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules`, `power` | what goes wrong on request; what firmware must not do; what a power-on leaves |
-//! | [`uart_line`] | what listens to the UART for samples |
+//! | [`faults`], [`rules`], `late_line`, `late_flags`, `late_enable`, [`dma_reach`], [`memory_types`], `start_rules`, `power` | faults on request; rules that firmware must not break; memory after a power-on |
+//! | [`uart_line`] | the listener at the UART for samples |
 //! | [`awake`] | how long the core sleeps |
-//! | [`truth`], [`arrivals`] | what is true; when what the device says of it is there |
+//! | [`truth`], [`arrivals`] | the truth of each frame; the arrival of its sample |
 
 pub mod arrivals;
 pub mod awake;

@@ -1,11 +1,10 @@
-//! What a power-on leaves in the memories: nothing that a program may rely on.
+//! The memories after a power-on: contents on which no program may rely.
 
 use rigless::emulator::Memory;
 use rigless::soc::Width;
 
-/// The end of DTCM, which programs use to keep something through a reset. By seed it has other
-/// contents at each power-on. The rest is zero, by which `start_rules` sees what was written too
-/// early.
+/// The end of DTCM, which programs use to keep data through a reset. By seed it has other contents
+/// at each power-on. The rest is zero, so that `start_rules` sees writes that came too early.
 const KEPT: std::ops::Range<u32> = 0x2001_FF80..0x2002_0000;
 /// Memories, with their sizes in bytes.
 const MEMORIES: [(u64, u64); 4] = [
@@ -26,7 +25,7 @@ pub fn forget(memory: &mut dyn Memory, seed: u64) {
     leave(memory, !seed);
 }
 
-/// Leaves what a power-on leaves in memories of zeros.
+/// Puts the contents after a power-on into memories of zeros.
 pub fn leave(memory: &mut dyn Memory, seed: u64) {
     for (address, word) in KEPT.step_by(8).zip(noise(seed)) {
         let _ = memory.write(address.into(), Width::W64, word);

@@ -11,7 +11,7 @@ use crate::camera::SharedCamera;
 use crate::chip::Chip;
 use crate::peripherals::dcmi;
 use crate::peripherals::flash::{Bank, Operation};
-use crate::uart_line::Heard;
+use crate::uart_line::UartByte;
 use crate::usb_host::{self, Port, SharedHost};
 
 /// Counters of a run.
@@ -61,7 +61,7 @@ pub struct Report {
     /// Events on the USB port.
     pub usb_log: Vec<String>,
     /// Bytes that came over the UART for samples.
-    pub uart: Vec<Heard>,
+    pub uart: Vec<UartByte>,
     /// Words that the firmware wrote into full USB FIFOs.
     pub lost_usb_words: u64,
     /// Accesses to addresses without a device, or refused by a clock gate.
@@ -112,12 +112,12 @@ impl Report {
             port: host.port(),
             usb: host.counters(),
             usb_log: host.log().to_vec(),
-            uart: chip.uart_heard().to_vec(),
+            uart: chip.uart_bytes().to_vec(),
             lost_usb_words: chip.lost_usb_words(),
             refused: unmapped.chain(refused).collect(),
             warnings: session
                 .told()
-                .map(|told| format!("{} {}: {}", told.instance, told.register, told.reason))
+                .map(|it| format!("{} {}: {}", it.instance, it.register, it.reason))
                 .collect(),
         }
     }

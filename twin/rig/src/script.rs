@@ -52,7 +52,7 @@ pub enum Action {
     Restart(Restart),
 }
 
-/// What restarts the microcontroller from outside.
+/// A restart of the microcontroller from outside.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Restart {
     /// The reset line is pulled, by the board's button or its supply's supervisor.

@@ -9,7 +9,7 @@ use crate::rules::Rules;
 const PWR_CR3: u64 = 0x5802_480C;
 const RCC_BDCR: u64 = 0x5802_4470;
 /// ITCM, DTCM, and SRAM1 to SRAM3: the first double words that a program may use, and how many are
-/// looked at, at equal distances.
+/// checked, at equal distances.
 const MEMORIES: [(&str, u64, u64); 3] = [
     ("ITCM", 0x0000_0040, 0xFFC0),
     ("DTCM", 0x2000_0000, 0x2_0000),
@@ -17,7 +17,7 @@ const MEMORIES: [(&str, u64, u64); 3] = [
 ];
 const LOOKS: u64 = 64;
 
-/// What has to happen once after power-on.
+/// Steps that must happen once after power-on.
 #[derive(Debug, Default)]
 pub struct StartRules {
     supplied: bool,

@@ -152,7 +152,7 @@ impl Core {
             return;
         };
         for mapped in &self.mapped {
-            // SAFETY: what the caller of `map` promised this core holds for the one inside it. The
+            // SAFETY: the promise of `map`'s caller to this core holds for the one inside it. The
             // memory that was mapped at the same addresses before is all replaced before it runs.
             unsafe { next.map(mapped.start, mapped.length, mapped.host, mapped.writable) };
         }

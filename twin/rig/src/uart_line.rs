@@ -1,4 +1,4 @@
-//! What hangs on the UART for samples: it keeps what the device sends, and when.
+//! Records bytes and times of the UART for samples.
 
 use rigless::chip::Timeline;
 use rigless::chip::uart::Peer;
@@ -7,7 +7,7 @@ use rigless::time::VirtualNanos;
 
 /// A byte on the line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Heard {
+pub struct UartByte {
     /// Time at which its stop bit ended, ns.
     pub at_ns: u64,
     /// The byte.
@@ -18,7 +18,7 @@ pub struct Heard {
 #[derive(Debug, Default)]
 pub struct Listener {
     /// All bytes since the start of the run.
-    pub heard: Vec<Heard>,
+    pub bytes: Vec<UartByte>,
 }
 
 // The rig takes no snapshots.
@@ -28,7 +28,7 @@ impl Peer for Listener {
     fn receive(&mut self, word: u16, context: &mut Timeline<'_, '_>) {
         let VirtualNanos(at_ns) = context.now();
         let [byte, _] = word.to_le_bytes();
-        self.heard.push(Heard { at_ns, byte });
+        self.bytes.push(UartByte { at_ns, byte });
     }
 
     fn transmit(&mut self, _now: VirtualNanos) -> Option<u16> {

@@ -72,7 +72,7 @@ fn no_frame_depends_on_a_register_that_nobody_wrote() {
 /// up a second time, in case it lost its supply, and then used; health and inspection name it.
 #[test]
 #[ignore = "15 s: several cameras"]
-fn reserved_bits_that_read_back_otherwise_are_told_and_frames_come() {
+fn reserved_bits_that_read_back_otherwise_are_reported_and_frames_come() {
     for seed in [2, 3] {
         let setup = Setup {
             seed,
@@ -183,8 +183,8 @@ fn a_search_that_finds_no_good_exposure_says_so() {
         .run();
     assert_eq!(run.answers(50)[0].0, Outcome::Done);
     assert_eq!(run.health().problems, Problem::Exposure.bit());
-    let told = "exposure: level 7";
-    assert!(run.log().contains(told), "{}", run.log());
+    let reported = "exposure: level 7";
+    assert!(run.log().contains(reported), "{}", run.log());
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Tests that the other cameras have the properties of the first one: the second board's MT9V034,
-//! and an OV5640 in the first board's socket. What is one camera's own is in its file.
+//! and an OV5640 in the first board's socket. Tests of a single camera are in its file.
 
 use crate::common::{Bug, Run, Setup, other};
 use crate::{openmv, ov5640};
@@ -18,7 +18,7 @@ struct Part {
     lasts: [u64; 4],
     /// Faults: the camera is silent, and a frame is short.
     faults: [&'static str; 2],
-    /// What is said while it is absent.
+    /// The message while it is absent.
     absent: &'static str,
 }
 
@@ -87,9 +87,9 @@ fn a_silent_camera_is_restarted() {
         let stats = run.stats();
         let restarted = stats.camera_timeouts >= 1 && stats.camera_restarts >= 1;
         assert!(restarted, "{stats:?}");
-        let told = |status: Status| status.contains(Status::CAMERA_RESTARTED);
+        let reported = |status: Status| status.contains(Status::CAMERA_RESTARTED);
         let samples = run.samples();
-        let restarted = samples.iter().find(|sample| told(sample.status));
+        let restarted = samples.iter().find(|sample| reported(sample.status));
         let restarted = restarted.expect("a sample says so").frame;
         assert!(samples.iter().any(|sample| sample.frame > restarted + 3));
         run.assert_times();

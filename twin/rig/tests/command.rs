@@ -128,7 +128,7 @@ fn a_signal_ends_a_rig_that_waits_for_its_client() {
 }
 
 /// A signal while the firmware runs, and one while the rig waits for its client: both leave the
-/// whole bank, and no other file beside it.
+/// whole bank, and no other file.
 #[test]
 fn a_signal_keeps_the_flash() {
     for (signal, options) in [("-INT", &["--no-wait"][..]), ("-TERM", &[])] {

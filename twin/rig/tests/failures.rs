@@ -1,5 +1,5 @@
-//! Tests of what a device tells of the failure that ended its program, with firmware that has
-//! seeded bugs, and of starts that fail again and again.
+//! Tests of the report of a failure that ended the program, with firmware that has seeded bugs, and
+//! of starts that fail repeatedly.
 
 use crate::common::{Bug, Run, Setup, command, elf, firmware, hello, other};
 use hivtac_rig::report::Report;
@@ -27,7 +27,7 @@ fn health(run: &Run) -> &Health {
 }
 
 fn failure(health: &Health) -> &Failure {
-    health.failure.as_ref().expect("it is told")
+    health.failure.as_ref().expect("it is reported")
 }
 
 /// The name of the function at an address of an ELF.
@@ -56,7 +56,7 @@ fn a_device_that_never_failed_tells_none() {
 
 #[test]
 #[ignore = "15 s: two starts with frames"]
-fn a_bus_error_is_told_after_the_reset_with_its_place() {
+fn a_bus_error_is_reported_after_the_reset_with_its_place() {
     let run = seeded().run_with(Bug::BusFault);
     let health = health(&run);
     assert_eq!(health.reset, ResetReason::Software);
@@ -72,7 +72,7 @@ fn a_bus_error_is_told_after_the_reset_with_its_place() {
 }
 
 #[test]
-fn a_panic_is_told_with_its_source_line() {
+fn a_panic_is_reported_with_its_source_line() {
     let run = seeded().run_with(Bug::Panic);
     let failure = failure(health(&run));
     assert_eq!(failure.kind, FailureKind::Panic, "{failure:x?}");
@@ -86,7 +86,7 @@ fn a_panic_is_told_with_its_source_line() {
 /// The stack's memory cannot take the registers, so where it was is not known.
 #[test]
 #[ignore = "15 s: two starts with frames"]
-fn a_stack_that_is_used_up_is_told() {
+fn a_stack_that_is_used_up_is_reported() {
     let run = seeded().run_with(Bug::StackOverflow);
     let failure = failure(health(&run));
     assert_eq!(failure.kind, FailureKind::StackOverflow, "{failure:x?}");
@@ -96,7 +96,7 @@ fn a_stack_that_is_used_up_is_told() {
 /// Thread mode stands still at about 220 ms. The watchdog counts from its last food on.
 #[test]
 #[ignore = "15 s: until the watchdog ends it"]
-fn a_program_that_stands_still_is_told() {
+fn a_program_that_stands_still_is_reported() {
     let setup = Setup::new(other("seeded-bugs"), 2_700).ask_health_at(2_650, ASKED);
     let run = setup.run_with(Bug::Hang);
     let health = health(&run);
@@ -108,21 +108,21 @@ fn a_program_that_stands_still_is_told() {
 /// The reset button leaves the memory, and the failure is older by a start.
 #[test]
 #[ignore = "30 s: several starts"]
-fn a_failure_is_told_until_the_power_is_cut() {
+fn a_failure_is_reported_until_the_power_is_cut() {
     let run = |restart: Restart| {
         let setup = Setup::new(other("seeded-bugs"), 620).restart_at(400, restart);
         setup.ask_health_at(580, ASKED).run_with(Bug::BusFault)
     };
     let run_on = run(Restart::Button);
-    let told = health(&run_on);
-    assert_eq!(told.reset, ResetReason::Pin);
-    let failed = failure(told);
+    let reported = health(&run_on);
+    assert_eq!(reported.reset, ResetReason::Pin);
+    let failed = failure(reported);
     assert_eq!((failed.kind, failed.starts_ago), (FailureKind::BusFault, 2));
 
     let anew = run(Restart::PowerCycle);
-    let told = health(&anew);
-    assert_eq!(told.reset, ResetReason::PowerOn);
-    assert_eq!(told.failure, None);
+    let reported = health(&anew);
+    assert_eq!(reported.reset, ResetReason::PowerOn);
+    assert_eq!(reported.failure, None);
 }
 
 /// The firmware that is written over USB makes the addresses of the one before worthless.

@@ -84,7 +84,7 @@ fn a_silent_camera_is_restarted() {
 /// The DMA loses the bus for a millisecond, during the rows of one frame or of two consecutive
 /// ones. Each is dropped and counted, and the next sample reports it.
 #[test]
-fn an_overrun_costs_a_frame_and_is_told() {
+fn an_overrun_costs_a_frame_and_is_reported() {
     let run = Setup::new(firmware(), 300).fault("dcmi-overrun@243").run();
     let (stats, missing) = (run.stats(), run.missing_frames());
     assert!((1..=2).contains(&missing.len()), "{missing:?}");
@@ -132,9 +132,9 @@ fn a_short_frame_costs_itself_and_no_other() {
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 
-/// Before the first sample there is none since which a frame could be missing.
+/// No frame can be missing before the first sample.
 #[test]
-fn frames_lost_before_the_first_sample_are_not_told() {
+fn frames_lost_before_the_first_sample_are_not_reported() {
     let run = Setup::new(firmware(), 300).fault("frame-short@0-230").run();
     assert!(run.stats().dropped_size >= 3, "{:?}", run.stats());
     assert!(run.samples().len() >= 3, "{}", run.log());
@@ -144,18 +144,22 @@ fn frames_lost_before_the_first_sample_are_not_told() {
 /// The camera sends rows after the last one. The frame counts as too long, whether it was already
 /// measured or, on a slow core, not yet. The next sample reports it, and that frame is whole.
 #[test]
-fn a_long_frame_is_told_and_costs_no_other() {
+fn a_long_frame_is_reported_and_costs_no_other() {
     let run = Setup::new(firmware(), 300).fault("frame-long@230").run();
     let stats = run.stats();
     assert!((1..=2).contains(&stats.dropped_size), "{stats:?}");
-    let told = run.frames_after_a_loss();
+    let reported = run.frames_after_a_loss();
     let missing = run.missing_frames();
     // Two consecutive losses are reported by one sample, the next.
     let together = missing.windows(2).filter(|pair| pair[0] + 1 == pair[1]);
-    let dropped = told.len() + together.count();
-    assert_eq!(dropped, stats.dropped_size as usize, "{missing:?} {told:?}");
-    let is_told = |frame: &u32| told.contains(&(frame + 1)) || missing.contains(&(frame + 1));
-    assert!(missing.iter().all(is_told), "{missing:?} {told:?}");
+    let dropped = reported.len() + together.count();
+    assert_eq!(
+        dropped, stats.dropped_size as usize,
+        "{missing:?} {reported:?}"
+    );
+    let is_reported =
+        |frame: &u32| reported.contains(&(frame + 1)) || missing.contains(&(frame + 1));
+    assert!(missing.iter().all(is_reported), "{missing:?} {reported:?}");
     assert_eq!((stats.capture_overruns, stats.camera_timeouts), (0, 0));
 }
 

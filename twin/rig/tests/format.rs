@@ -92,13 +92,13 @@ fn the_way_back_leads_to_the_same_forces() {
     for sample in back.iter().filter(|sample| sample.force.is_some()) {
         let others = undisturbed.samples();
         let same = others.iter().find(|it| it.frame == sample.frame);
-        // Uncertainties include what the film may remember of each run's own forces, and are left
+        // Uncertainties include the film's possible creep by each run's own forces, and are left
         // out.
-        let told = |sample: &Sample| {
+        let reported = |sample: &Sample| {
             let force = sample.force.unwrap();
             (force.cartesian, force.place.map(|place| (place.x, place.y)))
         };
-        assert_eq!(told(same.unwrap()), told(sample), "{sample:?}");
+        assert_eq!(reported(same.unwrap()), reported(sample), "{sample:?}");
     }
 }
 

@@ -34,7 +34,7 @@ fn a_device_that_was_just_switched_on_has_no_problem() {
     let health = health(ask(Request::GetHealth, 230));
     assert_eq!(health.reset, ResetReason::PowerOn, "{health:?}");
     // The rig's part is at 60 °C.
-    let temperature = health.temperature_centidegrees.expect("its sensor tells");
+    let temperature = health.temperature_centidegrees.expect("its sensor answers");
     assert!((5_900..6_100).contains(&temperature), "{health:?}");
     assert_eq!(health.stack_bytes, 40_960);
     let free = health.stack_bytes - health.stack_used;
@@ -51,7 +51,7 @@ fn a_camera_that_is_not_there_is_a_problem() {
 }
 
 #[test]
-fn a_camera_of_another_kind_is_told() {
+fn a_camera_of_another_kind_is_reported() {
     let health = health(ask(Request::GetHealth, 230).fault("camera-wrong-id"));
     let another = Problem::AnotherCamera.bit();
     let now = another | Problem::CameraSilent.bit();
@@ -61,7 +61,7 @@ fn a_camera_of_another_kind_is_told() {
 /// The camera's registers go back to their reset values during the set-up. The camera is set up
 /// anew, and forces come. The report still names the problem at the start.
 #[test]
-fn a_register_that_does_not_hold_what_was_written_is_told() {
+fn a_register_that_does_not_hold_what_was_written_is_reported() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
     let setup = Setup::new(firmware(), 920).at(900, asked);
     let run = setup.fault(FORGETS).run();
@@ -78,7 +78,7 @@ fn a_register_that_does_not_hold_what_was_written_is_told() {
 
 /// The camera's clock loop multiplies by half of its proper factor.
 #[test]
-fn frames_that_take_another_time_than_they_should_are_told() {
+fn frames_that_take_another_time_than_they_should_are_reported() {
     let asked = Action::Send(command(ASKED, Request::GetHealth));
     let setup = Setup::new(firmware(), 400).at(380, asked);
     let run = setup.fault("camera-slow").run();
@@ -89,7 +89,7 @@ fn frames_that_take_another_time_than_they_should_are_told() {
 }
 
 #[test]
-fn kept_settings_that_are_not_read_are_told() {
+fn kept_settings_that_are_not_read_are_reported() {
     let Device { flash, .. } = &Device::new();
     of_another_version(flash);
     let setup = Setup {
@@ -105,7 +105,7 @@ fn kept_settings_that_are_not_read_are_told() {
 /// those computed at build time: the arithmetic counts as faulty.
 #[test]
 #[ignore = "13 s"]
-fn a_built_in_model_that_answers_otherwise_is_told() {
+fn a_built_in_model_that_answers_otherwise_is_reported() {
     let directory = tempfile::tempdir().unwrap();
     let elf = directory.path().join("firmware.elf");
     let mut program = std::fs::read(firmware()).unwrap();

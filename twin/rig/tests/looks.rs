@@ -23,8 +23,8 @@ fn salted(instructions_per_second: u64) -> Run {
         forces += 1;
         let line = run.truth.iter().find(|line| line["frame"] == sample.frame);
         let truth = line.and_then(|line| line["magnitude_n"].as_f64()).unwrap();
-        let (told, sigma) = (force.magnitude.0, force.magnitude_sigma.0);
-        let off = (f64::from(told) - 1e6 * truth).abs();
+        let (reported, sigma) = (force.magnitude.0, force.magnitude_sigma.0);
+        let off = (f64::from(reported) - 1e6 * truth).abs();
         if off > 3.0 * f64::from(sigma) + 500.0 {
             wrong.push(format!("{sample:?}: truly {truth} N"));
         }

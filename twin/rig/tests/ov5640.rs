@@ -112,7 +112,7 @@ fn settings_and_inspection_are_its_own() {
 /// A register that lost its value is named by both bytes of its address.
 #[test]
 #[ignore = "10 s: as for the other cameras"]
-fn a_register_that_changed_is_told_by_its_whole_address() {
+fn a_register_that_changed_is_reported_by_its_whole_address() {
     let run = ov5640(1_500)
         .fault("camera-forgets@500")
         .at(600, send(51, Request::Inspect))
@@ -121,9 +121,9 @@ fn a_register_that_changed_is_told_by_its_whole_address() {
         DeviceMessage::Inspection(inspection) => inspection.different.first(),
         _ => None,
     });
-    let different = different.expect("it is told");
-    let told = (different.address, different.written, different.found);
-    assert_eq!(told, (0x5384, 0x0A, 0));
+    let different = different.expect("it is reported");
+    let reported = (different.address, different.written, different.found);
+    assert_eq!(reported, (0x5384, 0x0A, 0));
 }
 
 /// Exposure, gain, rate and white are set as on the other camera.
@@ -170,8 +170,8 @@ fn yuv422_is_sent_in_the_right_order() {
 #[test]
 fn a_camera_with_another_number_is_refused() {
     let run = ov5640(700).fault("camera-wrong-id").run();
-    let told = "ID 56 42, an OV5640 has 56 40";
-    assert!(run.log().contains(told), "{}", run.log());
+    let reported = "ID 56 42, an OV5640 has 56 40";
+    assert!(run.log().contains(reported), "{}", run.log());
     assert_eq!((run.samples().len(), run.report.sccb_writes), (0, 0));
 }
 

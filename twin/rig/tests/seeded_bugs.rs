@@ -197,7 +197,7 @@ fn an_end_without_its_last_words_drops_whole_frames() {
     assert!(wrong.stats().dropped_size >= 4, "{:?}", wrong.stats());
 }
 
-/// A bug is what the tests above notice, not the way in which it is chosen.
+/// The tests above notice a bug, not the way in which it is chosen.
 #[test]
 fn without_a_bug_the_same_program_measures() {
     let run = Setup::new(other("seeded-bugs"), 240).run();

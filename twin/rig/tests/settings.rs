@@ -161,17 +161,20 @@ fn name_tare_and_threshold_are_kept_while_forces_go_on() {
 fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     let directory = tempfile::tempdir().unwrap();
     let flash = directory.path().join("flash");
-    let told = Direction([0, 600, -800]);
+    let reported = Direction([0, 600, -800]);
     let run = setup(&flash, ERASED_MS)
-        .at(SET_MS - 10, down(Down::Told(told)))
+        .at(SET_MS - 10, down(Down::Told(reported)))
         .at(SET_MS, send(SET, Request::Tare { frames: 2 }))
         .at(KEEP_MS + 20, send(KEEP, Request::Keep(Selection::ALL)))
         .run();
     assert_eq!(run.outcome(SET), Outcome::Done);
     assert_eq!(run.outcome(KEEP), Outcome::Done);
     let report = run.settings();
-    assert_eq!((report.down, report.kept.down), (Down::Told(told), true));
-    assert_eq!(report.tare.unwrap().down, Some(told));
+    assert_eq!(
+        (report.down, report.kept.down),
+        (Down::Told(reported), true)
+    );
+    assert_eq!(report.tare.unwrap().down, Some(reported));
     // A restart keeps it. Turned over, the sensor continues to measure, and it reports an invalid
     // direction.
     let run = setup(&flash, 260)
@@ -181,7 +184,7 @@ fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     let samples = run.samples();
     let is_unknown = |sample: &&Sample| sample.status.contains(Status::WEIGHT_UNKNOWN);
     assert!(!is_unknown(&samples[0]) && is_unknown(samples.last().unwrap()));
-    assert_eq!(run.settings().tare.unwrap().down, Some(told));
+    assert_eq!(run.settings().tare.unwrap().down, Some(reported));
     assert_eq!(
         (run.settings().down, run.settings().kept.down),
         (Down::Unknown, false)
@@ -190,7 +193,7 @@ fn which_way_it_is_held_goes_with_a_tare_and_is_kept() {
     assert_eq!(run.missing_frames(), [0; 0], "forces go on");
 }
 
-/// A radius out of range is refused, and what was set before stays.
+/// A radius out of range is refused, and the earlier setting stays.
 #[test]
 fn what_presses_is_set_reported_kept_and_reset() {
     let Device { flash, kept, .. } = &Device::new();
@@ -326,7 +329,7 @@ pub fn of_another_version(flash: &Path) {
 }
 
 #[test]
-fn settings_of_another_version_are_told_and_stay_until_something_is_kept() {
+fn settings_of_another_version_are_reported_and_stay_until_something_is_kept() {
     let device = Device::new();
     of_another_version(&device.flash);
     let before = Contents::load(&device.flash).unwrap();
@@ -387,8 +390,8 @@ fn a_rest_position_that_is_none_is_refused_and_nothing_changes() {
     assert!(last.contains(Status::TARE_MISSING), "{last:?}");
 }
 
-/// What is written while the supply falls may be torn: it is refused. A sector whose word was
-/// refused is erased before the next one.
+/// A write while the supply falls may be torn: it is refused. A sector whose word was refused is
+/// erased before the next one.
 #[test]
 fn nothing_is_written_while_the_supply_is_low() {
     let directory = tempfile::tempdir().unwrap();

@@ -26,8 +26,8 @@ fn setup() -> Setup {
     }
 }
 
-/// A status, and a force's components, µN. Uncertainties are left out: they include what the film
-/// may remember, which a sample that is followed again would include twice.
+/// A status, and a force's components, µN. Uncertainties are left out: they include the film's
+/// possible creep, which a sample that is followed again would include twice.
 type Reported = (Status, Option<[MicroNewtons; 3]>);
 
 /// Returns a sample of another run with only the values of its own frame.
@@ -62,8 +62,8 @@ fn followed(samples: &[&Sample], other: TemporalSettings, from: usize) -> Vec<Re
 
 fn reported(run: &Run) -> Vec<Reported> {
     let samples = run.samples();
-    let told = |s: &&Sample| (s.status, s.force.map(|force| force.cartesian));
-    samples.iter().map(told).collect()
+    let stated = |s: &&Sample| (s.status, s.force.map(|force| force.cartesian));
+    samples.iter().map(stated).collect()
 }
 
 /// Returns the truth of each frame: whether the tip presses, and the distance that its contact has

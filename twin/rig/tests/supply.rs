@@ -13,7 +13,7 @@ const BACK_MS: u64 = 500;
 
 /// A new chip whose owner has chosen some options: IO_HSLV, and the watchdog stops in Stop mode.
 const CHOSEN: u32 = (FACTORY_OPTIONS | 1 << 29) & !(1 << 17);
-/// What firmware makes of it.
+/// The options that firmware sets.
 const SET: Operation = Operation::Options {
     options: CHOSEN | LEVEL,
 };
@@ -119,7 +119,7 @@ fn nothing_is_written_while_the_supply_is_not_steady() {
 }
 
 #[test]
-fn a_change_that_fails_is_told_and_the_device_works() {
+fn a_change_that_fails_is_reported_and_the_device_works() {
     let chip = Chip::new(CHOSEN);
     let run = chip.setup().fault("flash-fails").run();
     assert_eq!(run.report.flash_operations, [SET]);

@@ -186,11 +186,11 @@ fn a_rest_position_that_is_off_is_seen_and_followed() {
         ],
     );
     for bit in [Status::REST_MOVED, Status::REZEROED] {
-        let told = run
+        let reported = run
             .samples()
             .into_iter()
             .any(|sample| sample.status.contains(bit));
-        assert!(told, "{bit:?}");
+        assert!(reported, "{bit:?}");
     }
     let settings = run.settings();
     // It moved once, by the usual rate.

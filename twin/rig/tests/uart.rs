@@ -1,4 +1,4 @@
-//! Tests of the UART for samples: it has what USB has, without a host, and at its rate.
+//! Tests of the UART for samples: it sends USB's samples without a host, at its rate.
 
 use crate::common::{Run, Setup, firmware, openmv};
 use hivtac_rig::script::Action;
@@ -86,7 +86,7 @@ fn it_needs_no_host() {
 fn it_has_its_rate() {
     let run = Setup::new(firmware(), 400).run();
     let heard = &run.report.uart;
-    let pause = |pair: &[hivtac_rig::uart_line::Heard]| pair[1].at_ns - pair[0].at_ns;
+    let pause = |pair: &[hivtac_rig::uart_line::UartByte]| pair[1].at_ns - pair[0].at_ns;
     let shortest = heard.windows(2).map(pause).min().expect("bytes");
     assert_eq!(shortest, 10 * 1_000_000_000 / u64::from(BAUD));
 }

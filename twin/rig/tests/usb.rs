@@ -1,5 +1,5 @@
 //! Tests of control transfers of any kind: the device answers, stalls unknown ones, and goes on.
-//! `usb_dead.rs` has what may end USB.
+//! `usb_dead.rs` has faults that may stop USB.
 
 use crate::common::{Run, Setup, firmware};
 use hivtac_rig::script::Action;
@@ -56,7 +56,7 @@ fn requests_about_endpoints_that_do_not_exist_are_stalled() {
 }
 
 /// A device without high speed stalls a request for its qualifier (USB 2.0, section 9.6.2); Linux
-/// warns of a slow port otherwise. What precedes a stall is not part of the next transfer: 64 bytes
+/// warns of a slow port otherwise. Data before a stall are not part of the next transfer: 64 bytes
 /// of a request that is too long are not the line coding.
 #[test]
 fn a_refused_request_leaves_nothing_behind() {
@@ -71,7 +71,7 @@ fn a_refused_request_leaves_nothing_behind() {
 }
 
 #[test]
-fn the_status_of_an_endpoint_that_exists_is_told() {
+fn the_status_of_an_endpoint_that_exists_is_reported() {
     let setups = [
         [0x82, 0, 0, 0, 0x00, 0, 2, 0],
         [0x82, 0, 0, 0, 0x80, 0, 2, 0],

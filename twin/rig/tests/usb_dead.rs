@@ -1,4 +1,4 @@
-//! Tests of what may make USB dead: transfers that are cut, packets that nobody fetches, hosts that
+//! Tests of faults that may stop USB: cut transfers, packets that no host fetches, hosts that
 //! pause. Without a camera the core sleeps, and virtual time costs little.
 
 use crate::common::{Run, Setup, command, firmware, hello};
@@ -28,7 +28,7 @@ const STEP_US: u64 = 21;
 const STEPS: u64 = 18;
 const CUTS: u64 = CUT.len() as u64 * STEPS;
 
-/// Begins a control transfer at a fixed interval, ms, each cut off a step later by what
+/// Begins a control transfer at a fixed interval, ms, each cut off a step later by the action that
 /// `cut` adds at a time in µs; then says hello.
 fn cut(period_ms: u64, cut: impl Fn(Setup, u64) -> Setup) -> Run {
     let end_ms = 200 + CUTS * period_ms;
@@ -201,7 +201,7 @@ fn a_short_pause_loses_nothing() {
     assert_eq!(run.missing_frames(), [] as [u32; 0]);
 }
 
-/// What comes after a longer pause is new; the rest is counted.
+/// Samples after a longer pause are new; the others are counted.
 #[test]
 fn no_old_sample_comes_after_a_pause() {
     let run = paused(900);

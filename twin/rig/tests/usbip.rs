@@ -67,7 +67,7 @@ impl Rig {
         (Client { stream, number: 0 }, status)
     }
 
-    /// Ends the rig; returns its counters of USB and what it said.
+    /// Ends the rig; returns its counters of USB and its output.
     fn end(self) -> (Value, String) {
         let process = self.process.id().to_string();
         let kill = std::process::Command::new("kill")
@@ -148,7 +148,7 @@ impl Client {
         (status, data)
     }
 
-    /// Does what Linux does with a new device. Returns the configuration.
+    /// Enumerates a new device as Linux does. Returns the configuration.
     fn enumerate(&mut self) -> Vec<u8> {
         let (status, device) = self.control([0x80, 6, 0, 1, 0, 0, 64, 0], &[]);
         assert_eq!(
@@ -256,7 +256,7 @@ fn a_port_is_reset_suspended_and_pulled() {
     for number in [waits, waits - 1] {
         client.unlink(number);
     }
-    // Without a transfer the port is suspended, which nothing tells; the next one resumes it.
+    // Without a transfer the port is suspended, silently; the next one resumes it.
     std::thread::sleep(std::time::Duration::from_secs(2));
     assert_eq!(client.control([0x80, 0, 0, 0, 0, 0, 2, 0], &[]).0, 0);
     client.enumerate();

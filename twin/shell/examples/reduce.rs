@@ -1,6 +1,6 @@
 //! Makes the reduced film's tables and checks them against the full solution.
 //!
-//! `cargo run --release -p hivtac-shell --example reduce -- film/data`
+//! `cargo run --release -p hivtac-shell --example reduce -- twin/data`
 
 use std::error::Error;
 use std::fs::{File, OpenOptions};

@@ -25,7 +25,7 @@ target/whole-RADIUS.bin, which it adds to where they are incomplete.
 
 /// Number of functions of the load.
 const FUNCTIONS: usize = 16;
-/// The same for what a film's own differences and another tip add.
+/// The same for the motion by a film's own differences and another tip.
 const OF_DIFFERENCES: usize = 8;
 /// Distances of the tip from the middle within which the tables are checked, mm.
 const REACHES_MM: [f64; 3] = [4.0, 6.0, 8.0];
@@ -46,7 +46,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What the command line asks for.
+/// The arguments of the command line.
 struct Request {
     folder: PathBuf,
     check: bool,

@@ -6,7 +6,7 @@ use crate::shell::{Hold, Shell};
 use crate::{Design, Equilibrium, Film, ShellError};
 
 /// Steps of finite differences, mm: of the tip's place and radius, of the posts' places, and of
-/// what moves cells with them.
+/// changes that move cells with them.
 const TIP_STEP_MM: f64 = 1e-3;
 const POST_STEP_MM: f64 = 2e-2;
 const MORPH_STEP_MM: f64 = 1e-3;
@@ -461,14 +461,14 @@ mod tests {
             ];
             // At rest there are no forces.
             if !Change::of_sweep().take(6).any(|load| load == change) {
-                let told = film.surface_rate(&film.rest(), &at_rest[k], POINT_MM);
-                pairs.push(("rest", told, slope(back.2, forth.2)));
+                let reported = film.surface_rate(&film.rest(), &at_rest[k], POINT_MM);
+                pairs.push(("rest", reported, slope(back.2, forth.2)));
             }
-            for (what, told, full) in pairs {
+            for (what, reported, full) in pairs {
                 for c in 0..3 {
                     assert!(
-                        (told[c] - full[c]).abs() < 2e-3 * full[c].abs() + 2e-4,
-                        "{change:?} {what} {c}: {told:?} {full:?}"
+                        (reported[c] - full[c]).abs() < 2e-3 * full[c].abs() + 2e-4,
+                        "{change:?} {what} {c}: {reported:?} {full:?}"
                     );
                 }
             }

@@ -209,7 +209,7 @@ impl Design {
         Ok(())
     }
 
-    /// Returns the film as a sheet, without what holds it.
+    /// Returns the film as a sheet, without posts.
     pub(crate) fn sheet(&self) -> Sheet {
         let ([sx, sy], [cxx, cxy, cyy]) = (self.thickness_slope, self.thickness_curve);
         Sheet {

@@ -47,7 +47,7 @@ pub(crate) struct Tip {
     pub radius_mm: f64,
 }
 
-/// What presses a film.
+/// The contact on a film.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Touched {
     /// A tip.
@@ -425,7 +425,7 @@ impl Film {
         }
     }
 
-    /// Returns the shares of each coefficient in what presses.
+    /// Returns the shares of each coefficient in the contact.
     pub(crate) fn shares_of(&self, touched: &Touched) -> Cow<'_, [f64]> {
         let grid = self.shell.grid();
         match touched {

@@ -65,8 +65,7 @@ struct Step {
 impl Problem<'_> {
     /// Finds the equilibrium from `start`.
     ///
-    /// # Errors
-    /// If there is none within reach.
+    /// # Errors If no equilibrium is within reach.
     pub fn solve(&self, solver: &Solver, start: &[f64]) -> Result<Solution, ShellError> {
         let mut u = start.to_vec();
         let mut guide_n = vec![0.0; self.guides.len()];

@@ -132,8 +132,7 @@ impl Patch {
 
     /// Returns several patches at once, each with its part of the force, of any sum > 0.
     ///
-    /// # Errors
-    /// If there are none, a part is < 0, or all are zero.
+    /// # Errors If `patches` is empty, a part is < 0, or all are zero.
     pub fn all(patches: &[(Patch, f64)]) -> Result<Patch, ShellError> {
         let points = patches.iter().flat_map(|(patch, part)| {
             let points = patch.points.iter();

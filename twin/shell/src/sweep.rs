@@ -50,8 +50,8 @@ pub fn solve_place(
     at_all_loads(film, place_mm, look)
 }
 
-/// Solves the film with the tip at one place, at rest and for all sizes and tilts, and returns what
-/// `look` makes of each solution.
+/// Solves the film with the tip at one place, at rest and for all sizes and tilts, and returns
+/// `look` of each solution.
 ///
 /// # Errors
 /// If no equilibrium is found, or `look` fails.

@@ -156,7 +156,7 @@ fn directions() -> impl Iterator<Item = [f64; 3]> {
     })
 }
 
-/// Returns what a load adds to marker 2's motion along x and z per function of
+/// Returns the part that a load adds to marker 2's motion along x and z per function of
 /// [`Pull::under_load`], with the tip at a place.
 fn known<const N: usize>(
     solved: &[Weighed],

@@ -109,7 +109,7 @@ fn images(down: [f64; 3], loads: &[Load]) -> Vec<[Images; 2]> {
     loads.iter().map(of_load).collect()
 }
 
-/// The largest difference between what weight does to the images in the full solution and in the
+/// The largest difference of the weight's effect on the images between the full solution and the
 /// reduced film, px.
 fn off_px(with: &[Images; 2], without: &[Images; 2]) -> f64 {
     let does = |way: usize, k: usize, c: usize| with[way][k][c] - without[way][k][c];

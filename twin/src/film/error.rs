@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// A load or a film outside what the tables hold for. The message names the item, the cause and the
+/// A load or a film outside the tables' range. The message names the item, the cause and the
 /// possible values.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FilmError {

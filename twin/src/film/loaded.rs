@@ -101,8 +101,7 @@ impl Film {
     /// Returns the same film with other dots. Dots other than the nominal ones move by the tables
     /// of the whole film.
     ///
-    /// # Errors
-    /// If the film has a weight: what that does is known of the nominal dots alone.
+    /// # Errors If the film has a weight, whose effect is known for the nominal dots alone.
     pub fn with_layout(self, layout: Layout) -> Result<Film, FilmError> {
         if layout.is_nominal() || self.down.is_none() {
             return Ok(Film { layout, ..self });

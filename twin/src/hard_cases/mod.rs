@@ -17,7 +17,7 @@ use crate::{Load, Motion, Options, Patch, Preset, Scene, SceneError};
 pub struct HardCase {
     /// Its name, such as `gain-0.30`; unique.
     pub name: String,
-    /// What makes it hard, for a reader.
+    /// Its difficulty, for a reader.
     pub what: String,
     /// The correct result of the sensing.
     pub expected: Expected,

@@ -1,4 +1,4 @@
-//! Files for other tools that write by the chip's loader: ST's DfuSe format (UM0391).
+//! Writes firmware files for other tools that use the chip's loader: ST's DfuSe format (UM0391).
 
 use super::Image;
 use crate::image::{FIRST_STAGE, PROGRAM};
@@ -13,8 +13,8 @@ const SUFFIX_BYTES: u8 = 16;
 
 impl Image {
     /// The image as a `.dfu` file: first stage and program, each with its address, without the
-    /// blank flash between them. For `dfu-util` and STM32CubeProgrammer, which erase what a file
-    /// fills.
+    /// blank flash between them. For `dfu-util` and STM32CubeProgrammer, which erase the sectors
+    /// that a file fills.
     pub fn dfuse(&self) -> Vec<u8> {
         let elements = [(FIRST_STAGE, self.first_stage()), (PROGRAM, self.program())];
         let mut target = Vec::new();

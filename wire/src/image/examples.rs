@@ -1,10 +1,10 @@
-//! Images for tests of what reads, sends or writes them.
+//! Images for tests.
 
 use crate::image::header::{CRC_AT, Header, Mark, UNSEALED};
 use crate::image::{FIRST_STAGE, HEADER_AT, Image, MARK_AT, PROGRAM};
 
-/// What an ELF loads, from the first stage on: 200 bytes of that, and a program of `length` bytes,
-/// at least 0x460, which depend on `seed`.
+/// The loaded bytes of an ELF: 200 of the first stage, and a program of `length` bytes, at least
+/// 0x460, which depend on `seed`.
 pub fn loaded(board: &str, version: &str, length: usize, seed: u8) -> Vec<u8> {
     let begin = (PROGRAM - FIRST_STAGE) as usize;
     let mut bytes = vec![0xFF; begin];
@@ -26,8 +26,7 @@ pub fn loaded(board: &str, version: &str, length: usize, seed: u8) -> Vec<u8> {
 
 /// Its image.
 ///
-/// # Panics
-/// If `length` is not from 0x460 bytes to what fits into flash.
+/// # Panics If `length` is below 0x460 bytes or exceeds the flash.
 pub fn image(board: &str, version: &str, length: usize, seed: u8) -> Image {
     let image = Image::of_loaded(loaded(board, version, length, seed));
     image.expect("a length in range")

@@ -38,8 +38,8 @@ impl Image {
         }
     }
 
-    /// Makes the image of an ELF: what it loads into flash, from the first stage on, gaps as blank
-    /// flash, with length and checksums in the header.
+    /// Makes the image of an ELF: its bytes in flash, from the first stage on, gaps as blank flash,
+    /// with length and checksums in the header.
     ///
     /// # Errors
     /// If it is not the firmware's ELF.
@@ -47,7 +47,7 @@ impl Image {
         Image::of_loaded(loaded(elf)?)
     }
 
-    /// Puts length and checksums into the header of what an ELF loads.
+    /// Puts length and checksums into the header of an ELF's bytes in flash.
     pub(crate) fn of_loaded(mut bytes: Vec<u8>) -> Result<Image, Refusal> {
         let length = bytes.len().next_multiple_of(WORD_BYTES as usize);
         bytes.resize(length, BLANK);
@@ -128,13 +128,12 @@ impl Image {
         &self.version
     }
 
-    /// What is written into a device, one part for each sector, in this order. `found` is how its
-    /// flash begins ([`FIRST_LOOK`](super::FIRST_LOOK) bytes). A first stage that is there stays:
-    /// until the last byte is written it finds a wrong checksum, and starts the loader again. Where
-    /// none is, it comes first.
+    /// The parts to write into a device, one for each sector, in this order. `found` is how its
+    /// flash begins ([`FIRST_LOOK`](super::FIRST_LOOK) bytes). An existing first stage stays: until
+    /// the last byte is written it finds a wrong checksum, and starts the loader again. A missing
+    /// one is written first.
     ///
-    /// # Errors
-    /// [`Refusal::OtherBoard`] if the first stage that is there is another board's.
+    /// # Errors [`Refusal::OtherBoard`] if the existing first stage is another board's.
     pub fn parts(&self, found: &[u8]) -> Result<Vec<Part<'_>>, Refusal> {
         let mut parts = Vec::new();
         match board_of(found) {
@@ -166,7 +165,7 @@ impl Image {
     }
 }
 
-/// What is written into a sector, from its begin on, once it is erased.
+/// The bytes of an erased sector, from its start on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Part<'a> {
     /// Address of the sector.
@@ -189,7 +188,7 @@ pub fn version_of(program: &[u8]) -> Option<String> {
     Some(text(program.get(at..at + TEXT_BYTES)?))
 }
 
-/// What an ELF loads into flash.
+/// An ELF's bytes in flash.
 fn loaded(elf: &[u8]) -> Result<Vec<u8>, Refusal> {
     let bad = |why: String| Refusal::BadElf(why);
     let file = ElfFile32::<Endianness>::parse(elf).map_err(|error| bad(error.to_string()))?;
@@ -259,7 +258,7 @@ fn put(bytes: &mut [u8], at: usize, word: u32) {
     bytes[at..at + 4].copy_from_slice(&word.to_le_bytes());
 }
 
-/// A text that is padded with zeros; what is not printed in ASCII becomes `?`.
+/// A text padded with zeros; characters other than printable ASCII become `?`.
 fn text(padded: &[u8]) -> String {
     let bytes = padded.iter().take_while(|byte| **byte != 0);
     let shown = bytes.map(|byte| match byte {

@@ -17,7 +17,7 @@ pub const FIRST_STAGE_MAGIC: [u8; 8] = *b"HiVTac 1";
 /// Begins a program's header.
 pub const PROGRAM_MAGIC: [u8; 8] = *b"HiVTacFW";
 
-/// What a part of an image is for.
+/// The layout, chip and board of a part of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Mark {
@@ -54,7 +54,7 @@ impl Mark {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct Header {
-    /// What the program is for.
+    /// The program's layout, chip and board.
     pub mark: Mark,
     /// The program's version.
     pub version: [u8; TEXT_BYTES],

@@ -23,7 +23,7 @@ pub use file::{Image, Part, board_of, version_of};
 #[cfg(feature = "images")]
 pub use refusal::Refusal;
 
-/// Addresses of the flash's first bank, which an image may fill. What outlives an update lies in
+/// Addresses of the flash's first bank, which an image may fill. Data that outlive an update are in
 /// the second one.
 pub const FLASH: Range<u32> = 0x0800_0000..0x0810_0000;
 /// Bytes of a sector, the smallest unit of an erase.

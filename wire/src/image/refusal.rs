@@ -1,9 +1,9 @@
-//! Why a file is not written.
+//! Reasons why a firmware file is refused.
 
 use crate::image::header::{CHIP, LAYOUT};
 use std::fmt;
 
-/// Why a file is no image for the device: what is wrong, where, and what to do.
+/// Why a file is no image for the device: the fault, its place, and the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// It has no mark of the sensor's firmware.

@@ -18,7 +18,7 @@ const BASELINE: &str = "xtask/baseline.json";
 /// Options of `cargo xtask bench`.
 #[derive(Args, Default)]
 pub struct Bench {
-    /// Make what is measured now the baseline that later counts are held to.
+    /// Make this measurement the baseline for later counts.
     #[arg(long)]
     write_baseline: bool,
     /// Count on a Cortex-M55 instead, for which there is no baseline.
@@ -76,7 +76,7 @@ impl Bench {
 /// One script, as described by `benchmark-cases` (in `tests`).
 #[derive(Deserialize)]
 struct Case {
-    /// What it measures, with its frame's size and format. A whole frame begins with `frame full`.
+    /// The item, with its frame's size and format. A whole frame begins with `frame full`.
     name: String,
     file: PathBuf,
 }

@@ -12,7 +12,7 @@ for module in $MODULES; do insmod "/modules/$module.ko" || echo "module $module 
 ip link set lo up
 ip addr add 10.0.2.15/24 dev eth0
 ip link set eth0 up
-# What is judged begins here.
+# The judged part begins here.
 dmesg -c > /dev/null
 
 DEVICE=/sys/bus/usb/devices/1-1

@@ -1,6 +1,6 @@
 //! Linux itself as the USB host of the rig: a Debian kernel in QEMU attaches the emulated device by
-//! USB/IP, and does to its port what Linux can do. Forces come back, and the kernel warns of
-//! nothing.
+//! USB/IP, and resets, suspends and unplugs its port. Forces must continue, and the kernel must not
+//! warn.
 
 use std::path::Path;
 use std::process::Command;
@@ -46,7 +46,7 @@ pub fn test(firmware: &Path, tally: &mut Tally) -> Result<()> {
     judge_rig(&serde_json::from_str(&process::read(&stats)?)?)
 }
 
-/// Judges what the rig counted: its bus was reset and suspended as often as Linux did it.
+/// Checks the rig's counters: its bus was reset and suspended as often as Linux did it.
 fn judge_rig(stats: &Value) -> Result<()> {
     let usb = &stats["usb"];
     let count = |name: &str| usb[name].as_u64().with_context(|| format!("no {name}"));

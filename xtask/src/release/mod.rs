@@ -1,5 +1,5 @@
-//! `cargo xtask release`: makes and checks the files of a release. The scripts beside this file do
-//! what only runs other programs; `.github/workflows/release.yml` runs one of them, too.
+//! `cargo xtask release`: makes and checks the files of a release. The scripts in this folder only
+//! run other programs; `.github/workflows/release.yml` also runs one of them.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -25,7 +25,7 @@ pub struct Release {
 }
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
-/// Where the version is written: a file, and what is before and behind it.
+/// Where the version is written: a file, and the text before and behind it.
 const WRITTEN: [(&str, &str, &str); 5] = [
     ("Cargo.toml", "\nversion = \"", "\"\n"),
     ("tests/qemu/Cargo.toml", "\nversion = \"", "\"\n"),
@@ -43,7 +43,7 @@ const LINUX: [&str; 4] = [
     "aarch64-unknown-linux-gnu",
     "aarch64-unknown-linux-musl",
 ];
-/// What builds programs and wheels for other computers.
+/// Packages that build programs and wheels for other computers.
 const BUILDERS: [&str; 3] = ["maturin>=1.9,<2", "cargo-zigbuild>=0.20,<1", "ziglang"];
 
 impl Release {
@@ -128,7 +128,7 @@ fn git(words: &str) -> Command {
     git
 }
 
-/// Checks that a tag of this version would mark what is built.
+/// Checks that a tag of this version would mark this build.
 fn may_be_tagged(version: &str) -> Result<()> {
     let changed = process::output(&mut git("status --porcelain"))?;
     ensure!(changed.is_empty(), "not committed yet:\n{changed}");
@@ -163,7 +163,7 @@ fn firmware_and_page(folder: &Path) -> Result<()> {
     process::run(tar.arg(packed).arg("-C").arg(web::page(&images)?).arg("."))
 }
 
-/// A command that runs a script beside this file, in the project's root.
+/// A command that runs a script of this folder, in the project's root.
 fn script(name: &str, folders: &[&Path]) -> Command {
     let mut command = Command::new("sh");
     command.arg(toolchain::at("xtask/src/release").join(name));

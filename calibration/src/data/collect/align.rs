@@ -109,8 +109,7 @@ fn rate_n_per_s(gauge: Joined<'_>, time_s: f64) -> Option<f64> {
 
 /// Determines the lag of the gauge's clock.
 ///
-/// # Errors
-/// When the peak is not convincing; says why and what to do.
+/// # Errors When the peak is not convincing: the reason and the remedy.
 pub fn align(frames: &[RadiusSample], gauge: Joined<'_>, search: Search) -> Result<Alignment> {
     ensure!(
         frames.len() >= FEWEST,

@@ -1,5 +1,5 @@
-//! What presses anywhere cover: places on the film by ranges of force, and what is still missing.
-//! Both as text and maps for a person.
+//! The coverage of presses anywhere: which places and ranges of force are covered or missing, as
+//! text and maps.
 
 use std::fmt;
 
@@ -168,7 +168,7 @@ impl Coverage {
         }
     }
 
-    /// What to do next, in a sentence; `None` when all is covered.
+    /// The next action, in a sentence; `None` when all is covered.
     pub fn advice(&self) -> Option<String> {
         self.gaps().first().map(Gap::to_string)
     }

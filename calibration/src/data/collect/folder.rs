@@ -543,7 +543,7 @@ fn pose(record: &csv::StringRecord, [angles, place]: [usize; 2]) -> Result<Optio
     poses::parse(&texts.join(",")).map(Some)
 }
 
-/// Reads what [`Folder::covered`] recorded.
+/// Reads the records of [`Folder::covered`].
 fn read_covered(path: &Path) -> Result<Vec<([f64; 2], f64)>> {
     let text =
         fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;

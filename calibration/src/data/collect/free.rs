@@ -27,7 +27,7 @@ pub(super) struct FreeTake {
     first_us: Option<u64>,
     last_us: u64,
     /// Whether the sensor's model gives places.
-    tells_places: bool,
+    gives_places: bool,
     /// The present press: place, mm, and force, N.
     now: Option<([f64; 2], f64)>,
     shown: Instant,
@@ -50,7 +50,7 @@ impl FreeTake {
             length_s,
             first_us: None,
             last_us: 0,
-            tells_places: false,
+            gives_places: false,
             now: None,
             shown: Instant::now(),
             is_drawn: false,
@@ -70,7 +70,7 @@ impl FreeTake {
             let felt_n = f64::from(force.magnitude.0) / 1e6;
             Some((place_mm, gauge_n.map_or(felt_n, f64::abs)))
         });
-        self.tells_places |= self.now.is_some();
+        self.gives_places |= self.now.is_some();
         let (place_mm, force_n) = self.now?;
         let cell = Cell::of(place_mm, force_n)?;
         let is_new = self.coverage.press(cell, step_s.min(LONGEST_FRAME_S));
@@ -93,7 +93,7 @@ impl FreeTake {
         self.left_s() == 0.0 || lasted_s >= LEAST_S && self.coverage.is_complete()
     }
 
-    /// Shows the coverage and what is missing: a map on a terminal, a line elsewhere.
+    /// Shows the coverage: a map on a terminal, a line elsewhere.
     pub fn show(&mut self, sample: &Sample) {
         let mut terminal = std::io::stderr();
         if !terminal.is_terminal() {
@@ -160,10 +160,9 @@ impl FreeTake {
     /// Coverage and advice on one line.
     fn line(&self) -> String {
         let left_s = self.left_s();
-        if !self.tells_places {
+        if !self.gives_places {
             return format!(
-                "{left_s:.0} s left; the sensor has told no place yet: what is covered is not \
-                 known"
+                "{left_s:.0} s left; the sensor has given no place yet: the coverage is unknown"
             );
         }
         let [covered, all] = self.coverage.count();
@@ -174,9 +173,9 @@ impl FreeTake {
 
     /// The final summary.
     pub fn end(&self) -> String {
-        if !self.tells_places {
-            return "The sensor told no place: what is covered is not known. With a model that \
-                    tells places (`hivtac info`) it would be shown."
+        if !self.gives_places {
+            return "The sensor gave no place: the coverage is unknown. With a model of places \
+                    (`hivtac info`) it would be shown."
                 .to_owned();
         }
         let [covered, all] = self.coverage.count();
@@ -273,6 +272,6 @@ mod tests {
         let mut take = FreeTake::new(180.0, 0.0, &[]);
         take.sample(&sample(0.0, 100, None), None);
         assert!(take.line().contains("no place"), "{}", take.line());
-        assert!(take.end().contains("told no place"), "{}", take.end());
+        assert!(take.end().contains("gave no place"), "{}", take.end());
     }
 }

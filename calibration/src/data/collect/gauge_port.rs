@@ -21,8 +21,7 @@ pub struct GaugeArgs {
     /// Its baud rate.
     #[arg(long, default_value_t = 19_200, requires = "gauge_port")]
     pub gauge_baud: u32,
-    /// For a gauge that only answers: what it is asked with, again and again (`\r` and `\n` as in
-    /// C).
+    /// For a gauge that only answers: the request to repeat (`\r` and `\n` as in C).
     #[arg(long, value_name = "TEXT", requires = "gauge_port")]
     pub gauge_ask: Option<String>,
     /// The unit of readings that name none: N when it is not said.

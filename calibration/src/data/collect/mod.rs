@@ -45,8 +45,8 @@ pub enum CollectCommand {
     Record(record::RecordArgs),
     /// Align the clocks of a recording and write its data set.
     Align(AlignArgs),
-    /// Write what a gauge with a clock of its own would have recorded of a rig's run, to try all
-    /// this without a gauge.
+    /// Write the file that a gauge with a clock of its own would have recorded of a rig's run, to
+    /// try all this without a gauge.
     SimulateGauge(simulated::SimulateArgs),
 }
 
@@ -56,17 +56,17 @@ pub struct AlignArgs {
     /// The folder that was recorded into.
     #[arg(long, value_name = "FOLDER")]
     recording: PathBuf,
-    /// What the gauge recorded by itself: a line for each reading, seconds and force. One file for
-    /// all runs, or repeated, one for each run with a pose, in order; a file whose clock starts
-    /// again counts as one more from there. Without it, what `record` heard of the gauge.
+    /// The gauge's own recording: a line for each reading, seconds and force. One file for all
+    /// runs, or repeated, one for each run with a pose, in order; a file whose clock starts again
+    /// counts as one more from there. By default the lines that `record` received from the gauge.
     #[arg(long, value_name = "FILE")]
     gauge: Vec<PathBuf>,
     /// The unit of readings that name none: N when it is not said.
     #[arg(long, value_name = "UNIT")]
     gauge_unit: Option<Unit>,
-    /// What the poses' angles say: `force` (the direction of the force, as of a weight that hangs),
-    /// or the pressing direction of a tip that sticks (`stick`) or slips from a friction ratio on
-    /// (`slip:0.6`).
+    /// The meaning of the poses' angles: `force` (the direction of the force, as of a weight that
+    /// hangs), or the pressing direction of a tip that sticks (`stick`) or slips from a friction
+    /// ratio on (`slip:0.6`).
     #[arg(long, default_value = "force")]
     contact: Contact,
     /// Take only stretches in which the force was held, each as one load: for `unit`.
@@ -94,8 +94,7 @@ pub fn direction_deg(text: &str) -> Result<f64, String> {
 impl CollectCommand {
     /// Runs it.
     ///
-    /// # Errors
-    /// What failed, and what to do.
+    /// # Errors The failure and the remedy.
     pub fn run(self) -> Result<()> {
         match self {
             CollectCommand::Record(args) => record::record(&args),

@@ -15,7 +15,7 @@ use super::folder::{Folder, conditions_of};
 use super::free::FreeTake;
 use super::gauge_port::{GaugeArgs, GaugePort};
 use super::poses::{self, Person, Pose, Task};
-use super::take::{Heard, Take};
+use super::take::{GaugeActivity, Take};
 use super::watched::Watched;
 
 /// Options of `collect record`.
@@ -60,8 +60,8 @@ pub struct FreeArgs {
     #[arg(long, value_name = "α,β", value_parser = axis, default_value = "0,0")]
     #[arg(allow_hyphen_values = true, requires = "free")]
     pub axis: Pose,
-    /// Show what such presses cover on a live page, too, as `hivtac view` shows a sensor; the
-    /// address is said.
+    /// Also show the coverage of such presses on a live page, as `hivtac view` shows a sensor; the
+    /// address is printed.
     #[arg(long, requires = "free")]
     pub view: bool,
 }
@@ -299,7 +299,7 @@ impl Recorder {
         if let Some(watched) = &mut self.watched {
             watched.recording(true, text);
         }
-        let mut heard = Heard::from(self.gauge_readings()?);
+        let mut activity = GaugeActivity::from(self.gauge_readings()?);
         let mut take = Take::default();
         let mut early = Vec::new();
         self.link
@@ -310,7 +310,7 @@ impl Recorder {
         let length_us = (seconds * 1e6) as u64;
         let mut deadline = Instant::now() + self.patience;
         while !self.is_over(&take, length_us) {
-            if heard.is_silent(self.gauge_readings()?) {
+            if activity.is_silent(self.gauge_readings()?) {
                 bail!("{}", self.silence());
             }
             let Some(message) = self.link.receive(deadline)? else {
@@ -330,7 +330,7 @@ impl Recorder {
         for message in late {
             self.keep(message, pose, &mut take)?;
         }
-        let readings = heard.since(self.gauge_readings()?);
+        let readings = activity.since(self.gauge_readings()?);
         self.sum_up(&take, readings, task.is_none())?;
         Ok(take)
     }
@@ -339,9 +339,9 @@ impl Recorder {
     /// may be none yet: a gauge that must be asked may begin slowly. But one that sends only
     /// invalid lines does not recover.
     fn sum_up(&self, take: &Take, readings: Option<usize>, is_rest: bool) -> Result<()> {
-        let heard = readings.map_or(String::new(), |count| format!(", {count} gauge readings"));
+        let of_gauge = readings.map_or(String::new(), |count| format!(", {count} gauge readings"));
         eprintln!(
-            "{} samples ({} with markers, {} lost){heard}.",
+            "{} samples ({} with markers, {} lost){of_gauge}.",
             take.samples, take.good, take.lost
         );
         let is_unreadable = self.gauge.as_ref().is_some_and(GaugePort::is_unreadable);

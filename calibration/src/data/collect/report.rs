@@ -45,7 +45,7 @@ pub struct RunReport {
     pub rejected: BTreeMap<String, usize>,
     /// Whether the gauge shows pressing as negative, and its sign was reversed.
     pub is_turned: bool,
-    /// What was wrong with the gauge's lines.
+    /// The faults of the gauge's lines.
     pub complaint: Option<String>,
 }
 

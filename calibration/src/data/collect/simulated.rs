@@ -38,7 +38,7 @@ pub struct SimulatedGauge {
     /// Standard deviation of its readings, N.
     #[arg(skip = SimulatedGauge::default().noise_n)]
     pub noise_n: f64,
-    /// What it shows without a force, N.
+    /// Its reading without a force, N.
     #[arg(skip = SimulatedGauge::default().zero_n)]
     pub zero_n: f64,
     /// One line in this number is damaged; 0: no line.

@@ -51,7 +51,7 @@ const SILENT: Duration = Duration::from_secs(10);
 
 /// The gauge's readings during a take.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Heard {
+pub(super) struct GaugeActivity {
     /// Number of readings before it.
     before: Option<usize>,
     /// Number of readings so far, and when it last changed.
@@ -59,7 +59,7 @@ pub(super) struct Heard {
     at: Instant,
 }
 
-impl Heard {
+impl GaugeActivity {
     pub fn from(readings: Option<usize>) -> Self {
         Self {
             before: readings,

@@ -55,7 +55,7 @@ impl Watched {
         self.tell();
     }
 
-    /// Adds a sample of a take with this content; `coverage` computes what it covers.
+    /// Adds a sample of a take with this content; `coverage` computes its coverage.
     pub fn sample(
         &mut self,
         sample: &Sample,

@@ -15,7 +15,7 @@ use hivtac_twin::Frame;
 use super::{Observation, Recipe};
 use crate::data::rest::features_to_q16;
 
-/// What was found in a frame, or the reason for a refusal.
+/// The markers found in a frame, or the reason for a refusal.
 pub type Detection = Result<Observation, String>;
 
 /// Finds markers in frames.
@@ -34,7 +34,7 @@ pub type Detectors<'a> = Vec<Box<dyn MarkerDetector + 'a>>;
 pub struct Sensing<'m>(Box<Sensor<'m>>);
 
 impl Sensing<'static> {
-    /// Finds markers and features without a model: refuses only what cannot be markers.
+    /// Finds markers and features without a model: refuses only images that cannot be markers.
     ///
     /// # Errors
     /// When the recipe's frames do not exist.

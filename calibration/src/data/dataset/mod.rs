@@ -26,7 +26,7 @@ pub use generate::generate;
 pub use recipe::{Loads, Recipe};
 pub use resume::{generate_file, generate_files};
 
-/// Rows, and what they mean.
+/// Rows, and their meaning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     /// Its origin and the meaning of its numbers.
@@ -104,14 +104,14 @@ pub struct Row {
     /// Standard uncertainty of |F|, N, from the clocks' lag, the time between readings and the rate
     /// of the force. `None` where the force was held, or is known otherwise.
     pub clock_n: Option<f64>,
-    /// What was seen, or names of the status bits that explain why not.
+    /// The observation, or names of the status bits that explain its absence.
     pub seen: Result<Observation, String>,
 }
 
 /// A row whose markers were found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<'a> {
-    /// What was seen.
+    /// The observation.
     pub seen: &'a Observation,
     /// The labelled force, N: [`Row::force_n`].
     pub force_n: [f64; 3],
@@ -135,7 +135,7 @@ impl<'a> Sample<'a> {
     }
 }
 
-/// What the pipeline measured in a frame.
+/// The pipeline's measurement of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Observation {
     /// The features, px and the last in px².

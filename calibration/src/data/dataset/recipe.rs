@@ -30,7 +30,8 @@ pub enum Loads {
     Measured(usize),
 }
 
-/// What to generate. What has no argument is for studies, which make their recipes themselves.
+/// The recipe of a data set. Fields without an argument are for studies, which make their recipes
+/// themselves.
 #[derive(Args, Clone, Copy, Debug, PartialEq)]
 pub struct Recipe {
     /// Lens and camera.
@@ -42,13 +43,13 @@ pub struct Recipe {
     /// Rows of a frame.
     #[arg(long, default_value_t = Recipe::default().height)]
     pub height: u16,
-    /// What a pixel is: rgb565, yuv422 or mono.
+    /// Pixel format: rgb565, yuv422 or mono.
     #[arg(long, value_parser = pixel_format, default_value = "rgb565")]
     pub format: PixelFormat,
     /// How markers' positions are taken.
     #[arg(skip = Recipe::default().centroid)]
     pub centroid: CentroidEstimator,
-    /// What the loads' labels mean.
+    /// The meaning of the loads' labels.
     #[arg(skip)]
     pub contact: Contact,
     /// Random loads of each session.

@@ -4,7 +4,7 @@
 use crate::capture::event::{Band, Edge, Ending, Event};
 use crate::capture::shape::Shape;
 
-/// What the caller has to do next.
+/// The caller's next action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
     /// No action.

@@ -16,7 +16,7 @@ use hivtac_wire::message::{DeviceHello, Outcome, Sample};
 use hivtac_wire::settings::Name;
 use hivtac_wire::version::HelloPrefix;
 
-/// What identifies a device to a host.
+/// A device's identity for a host.
 pub struct Identity<'a> {
     /// The unit's number.
     pub device_id: [u8; 12],
@@ -60,7 +60,7 @@ pub fn hello(identity: &Identity<'_>, pipeline: Option<OfPipeline>, name: Name) 
     }
 }
 
-/// Formats text; what does not fit is dropped, from the end.
+/// Formats text; an end that does not fit is cut.
 pub fn text<const N: usize>(words: fmt::Arguments) -> String<N> {
     struct Cut<const N: usize>(String<N>);
     impl<const N: usize> Write for Cut<N> {
@@ -100,8 +100,8 @@ pub fn given_up(tare: &TareBuilder) -> Outcome {
     }
 }
 
-/// Returns the sample of a measured frame. `on_the_way` has the status bits of what happened before
-/// the frame was measured.
+/// Returns the sample of a measured frame. `on_the_way` has the status bits of events before the
+/// frame was measured.
 pub fn sample(
     sequence: u32,
     moment: Moment,

@@ -1,4 +1,4 @@
-//! The settings in use against the kept ones.
+//! Compares the settings in use with the kept ones.
 
 use crate::device::settings::{InUse, drift};
 use hivtac_wire::kept::Record;
@@ -42,7 +42,7 @@ pub fn keep(record: &mut Record, selection: Selection, used: InUse, camera: &Cam
     }
 }
 
-/// The state of what keeps a record.
+/// The state of the record's storage.
 pub struct Keeper {
     /// Its content at the start.
     pub found: Found,

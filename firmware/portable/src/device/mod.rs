@@ -1,11 +1,11 @@
-//! What a device does with settings, rest positions and models, whatever it runs on: the firmware,
-//! or the twin on a computer (`host-tool/src/live/`). No register, no task, no allocation.
+//! A device's settings, rest positions and models, for the firmware and for the twin on a computer
+//! (`host-tool/src/live/`). No register, no task, no allocation.
 //!
 //! | module | subject |
 //! |---|---|
 //! | [`camera`] | each camera's frame, rates and times |
 //! | [`settings`] | the settings in use, as the host sees them; rest positions of a host |
-//! | [`kept`] | the settings in use against the kept ones |
+//! | [`kept`] | compares the settings in use with the kept ones |
 //! | [`model`] | which models fit, and how one replaces another |
 //! | [`answer`] | the messages of hello, tare and sample |
 

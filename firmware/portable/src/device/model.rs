@@ -12,7 +12,7 @@ use hivtac_terms::threshold::{ByteOrder, PixelFormat, Threshold};
 use hivtac_wire::kept::Record;
 use hivtac_wire::message::Outcome;
 
-/// What a model must fit: the camera, and the unit.
+/// The camera and the unit that a model must fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Fitting {
     /// Its lens and pixels.

@@ -112,7 +112,7 @@ impl InUse {
     }
 }
 
-/// Returns what is known of gravity: unknown if it is not a valid direction.
+/// Returns this gravity, or unknown if it is not a valid direction.
 pub fn known(down: Down) -> Down {
     let is_sound = down.direction().is_none_or(Direction::is_sound);
     if is_sound { down } else { Down::Unknown }

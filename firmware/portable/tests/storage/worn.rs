@@ -111,10 +111,10 @@ fn both_sectors_wear_alike() {
         let action = Action::Set(save.to_le_bytes().to_vec());
         device.act(&action).unwrap().unwrap();
     }
-    let told = device.erases();
+    let reported = device.erases();
     let [first, second, ..] = cells.erases;
     assert!(first.abs_diff(second) <= 1, "{:?}", cells.erases);
     // Two words for each record and its seal: twelve of them a sector.
     assert_eq!(first + second, 1000_u32.div_ceil(12));
-    assert_eq!(told, first + second);
+    assert_eq!(reported, first + second);
 }

@@ -1,5 +1,5 @@
 // Presses the film of a simulated sensor by mouse, pen, finger or keys, and shows the true press
-// beside what the sensor says of the same frame.
+// next to the sensor's answer for the same frame.
 
 /** Half the side of the shown film, the largest distance of a press, the markers' distance, mm. */
 const FILM_MM = 5;
@@ -145,7 +145,7 @@ export class Press {
     this.send();
   }
 
-  /** Sends what the hand does now; while an order is on its way, only the newest waits. */
+  /** Sends the hand's press; while an order is on its way, only the newest waits. */
   async send() {
     this.waits = true;
     if (this.sends) return;

@@ -2,7 +2,7 @@
 
 /**
  * Converts a sample of the stream to named values in mN, degrees, mm and mN·mm. `parts` has the
- * two contacts that the force is the sum of, if they are told apart.
+ * two contacts that the force is the sum of, if they are resolved.
  */
 export function named([sequence, frame, timeUs, status, row, parts = []]) {
   const force = row && namedForce(row);

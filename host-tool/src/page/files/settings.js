@@ -1,4 +1,4 @@
-// Sets the shape of what presses, and shows the one in use.
+// Sets the contact's shape, and shows the one in use.
 
 const HAS_RADIUS = ["round", "flat"];
 

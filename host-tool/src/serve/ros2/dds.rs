@@ -82,25 +82,6 @@ pub(super) struct Request {
     header: Vec<u8>,
 }
 
-impl Dds {
-    /// Joins a domain as a node with this name.
-    pub(super) fn join(name: &str, domain: u16) -> Result<Dds, Trouble> {
-        let mut participant = DomainParticipantBuilder::new(domain);
-        if stays_here() {
-            participant = participant.with_only_networks([Ipv4Addr::LOCALHOST]);
-        }
-        let context = Context::from_domain_participant(participant.build()?)?;
-        // A log topic and parameters would be empty.
-        let options = NodeOptions::new().enable_rosout(false);
-        let node = context.new_node(NodeName::new("/", name)?, options)?;
-        Ok(Dds {
-            node,
-            context,
-            own_topic: None,
-        })
-    }
-}
-
 /// Whether the environment, as for all of ROS 2, restricts traffic to this computer.
 fn stays_here() -> bool {
     let is = |name: &str, value: &str| std::env::var_os(name).is_some_and(|it| it == value);
@@ -129,6 +110,25 @@ impl Middleware for Dds {
     type Subscription = Subscription<Body>;
     type Service = Server<Body, Body>;
     type Request = Request;
+
+    const ON: &str = "";
+    const ADVICE: &str = "is a network up, and is UDP allowed?";
+
+    fn join(name: &str, domain: u16) -> Result<Dds, Trouble> {
+        let mut participant = DomainParticipantBuilder::new(domain);
+        if stays_here() {
+            participant = participant.with_only_networks([Ipv4Addr::LOCALHOST]);
+        }
+        let context = Context::from_domain_participant(participant.build()?)?;
+        // A log topic and parameters would be empty.
+        let options = NodeOptions::new().enable_rosout(false);
+        let node = context.new_node(NodeName::new("/", name)?, options)?;
+        Ok(Dds {
+            node,
+            context,
+            own_topic: None,
+        })
+    }
 
     fn publisher(&mut self, topic: &str, kind: &str) -> Result<Self::Publisher, Trouble> {
         self.own_topic.get_or_insert_with(|| format!("rt{topic}"));

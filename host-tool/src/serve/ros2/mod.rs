@@ -34,13 +34,20 @@ const ALONE: Duration = Duration::from_secs(10);
 /// Why an entity of the node could not be made, or a message not be sent.
 type Trouble = Box<dyn std::error::Error + Send + Sync>;
 
-/// What carries a node's messages. Names of topics and services are absolute; types are such as
+/// The carrier of a node's messages. Names of topics and services are absolute; types are such as
 /// `std_msgs/msg/Bool`.
-trait Middleware: Sized {
+trait Middleware: Sized + 'static {
     type Publisher;
     type Subscription;
     type Service;
     type Request;
+
+    /// Its name in the message of a domain that cannot be joined, and advice for that.
+    const ON: &str;
+    const ADVICE: &str;
+
+    /// Joins a domain as a node with this name.
+    fn join(name: &str, domain: u16) -> Result<Self, Trouble>;
 
     /// A writer that is reliable and therefore reaches reliable and best-effort subscriptions. A
     /// slow subscription loses the oldest of the last [`KEPT`] messages.
@@ -70,7 +77,7 @@ trait Middleware: Sized {
     /// Whether another node of this node's name is seen.
     fn has_namesake(&self) -> bool;
 
-    /// What to check when no other program is seen.
+    /// Advice when no other program is seen.
     fn advice(&self) -> String;
 }
 
@@ -112,33 +119,39 @@ struct Node<M: Middleware> {
 }
 
 /// Joins a domain as a node with this name, with the devices' topics and services below it, and the
-/// topics of a grip if there is one.
+/// topics of a grip, if any.
 ///
-/// # Errors
-/// When there is no network to join, not even this computer's own, or the environment has settings
-/// of Zenoh that are none.
+/// # Errors When there is no network to join, not even this computer's own, or the environment has
+/// invalid settings of Zenoh.
 pub fn open(
     name: &str,
     domain: u16,
     served: &[Served],
     has_grip: bool,
 ) -> Result<Box<dyn Outlet>, Failure> {
-    let failure = |error: Trouble, on: &str, advice: &str| {
-        Failure::input(format!(
-            "cannot take part in ROS 2's domain {domain}{on}: {error}; {advice}"
-        ))
-    };
     #[cfg(feature = "zenoh")]
     if is_on_zenoh() {
-        let open = zenoh::Zenoh::join(name, domain);
-        let node = open.and_then(|it| Node::open(it, name, domain, served, has_grip));
-        let node = node.map_err(|error| failure(error, " on Zenoh", zenoh::SETTINGS))?;
-        return Ok(Box::new(node));
+        return open_on::<zenoh::Zenoh>(name, domain, served, has_grip);
     }
-    let open = dds::Dds::join(name, domain);
-    let node = open.and_then(|it| Node::open(it, name, domain, served, has_grip));
-    let advice = "is a network up, and is UDP allowed?";
-    Ok(Box::new(node.map_err(|error| failure(error, "", advice))?))
+    open_on::<dds::Dds>(name, domain, served, has_grip)
+}
+
+fn open_on<M: Middleware>(
+    name: &str,
+    domain: u16,
+    served: &[Served],
+    has_grip: bool,
+) -> Result<Box<dyn Outlet>, Failure> {
+    let joined = M::join(name, domain);
+    let node = joined.and_then(|it| Node::open(it, name, domain, served, has_grip));
+    let node = node.map_err(|error| {
+        Failure::input(format!(
+            "cannot take part in ROS 2's domain {domain}{}: {error}; {}",
+            M::ON,
+            M::ADVICE
+        ))
+    })?;
+    Ok(Box::new(node))
 }
 
 impl<M: Middleware> Node<M> {

@@ -1,6 +1,6 @@
 //! Zenoh as a node's middleware, as `rmw_zenoh_cpp` speaks it: a key for each topic and service,
-//! liveliness tokens that announce them, and with each message an attachment that says when it was
-//! sent and by whom.
+//! liveliness tokens that announce them, and an attachment of each message with its time and
+//! sender.
 
 use super::{KEPT, Middleware, Trouble};
 use hivtac_host::clock::now_ns;
@@ -19,9 +19,6 @@ use zenoh::{Config, Session, Wait};
 /// The environment variables with a file of the session's configuration, and with single settings.
 const CONFIGURATION: &str = "ZENOH_SESSION_CONFIG_URI";
 const OVERRIDE: &str = "ZENOH_CONFIG_OVERRIDE";
-/// What to check when a session cannot be opened.
-pub(super) const SETTINGS: &str =
-    "are ZENOH_SESSION_CONFIG_URI and ZENOH_CONFIG_OVERRIDE as rmw_zenoh_cpp wants them?";
 /// A session without such a file: it finds others through the router of this computer, and listens
 /// to this computer alone.
 const USUAL: [(&str, &str); 6] = [
@@ -59,7 +56,7 @@ pub(super) struct Zenoh {
 /// The keys of the tokens that are alive.
 type Tokens = Arc<Mutex<BTreeSet<String>>>;
 
-/// What an endpoint is, as tokens have it.
+/// The role of an endpoint, as in its token.
 #[derive(Clone, Copy)]
 enum Role {
     Publisher,
@@ -86,16 +83,12 @@ impl Role {
     }
 }
 
-/// An endpoint's identity, and the number of its messages.
-struct Author {
+/// A publisher, with its identity and the number of its messages.
+pub(super) struct Publisher {
+    publisher: zenoh::pubsub::Publisher<'static>,
     gid: [u8; GID],
     sent: AtomicI64,
-    token: LivelinessToken,
-}
-
-pub(super) struct Publisher {
-    author: Author,
-    publisher: zenoh::pubsub::Publisher<'static>,
+    _token: LivelinessToken,
 }
 
 pub(super) struct Subscription {
@@ -140,42 +133,13 @@ fn configuration() -> Result<Config, Trouble> {
 }
 
 impl Zenoh {
-    /// Opens a session and joins a domain as a node with this name. A router that is not there yet
-    /// is waited for in the background.
-    pub(super) fn join(name: &str, domain: u16) -> Result<Zenoh, Trouble> {
-        let session = zenoh::open(configuration()?).wait()?;
-        let tokens = Tokens::default();
-        let alive = tokens.clone();
-        let watch = session.liveliness();
-        let watch = watch.declare_subscriber(format!("{TOKENS}/{domain}/**"));
-        let watch = watch.history(true).callback(move |sample| {
-            let mut alive = alive.lock().unwrap_or_else(PoisonError::into_inner);
-            let key = sample.key_expr().as_str();
-            match sample.kind() {
-                SampleKind::Put => alive.insert(key.to_owned()),
-                SampleKind::Delete => alive.remove(key),
-            };
-        });
-        let watch = watch.wait()?;
-        let key = token(domain, &session.zid().to_string(), 0, "NN", name);
-        Ok(Zenoh {
-            _token: session.liveliness().declare_token(key).wait()?,
-            _watch: watch,
-            session,
-            domain,
-            name: name.to_owned(),
-            entities: 0,
-            tokens,
-        })
-    }
-
-    /// The key of a new endpoint, and its token with the identity that follows from it.
+    /// The keys of a new endpoint and of its token.
     fn endpoint(
         &mut self,
         role: Role,
         name: &str,
         type_name: &str,
-    ) -> Result<(String, Author), Trouble> {
+    ) -> Result<[String; 2], Trouble> {
         let hash = type_hash::of(type_name);
         let hash = hash.ok_or_else(|| format!("the hash of {type_name} is unknown"))?;
         let type_name = dds_name(type_name);
@@ -190,14 +154,13 @@ impl Zenoh {
         );
         let (mangled, quality) = (name.replace('/', "%"), role.quality());
         let token = format!("{node}/{mangled}/{type_name}/{hash}/{quality}");
-        let author = Author {
-            gid: xxh3_128(token.as_bytes()).to_le_bytes(),
-            sent: AtomicI64::new(0),
-            token: self.session.liveliness().declare_token(token).wait()?,
-        };
         let topic = name.trim_start_matches('/');
         let key = format!("{}/{topic}/{type_name}/{hash}", self.domain);
-        Ok((key, author))
+        Ok([key, token])
+    }
+
+    fn declare(&self, token: String) -> Result<LivelinessToken, Trouble> {
+        self.session.liveliness().declare_token(token).wait()
     }
 
     /// Whether a token of another session is alive whose parts fulfil a condition.
@@ -225,7 +188,7 @@ fn dds_name(type_name: &str) -> String {
     }
 }
 
-/// What goes with a message: its number, when it was sent, ns since 1970, and by whom, in the
+/// A message's attachment: its number, its time, ns since 1970, and its sender, in the
 /// serialization of Zenoh's libraries.
 fn attachment(number: i64, gid: [u8; GID]) -> Vec<u8> {
     let sent_ns = i64::try_from(now_ns()).unwrap_or(i64::MAX);
@@ -247,40 +210,73 @@ impl Middleware for Zenoh {
     type Service = Service;
     type Request = Request;
 
+    const ON: &str = " on Zenoh";
+    const ADVICE: &str =
+        "are ZENOH_SESSION_CONFIG_URI and ZENOH_CONFIG_OVERRIDE as rmw_zenoh_cpp wants them?";
+
+    /// Does not wait for a router, which is looked for in the background.
+    fn join(name: &str, domain: u16) -> Result<Zenoh, Trouble> {
+        let session = zenoh::open(configuration()?).wait()?;
+        let tokens = Tokens::default();
+        let alive = tokens.clone();
+        let watch = session.liveliness();
+        let watch = watch.declare_subscriber(format!("{TOKENS}/{domain}/**"));
+        let watch = watch.history(true).callback(move |sample| {
+            let mut alive = alive.lock().unwrap_or_else(PoisonError::into_inner);
+            let key = sample.key_expr().as_str();
+            match sample.kind() {
+                SampleKind::Put => alive.insert(key.to_owned()),
+                SampleKind::Delete => alive.remove(key),
+            };
+        });
+        let watch = watch.wait()?;
+        let key = token(domain, &session.zid().to_string(), 0, "NN", name);
+        Ok(Zenoh {
+            _token: session.liveliness().declare_token(key).wait()?,
+            _watch: watch,
+            session,
+            domain,
+            name: name.to_owned(),
+            entities: 0,
+            tokens,
+        })
+    }
+
     fn publisher(&mut self, topic: &str, kind: &str) -> Result<Publisher, Trouble> {
-        let (key, author) = self.endpoint(Role::Publisher, topic, kind)?;
+        let [key, token] = self.endpoint(Role::Publisher, topic, kind)?;
         // A link that is full loses messages: a reader that hangs must not stop the others.
         let publisher = self.session.declare_publisher(key);
         let publisher = publisher.congestion_control(CongestionControl::Drop);
         Ok(Publisher {
-            author,
             publisher: publisher.wait()?,
+            gid: xxh3_128(token.as_bytes()).to_le_bytes(),
+            sent: AtomicI64::new(0),
+            _token: self.declare(token)?,
         })
     }
 
     fn subscription(&mut self, topic: &str, kind: &str) -> Result<Subscription, Trouble> {
-        let (key, author) = self.endpoint(Role::Subscription, topic, kind)?;
+        let [key, token] = self.endpoint(Role::Subscription, topic, kind)?;
         let subscriber = self.session.declare_subscriber(key);
         Ok(Subscription {
             subscriber: subscriber.with(RingChannel::new(KEPT)).wait()?,
-            _token: author.token,
+            _token: self.declare(token)?,
         })
     }
 
     fn service(&mut self, name: &str, kind: &str) -> Result<Service, Trouble> {
-        let (key, author) = self.endpoint(Role::Service, name, kind)?;
+        let [key, token] = self.endpoint(Role::Service, name, kind)?;
         let queryable = self.session.declare_queryable(key).complete(true);
         Ok(Service {
             queryable: queryable.with(RingChannel::new(KEPT)).wait()?,
-            _token: author.token,
+            _token: self.declare(token)?,
         })
     }
 
     fn publish(publisher: &Publisher, data: &[u8]) -> Result<(), Trouble> {
-        let author = &publisher.author;
-        let number = author.sent.fetch_add(1, Ordering::Relaxed) + 1;
+        let number = publisher.sent.fetch_add(1, Ordering::Relaxed) + 1;
         let put = publisher.publisher.put(data);
-        put.attachment(attachment(number, author.gid)).wait()
+        put.attachment(attachment(number, publisher.gid)).wait()
     }
 
     fn take(subscription: &Subscription) -> Option<Vec<u8>> {

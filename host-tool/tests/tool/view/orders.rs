@@ -15,37 +15,37 @@ fn a_picture_has_its_pixels_mask_and_markers() {
     let (head, body) = view.get("/picture/0");
     assert!(head.starts_with("HTTP/1.1 200"), "{head}");
     let end = body.iter().position(|&byte| byte == b'\n').unwrap();
-    let told: Value = serde_json::from_slice(&body[..end]).unwrap();
+    let reported: Value = serde_json::from_slice(&body[..end]).unwrap();
     let pixels = &body[end + 1..];
     assert_eq!(
-        (&told["width"], &told["height"]),
+        (&reported["width"], &reported["height"]),
         (&json!(320), &json!(240))
     );
     assert_eq!(pixels.len(), 4 * 320 * 240);
     let passed = pixels[3 * 320 * 240..]
         .iter()
         .filter(|&&level| level == 255);
-    assert_eq!(told["passed"], passed.count());
+    assert_eq!(reported["passed"], passed.count());
     // Four dots of 18 px.
     assert!(
-        (600..1400).contains(&told["passed"].as_u64().unwrap()),
-        "{told}"
+        (600..1400).contains(&reported["passed"].as_u64().unwrap()),
+        "{reported}"
     );
-    assert_eq!(told["markers"][3]["area"], at_rest()[3].area);
-    assert_eq!(told["wrong"], json!([]));
+    assert_eq!(reported["markers"][3]["area"], at_rest()[3].area);
+    assert_eq!(reported["wrong"], json!([]));
     assert_eq!(
-        told["threshold"]["limits"],
+        reported["threshold"]["limits"],
         json!([170, 10, 100, 255, 45, 255])
     );
     // The next snapshot is empty, and the page gets the reason for the missing picture.
     let (_, body) = view.get("/picture/0");
-    let told: Value = serde_json::from_slice(&body).unwrap();
+    let reported: Value = serde_json::from_slice(&body).unwrap();
     assert!(
-        told["text"]
+        reported["text"]
             .as_str()
             .unwrap()
             .contains("nothing of it came"),
-        "{told}"
+        "{reported}"
     );
 }
 
@@ -99,7 +99,7 @@ fn is_question(request: &Request) -> bool {
 }
 
 #[test]
-fn several_sensors_are_told_apart() {
+fn several_sensors_are_distinguished() {
     let devices = [4, 8].map(|count| FakeDevice::on_tcp([device(count)]));
     let view = View::of(&[&devices[0].port, &devices[1].port]);
     let mut events = view.events();

@@ -44,7 +44,7 @@ inline constexpr std::array<State, 18> STATES{{
   {"status", [](const hivtac_sample & s) {return double(s.status);}},
 }};
 
-// The state of a name; null if there is none.
+// The state of a name, or null.
 inline const State * find_state(const std::string & name)
 {
   for (const State & state : STATES) {

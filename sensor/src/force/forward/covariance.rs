@@ -1,6 +1,6 @@
-//! Describes what a model does not know about the images' motion, as a covariance of their
-//! coordinates. It interpolates between sizes and places of the load, and whitens: in white
-//! coordinates the covariance is the unit matrix.
+//! The covariance of the images' coordinates by which a model may be wrong. It interpolates between
+//! sizes and places of the load, and whitens: in white coordinates the covariance is the unit
+//! matrix.
 
 use super::pose::{Pose, limited};
 use super::solve::{Column, MOST_EQUATIONS, square};
@@ -138,7 +138,7 @@ pub struct CovarianceGrid<'a> {
     knots: &'a [u8],
 }
 
-/// What a model does not know of a unit.
+/// The uncertainty of a model about a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unknown<'a> {
     /// Negligible compared with noise.
@@ -242,7 +242,7 @@ impl Unknown<'_> {
     }
 }
 
-/// The covariance of what may differ between units whose images move by `moved`.
+/// The covariance of the differences between units whose images move by `moved`.
 fn put_of_motion(moved: &Column, covariance: &mut Covariance) {
     covariance.reset(moved.len());
     for (row, a) in covariance.rows_mut().zip(moved.iter()) {

@@ -1,4 +1,5 @@
-//! Steps downhill to the load that explains the markers best, each by the linearized film.
+//! Takes steps of falling residual to the load that explains the markers best, by the linearized
+//! film.
 
 use super::Forward;
 use super::covariance::{Covariance, Unknown, Whitening};
@@ -35,7 +36,7 @@ pub struct Descent<'a> {
     here: &'a mut Point,
     /// The load of the next step.
     there: &'a mut Point,
-    /// By the covariance, at the load here, of noise and of what is unknown of the unit.
+    /// By the covariance of noise and of the unit's uncertainty, at the load here.
     whitening: &'a mut Whitening,
     /// The equations in coordinates in which that covariance is the unit matrix; `None` if it is
     /// singular or not finite.
@@ -50,7 +51,7 @@ pub struct Descent<'a> {
     looks: u8,
 }
 
-/// What the markers of a frame show, how they are mounted, and what is unknown of the unit.
+/// The markers of a frame, their mounting, and the unit's uncertainty.
 struct Markers<'a> {
     observed: &'a Observed<'a>,
     mounting: &'a Mounting,
@@ -357,8 +358,7 @@ impl Point {
         self.pose = pose;
     }
 
-    /// Puts the covariance, at this load, of noise and of what is unknown of the unit into
-    /// `covariance`.
+    /// Puts the covariance of noise and of the unit's uncertainty at this load into `covariance`.
     fn put_covariance(
         &self,
         forward: &Forward<'_>,

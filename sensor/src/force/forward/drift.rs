@@ -5,7 +5,7 @@ use super::covariance::{Covariance, add_square};
 use super::mounting::{Mounting, about_middle, radius};
 use super::predict::Markers;
 
-/// What may have happened to a rest position since it was taken.
+/// The possible change of a rest position since it was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drift {
     /// Standard uncertainties of drift that no frame has shown, relative to the pattern's radius:
@@ -95,7 +95,7 @@ mod tests {
 
     /// The pattern's radius is 70.7 px, a pixel 0.01 focal lengths.
     #[test]
-    fn shift_turn_and_scale_are_as_uncertain_as_told() {
+    fn shift_turn_and_scale_are_as_uncertain_as_stated() {
         let drift = Drift {
             unseen: [1e-3, 2e-3, 3e-3],
             ..Drift::NONE

@@ -16,14 +16,14 @@ use super::{Forward, Strength};
 use crate::markers::lost::Lost;
 use hivtac_terms::list::List;
 
-/// Most steps of a frame. It exceeds what the model asks for: more steps follow while the load does
-/// not explain the markers. Little-known units begin far from the result.
+/// Most steps of a frame, more than the model's number: steps go on while the load does not explain
+/// the markers. Little-known units begin far from the result.
 pub const STEPS_AT_MOST: u8 = 8;
 
 /// Where steps without a guess begin, as a fraction of the largest size.
 const HALF: f32 = 0.5;
-/// Variance of a lost marker's coordinates, focal lengths squared: beside any other, it counts for
-/// nothing.
+/// Variance of a lost marker's coordinates, focal lengths squared: so large that the marker has no
+/// weight.
 const LOST: f32 = 1e6;
 
 /// Where steps begin.
@@ -48,15 +48,15 @@ pub struct Observed<'a> {
     pub moved: Column,
     /// The noise of each marker: covariances xx, xy, yy, focal lengths squared; xx and yy > 0.
     pub noise: List<[f32; 3], MOST_DOTS>,
-    /// Markers that are not seen: they count for nothing.
+    /// Markers that are not seen; they have no weight.
     pub lost: Lost,
     /// How far the film may rest from the rest position, px; `None` if that is 0.
     pub drift: Option<(&'a Drift, &'a Markers)>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
     pub hanging: Option<&'a Hanging>,
-    /// What presses; `None` for the tables' tip.
+    /// The contact's shape; `None` for the tables' tip.
     pub pressing: Option<Pressing<'a>>,
-    /// What presses, if its width is an unknown; otherwise `None`.
+    /// The contact's shape, if its width is an unknown; otherwise `None`.
     pub wide: Option<Wide<'a>>,
     /// The torque of what presses; `None` if it is none, or its effect is unknown.
     pub turning: Option<Turning<'a>>,
@@ -106,8 +106,7 @@ impl Observed<'_> {
 pub struct Estimate {
     /// The load.
     pub pose: Pose,
-    /// The squared residual, relative to its covariance by noise and by what is unknown of the
-    /// unit.
+    /// The squared residual, relative to its covariance by noise and the unit's uncertainty.
     pub unexplained: f32,
     /// The residual that no load near this one explains, in units of noise alone. Its change from
     /// frame to frame is noise, whatever is unknown of the unit.
@@ -143,10 +142,10 @@ impl Forward<'_> {
     }
 
     /// Takes steps from a guess, or without one from where the markers moved most. If they get
-    /// stuck, or end at a load that does not explain the markers, also takes steps from where the
-    /// markers moved most, or from the nearest of a few presses, unless the start forbids it.
-    /// These succeed where the first steps began badly. Returns the better load. Compiled once,
-    /// because the near memory is scarce.
+    /// stuck, or end at a load that does not explain the markers, it starts again: where the
+    /// markers moved most, or from the nearest of a few presses, unless the start forbids it. These
+    /// succeed where the first steps began badly. Returns the better load. Compiled once, because
+    /// the near memory is scarce.
     #[inline(never)]
     pub(super) fn estimate_with(
         &self,

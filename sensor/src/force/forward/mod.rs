@@ -1,5 +1,5 @@
-//! Finds the force and its place that explain the markers' positions: a model of the film run
-//! forwards, and Gauss–Newton steps on it.
+//! Finds the force and its place that explain the markers' positions, by Gauss–Newton steps on a
+//! forward model of the film.
 //!
 //! N markers have 2·N coordinates, a contact has five unknowns. The network's answer is the first
 //! guess. Each step evaluates the film and its slopes there, and solves the linearized problem. The
@@ -17,13 +17,13 @@
 //! | `predict` | the positions of all images, with slopes |
 //! | `mounting` | where this unit's markers are glued, and how its camera sees them |
 //! | `solve` | 2·N equations, five unknowns |
-//! | `descent` | steps downhill from a guess |
-//! | `residual` | how large the residual of honest frames is |
-//! | `covariance` | what is unknown of the unit, in addition to the noise |
+//! | `descent` | steps of falling residual from a guess |
+//! | `residual` | how large the residual of undisturbed frames is |
+//! | `covariance` | uncertainty of the unit, in addition to the noise |
 //! | `weight` | the effect of the film's own weight |
-//! | `shapes` | the effect of the shape of what presses, of four markers |
+//! | `shapes` | the effect of the contact's shape on four markers |
 //! | `motions` | tables of the images' motion by the place that is pressed |
-//! | `widths` | the effect of how wide the contact is, which more markers tell |
+//! | `widths` | the effect of the contact's width, which more markers show |
 //! | `torsion` | the effect of a torque about the film's normal |
 //! | `estimate` | from guesses to a load, its residual and standard uncertainties |
 //! | `three` | the same while a marker is lost |
@@ -78,7 +78,7 @@ pub const MOST_STEPS: u8 = 3;
 /// Number of sizes at which the uncertainty of other units' strength is given.
 pub const RELATIVE: usize = 5;
 
-/// A film run forwards, borrowed from a model file.
+/// A forward model, borrowed from a model file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forward<'a> {
     /// Gauss–Newton steps from the network's guess, 0 to [`MOST_STEPS`]. With 0 the network's
@@ -100,7 +100,7 @@ pub struct Forward<'a> {
     /// The covariance that the tables leave on the model's own unit; `None` if it is negligible
     /// compared with noise.
     pub own: Option<CovarianceGrid<'a>>,
-    /// What is known of any other unit with a rest picture; `None` if the file has no such section.
+    /// Properties of any other unit with a rest picture; `None` if the file has no such section.
     pub other: Option<Others<'a>>,
     /// The effect of the film's own weight; `None` if the file has no such section.
     pub weight: Option<Weight<'a>>,
@@ -112,7 +112,7 @@ pub struct Forward<'a> {
     pub torques: Option<Torques<'a>>,
 }
 
-/// What is known of units other than the one that a model was made on.
+/// Properties of units other than the one that a model was made on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Others<'a> {
     /// The force of each size on a unit without stretch.
@@ -154,7 +154,7 @@ impl Strength {
 }
 
 impl<'a> Forward<'a> {
-    /// What is unknown of the model's own unit (`is_own`), or of any other.
+    /// The uncertainty about the model's own unit (`is_own`), or about any other.
     pub fn unknown(&self, is_own: bool) -> Unknown<'a> {
         match (is_own, self.own, self.other) {
             (true, None, _) => Unknown::Nothing,

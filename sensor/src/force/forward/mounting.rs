@@ -329,7 +329,7 @@ mod tests {
 
     /// Shifted by (2, −1) px, turned by 1°, 1 % larger; then one marker is 0.2 px off that.
     #[test]
-    fn a_camera_that_moved_is_told_by_shift_turn_and_scale() {
+    fn a_camera_that_moved_is_reported_by_shift_turn_and_scale() {
         let focal = [178.5, 0.0];
         let before = rest(STILL, focal, [160.0, 120.0]);
         let turn = 1f32.to_radians();

@@ -37,7 +37,7 @@ pub struct Tables<'a> {
     ends_mm: [f32; 2],
 }
 
-/// Where the table of a marker lies, and what was found when it was taken.
+/// The place of a marker's table in the file, and values computed once from it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Dot {
     /// Index of its first byte.

@@ -1,10 +1,10 @@
 //! Limits of the residual: χ² with as many degrees of freedom as there are coordinates beyond the
-//! five unknowns. Few frames with nothing wrong exceed them.
+//! five unknowns. Few undisturbed frames exceed them.
 
 use super::solve::UNKNOWNS;
 
-/// χ² that 1 of 2,000, 1 of 100 and 1 of 6 honest frames exceed, by the number of markers from 4
-/// on.
+/// χ² that 1 of 2,000, 1 of 100 and 1 of 6 undisturbed frames exceed, by the number of markers from
+/// 4 on.
 const LIMITS: [[f32; 3]; 13] = [
     [17.7, 11.3, 5.0],
     [22.1, 15.1, 7.8],
@@ -21,7 +21,7 @@ const LIMITS: [[f32; 3]; 13] = [
     [57.9, 47.0, 34.0],
 ];
 
-/// The row of this number of coordinates; of the nearest number, if there is none.
+/// The row of this number of coordinates, or of the nearest number.
 fn limits(coordinates: usize) -> [f32; 3] {
     let last = LIMITS.len() - 1;
     let row = (coordinates / 2).saturating_sub(4).min(last);
@@ -29,13 +29,13 @@ fn limits(coordinates: usize) -> [f32; 3] {
 }
 
 /// Largest residual, relative to its variance, of a load that explains the markers: 1 of 2,000
-/// honest frames exceeds it.
+/// undisturbed frames exceeds it.
 pub fn unexplained(coordinates: usize) -> f32 {
     limits(coordinates)[0]
 }
 
-/// If more than this is left where the steps end, they may be stuck where the tables bend: 1 of 100
-/// honest frames exceeds it.
+/// With a larger residual, the steps may be stuck where the tables bend: 1 of 100 undisturbed
+/// frames exceeds it.
 pub fn stuck(coordinates: usize) -> f32 {
     limits(coordinates)[1]
 }

@@ -4,7 +4,7 @@
 //! A wide contact moves the images as a slightly larger force does, and off the middle to one side.
 //! A table holds this motion at knots of size and place: its mean over all shapes, its covariance
 //! over them, and its dependence on the radius of a round or flat contact. Film and markers are
-//! symmetric, so that places along +x and +y tell all others.
+//! symmetric, so places along +x and +y give all others.
 
 use super::Column;
 use super::covariance::{Covariance, CovarianceGrid, add_square};
@@ -26,8 +26,8 @@ const LARGEST_STEP: f32 = 1e-3;
 const TIP_MM: f32 = 0.5;
 const LARGEST_MM: f32 = 4.0;
 /// Uncertainty of a contact whose shape and radius are set: of its own motion, in parts of that;
-/// and of any motion, in parts of what all shapes leave, at radius 0 and more per mm. A flat face
-/// is less certain, as it may be tilted.
+/// and of any motion, in parts of the covariance over all shapes, at radius 0 and more per mm. A
+/// flat face is less certain, as it may be tilted.
 const OF_OWN: f32 = 0.4;
 const OF_ALL: [f32; 2] = [0.15, 0.1];
 const OF_ALL_FLAT: [f32; 2] = [0.4, 0.15];
@@ -47,13 +47,13 @@ pub struct Shapes<'a> {
     shifts: &'a [[u8; SHIFT_KNOT]],
 }
 
-/// What presses, as the steps use it.
+/// The contact's shape, as the steps use it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pressing<'a> {
     shapes: Shapes<'a>,
     /// The parts of the table's motions in this one's.
     parts: [f32; SHIFTS],
-    /// Standard uncertainty relative to the motion itself, and to what all shapes leave.
+    /// Standard uncertainty relative to the motion itself, and to the covariance over all shapes.
     of_own: f32,
     of_all: f32,
 }
@@ -95,7 +95,7 @@ impl<'a> Shapes<'a> {
         }
     }
 
-    /// Returns what is known of a shape; `None` for the tables' tip.
+    /// Returns the effect of a shape; `None` for the tables' tip.
     pub fn pressing(&self, shape: ContactShape) -> Option<Pressing<'a>> {
         let radius_mm = shape.radius().map_or(0.0, |radius| 1e-3 * radius.0 as f32);
         let part = span(shape, radius_mm);

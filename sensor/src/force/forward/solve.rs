@@ -1,7 +1,7 @@
 //! Solves linear equations for a contact's five unknowns, or for those of two contacts, by least
 //! squares.
 //!
-//! Modified Gram–Schmidt with the right side as one more column. It is as stable as Householder's
+//! Modified Gram–Schmidt, with the right side as one more column, is as stable as Householder's
 //! reflections for least squares (Björck 1967), and avoids the squared condition of normal
 //! equations.
 

@@ -212,7 +212,7 @@ mod tests {
                 table.answer(1, &table.place([x, y]), &functions(table, [s, a, b]))
             };
             let here = [0.4, 0.3, -0.2, 0.7, 1.3];
-            let told = answer(here).slopes;
+            let reported = answer(here).slopes;
             for axis in 0..5 {
                 let step = 1e-2;
                 let [mut back, mut forth] = [here; 2];
@@ -220,8 +220,8 @@ mod tests {
                 forth[axis] += step;
                 let slope = (answer(forth).value - answer(back).value) / (2.0 * step);
                 assert!(
-                    (slope - told[axis]).abs() < 0.02,
-                    "{axis}: {slope} {told:?}"
+                    (slope - reported[axis]).abs() < 0.02,
+                    "{axis}: {slope} {reported:?}"
                 );
             }
         });

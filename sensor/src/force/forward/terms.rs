@@ -265,7 +265,8 @@ mod tests {
 
     #[test]
     fn slopes_are_the_values_differences() {
-        let near = |slope: f32, told: f32| (slope - told).abs() < 2e-2 * (1.0 + told.abs());
+        let near =
+            |slope: f32, reported: f32| (slope - reported).abs() < 2e-2 * (1.0 + reported.abs());
         let terms = Terms::new(TERMS).unwrap();
         let [even, odd] = terms.counts().map(parts);
         let functions = |[size, a, b]: [f32; 3]| {
@@ -278,10 +279,13 @@ mod tests {
             let [mut back, mut forth] = [here; 2];
             back[axis] -= step;
             forth[axis] += step;
-            let (back, forth, told) = (functions(back), functions(forth), functions(here));
+            let (back, forth, reported) = (functions(back), functions(forth), functions(here));
             for k in [0, 1] {
                 let slope = (forth[k][0] - back[k][0]) / (2.0 * step);
-                assert!(near(slope, told[k][1 + axis]), "{axis}: {slope} {told:?}");
+                assert!(
+                    near(slope, reported[k][1 + axis]),
+                    "{axis}: {slope} {reported:?}"
+                );
             }
         }
     }

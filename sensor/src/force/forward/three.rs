@@ -13,7 +13,7 @@ use super::{Forward, Unknown};
 use crate::markers::lost::Lost;
 
 /// Largest residual, relative to its variance, of a contact that explains three markers. χ² of one
-/// degree of freedom exceeds it in 1 of 2,000 honest frames.
+/// degree of freedom exceeds it in 1 of 2,000 undisturbed frames.
 const UNEXPLAINED: f32 = 12.1;
 /// A contact this near to the lost marker moves the other three so little that several loads
 /// explain them, mm.
@@ -41,8 +41,8 @@ impl Forward<'_> {
             .is_some_and(|square| square >= NEAR_MM * NEAR_MM)
     }
 
-    /// Returns the load that explains the markers but `lost` (0–3) best, and where that one is
-    /// under it: how far it moved from rest, focal lengths.
+    /// Returns the load that explains the markers without `lost` (0–3) best, and the lost marker's
+    /// motion from rest under it, focal lengths.
     #[inline(never)]
     pub fn estimate_of_three(
         &self,

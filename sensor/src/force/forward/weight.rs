@@ -77,7 +77,7 @@ pub struct Weight<'a> {
     pub under_load: &'a [u8],
 }
 
-/// What the functions of gravity need to know of a film.
+/// The properties of a film that the functions of gravity need.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Functions {
     /// The force of each size.
@@ -86,7 +86,7 @@ pub struct Functions {
     pub press_n: f32,
 }
 
-/// What is known of gravity on a sensor: when its rest position was taken, and now.
+/// Gravity on a sensor as far as known: when its rest position was taken, and now.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Turned {
     /// Unknown, both times.

@@ -1,10 +1,10 @@
-//! Knows how a contact of some width moves the images, compared with the tables' tip under the same
-//! force at the same centre of pressure. Its width is an unknown of the equations.
+//! Predicts how a contact of some width moves the images, compared with the tables' tip under the
+//! same force at the same centre of pressure. Its width is an unknown of the equations.
 //!
-//! Enough markers tell how wide a contact is. A soft disc's radius is the measure: a rigid face of
-//! 0.6 times that radius moves the images alike. A [table](super::motions) holds the motions by
-//! size and width, and, as standard deviations, what a contact that is longer than wide, leans, or
-//! presses with its rim moves in addition.
+//! Enough markers show how wide a contact is. Width is given as a soft disc's radius; a rigid face
+//! of 0.6 times that radius moves the images alike. A [table](super::motions) holds the motions as
+//! polynomials in size and width. It also has standard deviations of the additional motion by
+//! contacts that are longer than wide, lean, or press with their rim.
 
 use super::Column;
 use super::covariance::{Covariance, add_square};
@@ -33,12 +33,12 @@ pub const PER_WIDTH_MM: f32 = 4.0;
 pub const OF_FACE: f32 = 1.65;
 /// The least and the largest width.
 pub const ENDS: [f32; 2] = [-0.1, 1.5];
-/// Width and its standard deviation of contacts of which nothing is known.
+/// Width and its standard deviation of unknown contacts.
 const LIKELY: [f32; 2] = [0.5, 0.5];
 /// Standard deviation of the width of a disc whose radius is set, and of a face.
 const SET_DISC: [f32; 2] = [0.01, 0.02];
 const SET_FACE: [f32; 2] = [0.02, 0.06];
-/// Standard deviations of the groups of contacts of which nothing is known, of discs and of faces.
+/// Standard deviations of the groups of unknown contacts, of discs and of faces.
 const UNKNOWN: [f32; GROUPS] = [0.0, 0.7, 0.7, 0.6, 0.6, 1.6];
 const DISC: [f32; GROUPS] = [0.0, 0.05, 0.05, 0.05, 0.05, 0.3];
 const FACE: [f32; GROUPS] = [0.0, 0.2, 0.2, 0.5, 0.5, 0.6];
@@ -49,12 +49,12 @@ const OF_ITSELF: f32 = 0.08;
 /// Uncertainty due to the mesh of finite elements by which all contacts are known, in parts of the
 /// motion: of each coordinate, and of all together. A finer mesh gives way differently.
 const OF_MESH: [f32; 2] = [6e-4, 8e-4];
-/// A tilted force moves the images under a wide contact as under a contact that is farther along
-/// the tilt: by this many mm for each radian, at width 1 and the largest size.
+/// A tilted force moves the images under a wide contact as if the contact were farther along the
+/// tilt: by this many mm for each radian, at width 1 and the largest size.
 const ALONG_TILT_MM: f32 = 0.83;
-/// The widths where the first steps begin of a contact of which nothing is known, and where those
-/// begin that follow if these end narrow without success. Steps from a narrow contact to a wide one
-/// often do, near the place and the force of the wide one.
+/// The widths where the first steps for an unknown contact begin, and where the next ones begin if
+/// these end narrow without success. Steps from a narrow contact to a wide one often do, near the
+/// place and the force of the wide one.
 const NARROW: f32 = 0.1;
 const WIDE: f32 = 0.8;
 /// The markers are this near to those of the layout, mm.
@@ -80,8 +80,7 @@ pub struct Wide<'a> {
 }
 
 impl<'a> Widths<'a> {
-    /// That of the nominal film, which stands for all films with its markers; `None` if there is
-    /// none for these.
+    /// That of the nominal film, used for all films with its markers; `None` for other markers.
     pub fn nominal(rest_image: &RestImage) -> Option<Widths<'static>> {
         rest_image
             .is_layout(&EIGHT_V, NEAR_MM)
@@ -90,7 +89,7 @@ impl<'a> Widths<'a> {
             .map(Widths)
     }
 
-    /// Returns what is known of a shape; `None` for the tables' tip.
+    /// Returns the prior of a shape's width; `None` for the tables' tip.
     pub fn pressing(&self, shape: ContactShape) -> Option<Wide<'a>> {
         let radius_mm = shape.radius().map_or(0.0, |radius| 1e-3 * radius.0 as f32);
         let of_disc = |disc_mm: f32| (disc_mm - TIP_MM) / PER_WIDTH_MM;
@@ -196,8 +195,8 @@ impl Wide<'_> {
         prediction.by_width = by_width;
     }
 
-    /// Adds the uncertainty of that motion to a covariance, and that of the mesh, of which `moved`
-    /// is the whole motion.
+    /// Adds the uncertainty of that motion to a covariance, and the mesh's error for the whole
+    /// motion `moved`.
     #[inline(never)]
     pub fn add_uncertainty(
         &self,
@@ -245,8 +244,8 @@ pub struct Taken {
     of_side: f32,
 }
 
-/// Takes the part along the column of the width out of all equations: what is left determines the
-/// other unknowns, with their covariance, whatever the width is (Frisch and Waugh 1933).
+/// Projects the column of the width out of all equations. The rest determines the other unknowns,
+/// with their covariance, for any width (Frisch and Waugh 1933).
 #[inline(never)]
 pub fn take_out(width: &mut Rows, columns: &mut [Rows; UNKNOWNS], side: &mut Rows) -> Taken {
     let own = norm(width);

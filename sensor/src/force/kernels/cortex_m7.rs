@@ -1,7 +1,7 @@
 //! Implements kernels for Cortex-M4 and M7 in assembly, scheduled for the M7's two issues a cycle.
 //!
-//! All of them but that of two contacts lie in sections `.itcm.*`, which a linker script can put
-//! into the memory nearest to the core. Cycles are those of LLVM's model of the core (`llvm-mca
+//! All except that of two contacts lie in sections `.itcm.*`, which a linker script can put into
+//! the memory nearest to the core. Cycles are those of LLVM's model of the core (`llvm-mca
 //! -mtriple=thumbv7em-none-eabihf -mcpu=cortex-m7`, the block between a label and the branch back
 //! to it), with weights and inputs in memory without wait states.
 //!
@@ -31,10 +31,9 @@ unsafe extern "C" {
     /// (w₀·a₀ + w₁·a₁). That is four products in two multiplications and one extension, at the
     /// price of a shift by 8 at the end of a row.
     ///
-    /// *No overflow.* Sums are modulo 2³², so only the last one of a row has to fit: |256·Σ w·a| <
-    /// 2³¹ holds because |Σ w·a| ≤ 512 · 127 · 127 = 8,258,048 < 2²³ for every layer that a model
-    /// may have; see the assertion below. Lanes fit 16 bits: |256·w₁ + w₀| ≤ 32,639, and −127 ≤ x ≤
-    /// 32,512.
+    /// *No overflow.* Sums are modulo 2³², so only the last one of a row has to fit. |256·Σ w·a| <
+    /// 2³¹ holds because |Σ w·a| ≤ 512 · 127 · 127 = 8,258,048 < 2²³ for every possible layer; see
+    /// the assertion below. Lanes fit 16 bits: |256·w₁ + w₀| ≤ 32,639, and −127 ≤ x ≤ 32,512.
     ///
     /// *Contract.* `weights`: word-aligned, 32·`blocks` columns for each group of four rows, as
     /// `docs/model-file.md` lays them out, and eight readable bytes after them. `inputs`:
@@ -77,8 +76,8 @@ unsafe extern "C" {
         end: *const i32,
     );
 
-    /// As [`hivtac_dot16`] for up to 12 columns (the features are 11), laid out as 16, the last
-    /// four of which it leaves out.
+    /// As [`hivtac_dot16`] for up to 12 columns (the features are 11), laid out as 16, without the
+    /// last four.
     ///
     /// *Contract.* As [`hivtac_dot16`]; it reads no more than the weights and 12 inputs.
     ///

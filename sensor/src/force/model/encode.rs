@@ -16,23 +16,23 @@ use hivtac_terms::conditions::{CentroidEstimator, ContactReading};
 use hivtac_terms::marker::LEAST_MARKERS;
 use hivtac_terms::threshold::PixelFormat;
 
-/// Offset of the film run forwards in models with a network: after the places.
+/// Offset of the forward model in models with a network: after the places.
 pub const FORWARD_OFFSET: usize = 456;
 
-/// Everything a model file holds, to be written. The fields mean what [`Model`]'s do.
+/// The contents of a model file, to be written. The fields are those of [`Model`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct ModelSpec {
-    /// What it was made for.
+    /// The frames that it was made for.
     pub conditions: Conditions,
     /// The rest position of the sensor it was made on.
     pub rest: Rest,
     /// How features become the network's input.
     pub input: InputScaling,
-    /// Its layers, first to last: 1 to 8, or none for a film run forwards without a network.
+    /// Its layers, first to last: 1 to 8, or none for a forward model without a network.
     pub layers: Vec<LayerSpec>,
-    /// The film run forwards.
+    /// The forward model.
     pub forward: Option<ForwardSpec>,
-    /// What the outputs are.
+    /// The kind of outputs.
     pub output: OutputKind,
     /// The forces it was trained or calibrated on.
     pub range: CalibratedRange,

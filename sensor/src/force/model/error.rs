@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-/// What is wrong with a model file, and where.
+/// A fault of a model file, and its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModelError {
     /// The file does not begin with `HVTM`.

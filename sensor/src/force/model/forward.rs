@@ -1,4 +1,4 @@
-//! Reads and writes the model file's section on the film run forwards.
+//! Reads and writes the model file's section on the forward model.
 
 use super::{ModelError, reader::Reader};
 use crate::force::forward::{
@@ -257,7 +257,7 @@ fn float(
     })
 }
 
-/// A film run forwards, to be written. The fields mean what [`Forward`]'s do.
+/// A forward model, to be written. The fields are those of [`Forward`].
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForwardSpec {
@@ -277,13 +277,13 @@ pub struct ForwardSpec {
     pub tables: TablesSpec,
     /// The covariance that the tables leave on its own unit.
     pub own: Option<CovarianceSpec>,
-    /// What is known of any other unit.
+    /// Properties of any other unit.
     pub other: Option<OthersSpec>,
     /// The effect of the film's own weight.
     pub weight: Option<WeightSpec>,
 }
 
-/// The effect of the shape of what presses, to be written.
+/// The effect of the contact's shape, to be written.
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShapesSpec {
@@ -295,7 +295,7 @@ pub struct ShapesSpec {
     pub shifts: Vec<[[f64; SHAPES_COORDINATES]; SHIFTS]>,
 }
 
-/// The effect of a film's weight, to be written. The fields mean what [`Weight`]'s do.
+/// The effect of a film's weight, to be written. The fields are those of [`Weight`].
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct WeightSpec {
@@ -312,7 +312,7 @@ pub struct WeightSpec {
     pub under_load: [[Vec<[f64; weight::TERMS]>; weight::UNDER_LOAD]; weight::SIZES],
 }
 
-/// What is known of other units, to be written. The fields mean what [`Others`]' do.
+/// Properties of other units, to be written. The fields are those of [`Others`].
 #[cfg(any(test, feature = "encode"))]
 #[derive(Clone, Debug, PartialEq)]
 pub struct OthersSpec {

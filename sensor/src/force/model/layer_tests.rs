@@ -81,7 +81,7 @@ fn weights_beyond_rows_and_columns_are_zero() {
 }
 
 #[test]
-fn an_aligned_file_is_told() {
+fn an_aligned_file_is_reported() {
     let bytes = spec(&[11, 5, 3]).encode().unwrap();
     let mut file = AlignedFile([0; 1024]);
     for shift in 0..8 {

@@ -25,7 +25,7 @@ pub(super) const FORCE_VERSION: u16 = 3;
 pub(super) const PLACE_VERSION: u16 = 7;
 /// The order of the weights: field `packing`.
 pub(super) const PACKING: u8 = 1;
-/// Contents in addition to the layers: none, or the film run forwards.
+/// Contents in addition to the layers: none, or the forward model.
 pub(super) const NOTHING_BESIDE: u8 = 0;
 pub(super) const FORWARD_BESIDE: u8 = 2;
 /// Bytes of the preset's name, padded with zeros.
@@ -103,7 +103,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Model<'_>, ModelError> {
 fn check_layers(layers: usize, has_forward: bool, markers: usize) -> Result<(), ModelError> {
     let allowed = match (layers, has_forward, markers) {
         (0, true, _) | (1.., _, LEAST_MARKERS) => return Ok(()),
-        (0, false, _) => "1 to 8 without the film run forwards",
+        (0, false, _) => "1 to 8 without a forward model",
         (1.., ..) => "0 with other than four markers",
     };
     Err(ModelError::Field {
@@ -144,7 +144,7 @@ fn output_kind(reader: &mut Reader<'_>, version: u16) -> Result<OutputKind, Mode
     })
 }
 
-/// Reads whether the film run forwards follows the layers.
+/// Reads whether the forward model follows the layers.
 fn has_forward(reader: &mut Reader<'_>, output: OutputKind) -> Result<bool, ModelError> {
     let offset = reader.offset;
     match reader.u8()? {

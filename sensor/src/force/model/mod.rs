@@ -1,4 +1,4 @@
-//! Holds the model file: a quantized network with its input scaling, the film run forwards, and the
+//! Holds the model file: a quantized network with its input scaling, the forward model, and the
 //! conditions that they were made for.
 //!
 //! [`Model::parse`] reads a file in place, from flash or from memory, without copying, and proves
@@ -52,7 +52,7 @@ pub const PLACE_OUTPUTS: usize = 2;
 /// A model, borrowed from the bytes of its file and proven sound.
 #[derive(Clone, Copy, Debug)]
 pub struct Model<'a> {
-    /// What it was made for; a frame made under other conditions has no force.
+    /// The conditions that it was made for; a frame made under others has no force.
     pub conditions: Conditions,
     /// The rest position of the sensor it was made on.
     pub rest: Rest,
@@ -64,7 +64,7 @@ pub struct Model<'a> {
     pub range: CalibratedRange,
     /// How uncertain its forces are.
     pub uncertainty: Uncertainty,
-    /// The film run forwards, which improves the network's answer.
+    /// The forward model, which improves the network's answer.
     pub forward: Option<Forward<'a>>,
     crc: u32,
     layers: [Layer<'a>; MAX_LAYERS],

@@ -210,7 +210,7 @@ pub fn any_set(words: &[u32]) -> bool {
     let (sixteens, rest) = words.as_chunks::<16>();
     let all = match sixteens.len() {
         0 => 0,
-        // SAFETY: so many words are there.
+        // SAFETY: the slice has these words.
         sixteens => unsafe { hivtac_dilate_any_set(words.as_ptr(), 16 * sixteens) },
     };
     all != 0 || crate::markers::mask::any_set(rest)
@@ -231,7 +231,7 @@ pub fn weigh_luma(table: &[u8; 256], row: &[u16], columns: Range<usize>) -> [u32
     if columns.end > 2 * row.len() {
         return [0; 2];
     }
-    // SAFETY: the row has so many bytes, the left pixel of each two first, as memory is
+    // SAFETY: the row has these bytes, the left pixel of each two first, as memory is
     // little-endian.
     let sums = unsafe {
         let end = row.as_ptr().cast::<u8>().add(columns.end);

@@ -12,16 +12,16 @@
 //!    across it, plus the width that dilation and soft edges add.
 //! 4. *Trust* (`trust`): limits relative to a rest position are much tighter and decide whether the
 //!    markers may give a force. The film answers any force symmetrically, so the pattern's strain
-//!    bounds the displacement of a single marker. Four properties of the images bound what may be
-//!    cut off, grown, hidden or holed: how little each image leans, is hollow or skewed; how alike
-//!    their colours are; how many pixels passed the threshold themselves.
+//!    bounds the displacement of a single marker. Four properties of the images bound cuts,
+//!    growths, covers and holes: lean, hollowness and skew of each image, and the likeness of their
+//!    colours. So does the number of pixels that passed the threshold themselves.
 //!
 //! A new rest position has no earlier one to be compared with. Rule 4 judges it against itself
 //! ([`Found::may_rest`]), and the four markers must be alike: they are punched alike, and a film at
 //! rest is flat.
 //!
-//! With a film run forwards, three markers may do (`three`): a fourth one stands where the film has
-//! it. Markers of other layouts than the square of four are found by where they rest (`placed`).
+//! With a forward model, three markers may suffice (`three`): the model predicts the fourth one.
+//! Markers of other layouts than the square of four are found by their rest places (`placed`).
 //!
 //! Exactly one set of four must pass rules 1 to 3; two such sets are ambiguous, however different.
 //!
@@ -36,7 +36,7 @@
 //! | weighted, 800×600: JPEG of quality 70 and less | 0.2 px |
 //! | weighted, under a tip that sticks or slips | 0.45 px |
 //! | the same, seldom, at 320×240: JPEG of quality 30 | 0.5 px |
-//! | binary, honest frames, which no rule can distinguish from a fault | 0.36 px |
+//! | binary, undisturbed frames, which no rule can distinguish from a fault | 0.36 px |
 //! | binary: a covered marker | 0.6 px |
 //! | binary: a marker under a red disc of nearly its size | 0.85 px |
 //! | 800×600: a disc of a marker's size in its place, small forces | 0.3 px |
@@ -101,7 +101,7 @@ impl Found {
     }
 }
 
-/// By what a blob is no marker's image.
+/// The reason why a blob is no marker's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unlike {
     /// It has fewer pixels than this.
@@ -229,7 +229,7 @@ impl Finder {
         found.ok_or(reason)
     }
 
-    /// Returns by what a blob is no marker's image; `None` if it could be one.
+    /// Returns why a blob is no marker's image; `None` if it could be one.
     pub fn unlike(&self, blob: &Blob) -> Option<Unlike> {
         self.candidate(blob).err()
     }

@@ -1,9 +1,9 @@
-//! Finds the markers of any layout by where they rest.
+//! Finds the markers of any layout by their rest places.
 //!
 //! Each marker is nearest to its own rest place: loads within ±6 mm of the middle, up to 200 mN,
 //! move no marker half the way to another one's. An image that is not whole, or shares its rest
-//! place with another, is no marker. What is left of the rules for four markers: the film that
-//! explains more markers than it must exposes one that lies.
+//! place with another, is no marker. The other rules for four markers are not needed: the residual
+//! of the redundant markers exposes a false one.
 
 use super::pattern::{distance, larger};
 use super::shape::Shape;
@@ -135,7 +135,7 @@ impl Placed {
         lost <= MOST_LOST && lost + FEWEST <= self.markers.len()
     }
 
-    /// The markers that count for nothing: those that are lost, and this one.
+    /// The markers without weight: those that are lost, and this one.
     pub fn without(&self, left_out: Option<usize>) -> Lost {
         left_out.map_or(self.lost, |identity| self.lost.and(identity))
     }

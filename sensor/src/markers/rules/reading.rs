@@ -10,15 +10,15 @@
 //! frames of the same sizes and presets: |F| of 5 to 250 mN, tangential force up to 0.8 of the
 //! normal one, places to 4 mm along x and y.
 //!
-//! Those frames show each dot as a plane disc. Frames of the full film show how a needle bends the
-//! dot beside it (`hivtac-studies contacts --near-dots`, seeds 2, 11 and 12, 320×240).
+//! Those frames show each dot as a plane disc. Frames of the full film show how a needle bends a
+//! dot next to it (`hivtac-studies contacts --near-dots`, seeds 2, 11 and 12, 320×240).
 //!
 //! `FORCE` lists the limits of a tilted force. The tables of the others list only fields that
 //! differ from the reading on which they are based.
 
 use hivtac_terms::conditions::ContactReading;
 
-/// A taper beyond which a tip presses hard beside a dot and bends it.
+/// A taper beyond which a tip presses hard near a dot and bends it.
 pub const STEEP_TAPER: f32 = 0.08;
 
 /// Limits of one kind of contact. A shift is relative to the half side at rest.

@@ -1,16 +1,15 @@
-//! Finds three markers in a frame whose fourth one is not seen, or is seen badly, and judges them.
+//! Finds and judges three markers in a frame whose fourth one is missing or faulty.
 //!
-//! Three markers are no pattern, so the rest position tells which they are. Each lies nearest to
-//! its own rest place: loads within ±6 mm of the middle, up to 200 mN, move no marker half the way
-//! to another one's. Three images that are nearest to three rest places are the three markers. If
-//! there are four, one of them must be the only one that the rules object to.
+//! Three markers are no pattern, so the rest position identifies them. Each lies nearest to its own
+//! rest place: loads within ±6 mm of the middle, up to 200 mN, move no marker half the way to
+//! another one's. Three images that are nearest to three rest places are the three markers. If
+//! there are four, the rules must object to exactly one of them.
 //!
-//! The film that explains the three tells where the lost marker is. With it the pattern is whole,
-//! and the rules of four markers judge it by the same limits: the pattern, and each image of the
-//! three. For the lost marker stands an image to which no rule objects.
+//! The film that explains the three predicts the lost marker. With it the pattern is whole, and the
+//! rules of four markers judge pattern and three images by the same limits. The lost marker gets an
+//! image that passes every rule.
 //!
-//! What shifts an image and keeps its shape has one redundant coordinate against it instead of
-//! three.
+//! A shift that keeps an image's shape is checked by one redundant coordinate instead of three.
 
 use super::pattern::Pattern;
 use super::placed::nearest;

@@ -26,7 +26,7 @@ use hivtac_terms::units::Px;
 
 /// Strain of binary centroids against this unit's own rest, as the displacement of one marker that
 /// causes it, px (largest seen: 0.7 at QVGA, 0.26 at 800×600). For weighted ones:
-/// [`Reading::displacement`]. It bounds how far a false marker may be off.
+/// [`Reading::displacement`]. It bounds the displacement of a false marker.
 const STRAIN_BINARY: f32 = 0.7;
 /// Strain against a model's rest: another unit's markers are at slightly different places.
 const STRAIN_FOREIGN: f32 = 0.015;

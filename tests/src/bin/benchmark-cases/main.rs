@@ -1,6 +1,6 @@
 //! `benchmark-cases FOLDER`: writes the scripts that `cargo xtask bench` runs, one file each, and
-//! prints what they are, one JSON object a line: `{"name":…,"file":…}`. What a board's program can
-//! measure of them it writes as `board.rs`, too, for `firmware/examples/benchmark`.
+//! lists them, one JSON object a line: `{"name":…,"file":…}`. Those that a board can measure it
+//! also writes as `board.rs`, for `firmware/examples/benchmark`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -58,15 +58,15 @@ struct Case {
 enum Work {
     /// One frame through the whole pipeline, as the firmware runs it.
     Frame {
-        /// What is special about it; empty for the usual one.
+        /// Its special feature; empty for the usual one.
         special: &'static str,
-        /// The frames before it, which tell what moves.
+        /// The frames before it, which show motion.
         before: Vec<Vec<u16>>,
         pixels: Vec<u16>,
     },
     /// One inference of the small model.
     Network,
-    /// The network of a model that tells places, and the number of steps from its answer.
+    /// The network of a model with places, and the number of steps from its answer.
     Steps(u8, [Marker; 4], Box<Rest>),
     /// The threshold's table of 64 KiB.
     Table,
@@ -140,7 +140,7 @@ fn cases() -> Result<Vec<Case>> {
             model: weighted_model?,
             ..case(("weighted", usual.clone()))
         });
-        // What is special are colours, drawn in RGB565.
+        // Special features are colours, drawn in RGB565.
         if format == PixelFormat::Rgb565 {
             cases.extend(strained(&usual).map(case));
         }
@@ -311,7 +311,7 @@ impl Board {
     }
 }
 
-/// Worst cases beside the usual frame.
+/// Worst cases in addition to the usual frame.
 fn strained(usual: &[u16]) -> [(&'static str, Vec<u16>); 4] {
     let [width, height] = SIZE;
     [
@@ -379,7 +379,7 @@ fn position(format: PixelFormat, centroid: CentroidEstimator, pixels: &[u16]) ->
     })
 }
 
-/// What a frame shows.
+/// Measures a frame.
 fn seen(
     format: PixelFormat,
     centroid: CentroidEstimator,

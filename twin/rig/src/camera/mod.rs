@@ -7,10 +7,10 @@
 //! VSYNC edge comes one frame later.
 //!
 //! OV7725: exposure, gain and colours follow the registers (`exposure`, `colour`). A register whose
-//! reset value differs between sources gets another value for each seed. It breaks a rule to
-//! capture a frame that depends on such a register before it was written. Not simulated: the zoom
-//! registers (the window is scaled to the output size by taking the nearest pixel), automatic frame
-//! rate, automatic white balance. MT9V034: `mt9v034`; OV5640: `ov5640`.
+//! reset value differs between sources gets another value for each seed. Capturing a frame that
+//! depends on such an unwritten register breaks a rule. Not simulated: the zoom registers (the
+//! window is scaled to the output size by taking the nearest pixel), automatic frame rate,
+//! automatic white balance. MT9V034: `mt9v034`; OV5640: `ov5640`.
 
 pub mod colour;
 pub mod encode;

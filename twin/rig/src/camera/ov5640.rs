@@ -1,10 +1,10 @@
 //! The OV5640: turns a scene into its output by its registers.
 //!
 //! The picture is that of the window for which the sensor's lens is meant, 2352 × 1764 of the
-//! array, at 320 × 240; outside it is black. Of the PLL's tree only what feeds lines and PCLK is
-//! simulated. After a reset the pins are no outputs, so nothing is sent. Not simulated: banding,
-//! night mode, lens correction, sharpening and smoothing, automatic white balance (a captured frame
-//! with it breaks a rule), the microcontroller, the focus motor.
+//! array, at 320 × 240; outside it is black. Of the PLL's tree only the branches to lines and PCLK
+//! are simulated. After a reset the pins are no outputs, so nothing is sent. Not simulated:
+//! banding, night mode, lens correction, sharpening and smoothing, automatic white balance (a
+//! captured frame with it breaks a rule), the microcontroller, the focus motor.
 
 use super::colour::Colour;
 use super::output::{Format, Output, Window};
@@ -68,7 +68,7 @@ pub struct Ov5640 {
     hesitant: bool,
 }
 
-/// What the PLL gives.
+/// The PLL's clocks.
 struct Clocks {
     lines_hz: u64,
     pixels_hz: u64,
@@ -149,7 +149,7 @@ impl Ov5640 {
         })
     }
 
-    /// Returns how many columns and rows are read, first ones and sizes of what is shown of them in
+    /// Returns how many columns and rows are read, and first ones and sizes of the shown part, in
     /// the array's.
     fn read_out(&self) -> [[u32; 2]; 3] {
         let wide = |address| self.registers.wide(address);
@@ -540,7 +540,7 @@ mod tests {
 
     #[test]
     fn what_it_cannot_do_gives_no_rows_and_the_register() {
-        for (also, told) in [
+        for (also, reported) in [
             ((reg::PLL_MULTIPLIER, 100), "0x3036"),
             ((reg::PLL_MULTIPLIER, 210), "84 MHz"),
             ((reg::CLOCK_SOURCE, 0x01), "0x3103"),
@@ -554,7 +554,10 @@ mod tests {
         ] {
             let output = set(&[also]).output(XCLK_HZ).unwrap();
             assert_eq!(output.rows, 0);
-            assert!(output.fault.as_ref().unwrap().contains(told), "{output:?}");
+            assert!(
+                output.fault.as_ref().unwrap().contains(reported),
+                "{output:?}"
+            );
         }
     }
 

@@ -1,8 +1,8 @@
 //! The OV5640's register file: addresses, values after a reset, and the registers that only the
 //! sensor writes.
 //!
-//! Sources: the drivers of Linux, OpenMV, esp32-camera and GreenWaves, which also tell the meaning
-//! of bits. Values after a reset are known for some registers only; all others count as zero, and a
+//! Sources: the drivers of Linux, OpenMV, esp32-camera and GreenWaves, also for the meaning of
+//! bits. Values after a reset are known for some registers only; all others count as zero, and a
 //! picture must not depend on them ([`RECOMMENDED`]).
 
 /// System control: reset (bit 7), standby (bit 6).
@@ -37,7 +37,7 @@ pub const BLUE: u16 = 0x3404;
 pub const MANUAL_WHITE: u16 = 0x3406;
 /// Exposure, 20 bits in three registers, in sixteenths of a line.
 pub const EXPOSURE: u16 = 0x3500;
-/// What is not automatic: gain (bit 1), exposure (bit 0).
+/// Manual control of gain (bit 1) and exposure (bit 0).
 pub const MANUAL: u16 = 0x3503;
 /// Gain, ten bits in two registers, in sixteenths.
 pub const GAIN: u16 = 0x350A;
@@ -47,7 +47,7 @@ pub const WINDOW: u16 = 0x3800;
 pub const OUTPUT: u16 = 0x3808;
 /// Clocks of a line, then lines of a frame.
 pub const TOTAL: u16 = 0x380C;
-/// Columns and rows that are left out at each edge of what is read.
+/// Columns and rows that are left out at each edge of the read part.
 pub const OFFSET: u16 = 0x3810;
 /// Steps from column to column: odd (bits 7:4), even (bits 3:0).
 pub const COLUMN_STEPS: u16 = 0x3814;

@@ -1,5 +1,5 @@
-//! What programs on this machine use: here the serial port, as a TCP port, a pseudo-terminal, or
-//! both; one client at a time. [`crate::usbip`] has the device itself.
+//! The device's serial port for programs on this machine: a TCP port, a pseudo-terminal, or both;
+//! one client at a time. [`crate::usbip`] has the device itself.
 
 mod pty;
 mod tcp;
@@ -42,7 +42,7 @@ pub trait Endpoint: Send + std::fmt::Debug {
     fn writable(&self) -> Option<BorrowedFd<'_>>;
 }
 
-/// The near end of what clients use.
+/// The near end of the clients' port.
 pub trait Plug: Send + std::fmt::Debug {
     /// Returns whether the client is a USB host itself, not a program on the serial port.
     fn is_host(&self) -> bool {
@@ -52,8 +52,8 @@ pub trait Plug: Send + std::fmt::Debug {
     /// Returns whether a client is there; looks for one if not.
     fn connected(&mut self) -> bool;
 
-    /// Moves bytes between client and host, without waiting; `is_here` tells whether a client is
-    /// there.
+    /// Moves bytes between client and host, without waiting; `is_here` says whether a client is
+    /// connected.
     fn exchange(&mut self, host: &mut Host, is_here: bool) -> Traffic;
 
     /// Waits a short time for the client to take more, or for a client to come.

@@ -8,7 +8,7 @@ use rigless::device::{Device, DeviceContext, RegisterFile};
 use rigless::soc::stm32h743::generated::iwdg::Register;
 use rigless::time::{EventId, VirtualNanos};
 
-/// KR: what may be written to it.
+/// KR: the keys that may be written to it.
 const START: u64 = 0xCCCC;
 const REFRESH: u64 = 0xAAAA;
 const ENABLE_ACCESS: u64 = 0x5555;

@@ -1,4 +1,4 @@
-//! What the emulator lacks of the STM32H743, or has too roughly: peripherals that know nothing of
+//! Peripherals of the STM32H743 that the emulator lacks, or has too roughly. They know nothing of
 //! this sensor's camera or messages. `README.md` says what each simulates and what ties it to the
 //! rig.
 

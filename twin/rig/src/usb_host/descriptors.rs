@@ -92,8 +92,7 @@ const DATA: u8 = 10;
 impl Function {
     /// Reads a configuration descriptor and the descriptors that follow it.
     ///
-    /// # Errors
-    /// Describes what is missing or malformed.
+    /// # Errors Names the missing or malformed part.
     pub fn parse(configuration: &[u8]) -> Result<Self, &'static str> {
         let mut function = Self::default();
         let (mut has_control, mut in_data) = (false, false);

@@ -7,8 +7,8 @@ use super::urbs::{Done, Turn, Urb, Urbs};
 use super::{Host, IDLE_NS, Port, SUSPEND_NS, TRANSACTION_NS};
 use crate::peripherals::otg::Core;
 
-/// Time without a transfer after which the port is suspended, ns. A client does not tell when it
-/// suspends its port, but has no transfer then.
+/// Time without a transfer after which the port is suspended, ns. A client does not report a
+/// suspend of its port, but has no transfer then.
 const QUIET_NS: u64 = 50_000_000;
 /// Duration of a resume and of the recovery after it, ns (USB 2.0, section 7.1.7.7).
 const RESUME_NS: u64 = 30_000_000;
@@ -27,7 +27,7 @@ pub struct Remote {
     busy_at: u64,
 }
 
-/// What a client's port has.
+/// The state of a client's port.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Presence {
     /// No device yet.
@@ -38,7 +38,7 @@ pub enum Presence {
     Failed,
 }
 
-/// What a client can know of a device.
+/// A device's description for a client.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Description {
     /// The device descriptor, 18 bytes.
@@ -58,7 +58,7 @@ impl Remote {
         }
     }
 
-    /// Keeps what one of these requests has read.
+    /// Keeps the data that one of these requests has read.
     pub(super) fn has_read(&mut self, name: &str, data: &[u8]) {
         match (name, data.try_into()) {
             (control::DEVICE, Ok(device)) => self.device = device,
@@ -108,7 +108,7 @@ impl Host {
         remote.is_some_and(|remote| std::mem::take(&mut remote.was_pulled))
     }
 
-    /// Returns what a client's port has.
+    /// Returns the state of a client's port.
     pub fn presence(&self) -> Presence {
         let works = matches!(
             self.port,

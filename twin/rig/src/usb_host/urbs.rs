@@ -1,5 +1,5 @@
-//! The transfers of a host that is another program: it decides what is asked, the rig's host makes
-//! the transactions.
+//! The transfers of another program as host: it decides on them, and the rig's host makes the
+//! transactions.
 //!
 //! Endpoints take turns, one transaction each; a transfer of an endpoint waits for those before it.
 //! A transfer that the device does not acknowledge waits on.
@@ -78,7 +78,7 @@ pub struct Done {
     pub data: Vec<u8>,
 }
 
-/// What a client's transfer asks of the port itself.
+/// A client's request to the port itself.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turn {
     /// The transaction, if any, is over; these are the bytes that came from and went to the device.
@@ -284,7 +284,7 @@ impl Urbs {
 }
 
 impl Queue {
-    /// Forgets what the first transfer has moved, and until when it waits.
+    /// Resets the first transfer's progress, and the time until which it waits.
     fn begin(&mut self) {
         self.moved.clear();
         (self.sent, self.silent, self.due_ns) = (0, 0, 0);

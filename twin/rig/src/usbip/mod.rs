@@ -170,7 +170,7 @@ impl Plug for Server {
 }
 
 impl Visitor {
-    /// Reads what has come. Returns whether anything has.
+    /// Reads the bytes that have come. Returns whether any have.
     fn read(&mut self) -> bool {
         let before = self.input.len();
         if !read_some(&self.stream, &mut self.input) {
@@ -234,7 +234,7 @@ impl Visitor {
         }
     }
 
-    /// Writes what is to go. Returns whether anything went.
+    /// Writes waiting bytes. Returns whether any went.
     fn write(&mut self) -> bool {
         let before = self.output.len();
         if self.state != State::Gone && !write_all(&self.stream, &mut self.output) {
@@ -296,7 +296,7 @@ mod tests {
             let _client = connect(&mut server);
             let visitor = &mut server.visitors[0];
             visitor.state = State::Leaves;
-            // What the system itself keeps does not count.
+            // Fills the system's own buffer, which does not count.
             while visitor.stream.write(&[0; ROUND]).is_ok() {}
             visitor.output.resize(length, 0);
             let _ = [(); 2].map(|()| server.exchange(&mut host, true));

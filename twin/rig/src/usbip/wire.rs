@@ -47,7 +47,7 @@ pub enum Refusal {
     Unknown = 4,
 }
 
-/// What a client asks before it has the device.
+/// A client's request before it has the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Request {
     /// The list of devices.
@@ -56,7 +56,7 @@ pub enum Request {
     Import(String),
 }
 
-/// What a client asks once it has the device.
+/// A client's request once it has the device.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
     /// A transfer.

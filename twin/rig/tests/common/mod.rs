@@ -65,7 +65,7 @@ pub enum Bug {
 /// Time at which the host says hello, ms: the port exists from about 140 ms on.
 pub const HELLO_MS: u64 = 160;
 
-/// Number of the command that sets the shape of what presses.
+/// Number of the command that sets the contact's shape.
 const SHAPE: u16 = u16::MAX;
 
 /// Returns the firmware under test.
@@ -131,8 +131,8 @@ pub fn instructions_per_second() -> u64 {
     }
 }
 
-/// A run under a scripted host, which opens the port, says hello, sets the shape of what presses,
-/// starts the stream, and asks for counters at the end.
+/// A run under a scripted host, which opens the port, says hello, sets the contact's shape, starts
+/// the stream, and asks for counters at the end.
 pub struct Setup {
     pub elf: PathBuf,
     pub board: board::Kind,
@@ -142,7 +142,7 @@ pub struct Setup {
     pub seed: u64,
     /// The dots of a scene by name.
     pub layout: Layout,
-    /// The shape of what presses; `None` leaves the device's own. Scenes press with a needle.
+    /// The contact's shape; `None` leaves the device's own. Scenes press with a needle.
     pub shape: Option<ContactShape>,
     pub faults: Vec<&'static str>,
     pub actions: Vec<(u64, Action)>,
@@ -342,7 +342,7 @@ pub fn command(id: u16, request: Request) -> Vec<u8> {
     frame(&HostMessage::Command(Command { id, request }))
 }
 
-/// Returns the message that sets what is known of gravity.
+/// Returns the message that sets the direction of gravity.
 pub fn down(down: Down) -> Action {
     Action::Send(frame(&HostMessage::Down(down)))
 }
@@ -480,7 +480,7 @@ impl Run {
             DeviceMessage::Health(health) => Some(health),
             _ => None,
         });
-        health.expect("it tells")
+        health.expect("it answers")
     }
 
     /// Returns the last counters.
@@ -530,11 +530,11 @@ impl Run {
 
     /// Returns the frames whose samples report that a frame before them was lost.
     pub fn frames_after_a_loss(&self) -> Vec<u32> {
-        let told = |sample: &&&Sample| sample.status.contains(Status::FRAME_DROPPED);
+        let reported = |sample: &&&Sample| sample.status.contains(Status::FRAME_DROPPED);
         let samples = self.samples();
         samples
             .iter()
-            .filter(told)
+            .filter(reported)
             .map(|sample| sample.frame)
             .collect()
     }

@@ -6,8 +6,9 @@
 //! stiffness is large enough not to matter.
 //!
 //! The contact sticks as a whole. The body moves along x and y as the mean of the points that bear
-//! it, weighted by their pressure. What the normal pressure does not bear of the force along x and
-//! y is spread over them in proportion to it, on the middle surface. The body does not turn.
+//! it, weighted by their pressure. The rest of the force along x and y, which the normal pressure
+//! does not bear, is spread over them in proportion to it, on the middle surface. The body does not
+//! turn.
 
 mod newton;
 mod points;
@@ -246,7 +247,7 @@ impl Film {
     }
 }
 
-/// What the bearing points say of a contact.
+/// A contact by its bearing points.
 struct Contact {
     patch: Patch,
     area_mm2: f64,

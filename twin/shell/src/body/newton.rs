@@ -3,7 +3,7 @@
 //! Unknowns are the film's and the height of the body's foot. Along x and y the foot goes with the
 //! film: it keeps its distance from the mean place of the points that bear it (`shares`). A force
 //! on the body along x and y therefore acts on the film by these shares, less what the contact's
-//! normal pressure already bears. All of that is one energy, U(u) + E(u, foot) − F · foot.
+//! normal pressure already bears. Together these are one energy, U(u) + E(u, foot) − F · foot.
 
 use crate::ShellError;
 use crate::body::points::{Bearing, First, Points};
@@ -55,7 +55,7 @@ struct Balance {
     film: Vec<f64>,
     /// On the body along z, N.
     body: f64,
-    /// What the film holds of the body along x and y, N.
+    /// The force along x and y by which the film holds the body, N.
     held: [f64; 2],
 }
 
@@ -108,8 +108,7 @@ impl Pressing<'_> {
     /// Finds the equilibrium from a state, but for this much unbalanced force, N. Returns it with
     /// the number of steps.
     ///
-    /// # Errors
-    /// If there is none within reach.
+    /// # Errors If no equilibrium is within reach.
     pub fn solve(&self, mut state: State, tolerance_n: f64) -> Result<(State, usize), ShellError> {
         state.foot = self.foot(&state.unknowns, state.foot[2]);
         let mut at = self.balance(&state);

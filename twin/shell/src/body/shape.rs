@@ -8,7 +8,7 @@ const PEG_MM: f64 = 100.0;
 /// The least and the largest distance of the points that feel a body, mm.
 const FINE_MM: f64 = 0.07;
 const COARSE_MM: f64 = 0.2;
-/// How far a film is looked at beyond a body, in parts of its radius.
+/// How far beyond a body the film is checked, in parts of the body's radius.
 const WRAP: f64 = 1.6;
 /// The same of a pad: how much of its height the film may wrap, mm, and the largest reach, mm.
 const PAD_HEIGHT_MM: f64 = 3.0;

@@ -1,4 +1,4 @@
-//! What a film's own differences, and another tip, add to the motion of the whole film.
+//! The motion that a film's own differences, and another tip, add to the whole film.
 
 use hivtac_twin::MARKERS;
 use hivtac_twin::film::reduced::{

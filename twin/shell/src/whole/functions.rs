@@ -10,7 +10,7 @@ use crate::path::halton;
 
 /// Number of loads over which functions are compared.
 const LOADS: usize = 4000;
-/// What is added to the products of terms so that none is nearly nothing, in parts of the largest.
+/// Added to the products of terms so that none is nearly zero, in parts of the largest.
 const LEAST: f64 = 1e-12;
 
 /// Terms that are even or odd alike in the tilts along x and y.
@@ -125,8 +125,8 @@ fn products() -> Mat<f64> {
     })
 }
 
-/// Returns the directions among the terms of a class, by what they have of the motions. Motions of
-/// the mirrored film count, too.
+/// Returns the directions among the terms of a class, ordered by their share of the motions.
+/// Motions of the mirrored film count, too.
 fn of_class(
     class: &Class,
     products: &Mat<f64>,
@@ -237,8 +237,8 @@ mod tests {
         let parts = Parts::of(found.coefficients());
         for (column, _) in &columns {
             let whole = dot(column, &LoadFunctions::terms().exact(&pose));
-            let told = dot(&parts.in_motion(column), &found.values(&pose));
-            assert!((whole - told).abs() < 1e-6, "{whole} {told}");
+            let reported = dot(&parts.in_motion(column), &found.values(&pose));
+            assert!((whole - reported).abs() < 1e-6, "{whole} {reported}");
         }
     }
 }

@@ -40,8 +40,8 @@ pub enum Kind {
     Slopes,
     /// The displacement of a tip in the corner (+, +), mm: along x, along z.
     Tip,
-    /// For a tip of radius R mm, what the first, second and third power of ρ = (R² − 0.25) / 3.75
-    /// add: to the motion along x and along z, power by power.
+    /// For a tip of radius R mm, the additional motion by the first, second and third power of ρ =
+    /// (R² − 0.25) / 3.75: along x and along z, power by power.
     Radius,
     /// The same for the tip's own displacement.
     TipRadius,

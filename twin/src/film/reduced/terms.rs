@@ -152,8 +152,8 @@ mod tests {
         let at = [0.4, 0.3, -0.5];
         let rows = terms.rows(&pose(at));
         let values = terms.values(&pose(at));
-        for (value, told) in rows[0].iter().zip(values) {
-            assert!((value - f64::from(told)).abs() < 1e-7);
+        for (value, reported) in rows[0].iter().zip(values) {
+            assert!((value - f64::from(reported)).abs() < 1e-7);
         }
         for (axis, slopes) in rows[1..].iter().enumerate() {
             let step = 1e-6;

@@ -89,14 +89,14 @@ impl Weight {
         Axis::new(&NODES_MM)
     }
 
-    /// Returns the terms of what a load adds.
+    /// Returns the terms of the part that a load adds.
     pub fn terms() -> Terms {
         Terms::up_to(4, 2, 1)
     }
 
     /// Makes it from the motion and slopes of marker 2 per function of [`Pull::at_rest`], and from
-    /// the coefficients of what a load adds. These are ordered by node along y, node along x,
-    /// function of [`Pull::under_load`], motion along x and z, and term.
+    /// the coefficients of the part that a load adds. These are ordered by node along y, node along
+    /// x, function of [`Pull::under_load`], motion along x and z, and term.
     pub fn new(at_rest: [DiscMotion; AT_REST], coefficients: &[f64]) -> Weight {
         let outputs = 2 * UNDER_LOAD;
         Weight {
@@ -140,9 +140,9 @@ impl Weight {
         }
     }
 
-    /// Returns what gravity, in parts of g in the film's frame, adds to the motion of the film
-    /// around marker `k`, which sits `unit.markers_mm` off its place. Of a unit's own differences
-    /// only stiffness and thickness count.
+    /// Returns the motion that gravity, in parts of g in the film's frame, adds to the film around
+    /// marker `k`, which sits `unit.markers_mm` off its place. Of a unit's own differences only
+    /// stiffness and thickness count.
     pub fn disc(&self, pose: &Pose, down: [f64; 3], unit: &Unit, k: usize) -> DiscMotion {
         let signs = MARKER_CENTRES_MM[k].map(f64::signum);
         let [x, y, z] = down;
@@ -167,7 +167,7 @@ impl Weight {
         super::tables::mirrored_disc(DiscMotion { moved_mm, ..disc }, signs)
     }
 
-    /// Returns what a load adds to the motion along x and along z.
+    /// Returns the part that a load adds to the motion along x and along z.
     fn more(&self, pose: &Pose, pull: &Pull) -> [f64; 2] {
         let sums: [f64; 2 * UNDER_LOAD] = self.under_load.sums(&self.under_load.at(pose), 0);
         let pairs = sums.as_chunks::<2>().0.iter().zip(pull.under_load());

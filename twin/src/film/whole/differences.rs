@@ -1,4 +1,4 @@
-//! What a film's own differences, and another tip, add to the motion of the whole film.
+//! The motion that a film's own differences, and another tip, add to the whole film.
 
 use std::sync::LazyLock;
 
@@ -7,8 +7,8 @@ use super::table::{Nodes, Table};
 use crate::film::FilmError;
 use crate::film::reduced::{Unit, rho};
 
-/// The tables of what is added. Those of a post are of the shift along x of the post in the corner
-/// (+, +); mirrored films have those of the others.
+/// The tables of the additional motion. Those of a post are of the shift along x of the post in the
+/// corner (+, +); mirrored films have those of the others.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Differences {
     functions: LoadFunctions,
@@ -32,7 +32,7 @@ pub enum Difference {
     Radius(usize),
 }
 
-/// A part of what is added: a table, how much of it, and the film that it is seen in. There the
+/// A part of the additional motion: a table, its factor, and the film that it is seen in. There the
 /// axes are exchanged if `swap`, and before that take the signs.
 pub(super) struct Part<'a> {
     pub table: &'a Table,

@@ -13,7 +13,7 @@ pub struct LoadFunctions {
     mirrored: Vec<Mirrored>,
 }
 
-/// What a function becomes when the load is mirrored.
+/// A function under a mirrored load.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mirrored {
     /// Whether it changes its sign with that of the tilt along x, and along y.

@@ -1,9 +1,9 @@
 //! The motion of any part of the film, by tables made from full solutions.
 //!
-//! The tables are over the tip's place and over the distance from the tip: at one distance the
-//! film's motion hardly changes with the place, while at one place of the film it changes quickly
-//! as the tip comes near. A load enters by a few functions of its size and tilt that are common to
-//! all places.
+//! The tables are over the tip's place and over the distance from the tip. At one distance the
+//! film's motion hardly changes with the place; at one place of the film it changes quickly as the
+//! tip comes near. A load enters by a few functions of its size and tilt that are common to all
+//! places.
 
 mod differences;
 mod functions;

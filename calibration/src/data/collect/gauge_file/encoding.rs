@@ -29,19 +29,19 @@ mod tests {
 
     #[test]
     fn all_encodings_give_the_same_text() {
-        let told = "t;F [N]\n0,5;\u{2212}0,1\n";
-        let little: Vec<u8> = told.encode_utf16().flat_map(u16::to_le_bytes).collect();
-        let big: Vec<u8> = told.encode_utf16().flat_map(u16::to_be_bytes).collect();
+        let reported = "t;F [N]\n0,5;\u{2212}0,1\n";
+        let little: Vec<u8> = reported.encode_utf16().flat_map(u16::to_le_bytes).collect();
+        let big: Vec<u8> = reported.encode_utf16().flat_map(u16::to_be_bytes).collect();
         let marked = |mark: &[u8], bytes: &[u8]| [mark, bytes].concat();
         for bytes in [
-            told.as_bytes().to_vec(),
-            marked(&[0xef, 0xbb, 0xbf], told.as_bytes()),
+            reported.as_bytes().to_vec(),
+            marked(&[0xef, 0xbb, 0xbf], reported.as_bytes()),
             marked(&[0xff, 0xfe], &little),
             marked(&[0xfe, 0xff], &big),
             little,
             big,
         ] {
-            assert_eq!(text(&bytes), told, "{bytes:?}");
+            assert_eq!(text(&bytes), reported, "{bytes:?}");
         }
         assert_eq!(text(b"\xb5N"), "\u{fffd}N");
         assert_eq!(text(&[0xff, 0xfe, 0x30]), "");

@@ -61,7 +61,7 @@ fn files_of_all_kinds_say_the_same() {
     }
 }
 
-/// Ambiguous and meaningless files are refused, with the line and what helps.
+/// Ambiguous and meaningless files are refused, with the line and the remedy.
 #[test]
 fn what_is_not_clear_is_refused_with_what_helps() {
     for (text, unit, words) in [

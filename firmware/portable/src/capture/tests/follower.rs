@@ -99,7 +99,7 @@ fn a_frame_that_was_delivered_is_lost_to_nothing() {
 }
 
 #[test]
-fn a_set_up_and_a_restart_are_told() {
+fn a_set_up_and_a_restart_are_reported() {
     let passed = |from: u32, restart: bool| Event::Passed {
         from,
         to: from + 1,

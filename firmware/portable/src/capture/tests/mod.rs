@@ -155,9 +155,9 @@ fn silence_gives_the_begun_frame_up() {
 }
 
 fn silence(tracker: &mut Tracker, chip: &mut Chip) -> Vec<Event> {
-    let mut told = Vec::new();
-    tracker.silence(chip, &mut |event| told.push(event));
-    told
+    let mut reported = Vec::new();
+    tracker.silence(chip, &mut |event| reported.push(event));
+    reported
 }
 
 #[test]
@@ -250,29 +250,29 @@ fn frames_that_are_passed_over_are_counted_and_never_mixed() {
 fn a_stopped_tracker_tells_nothing() {
     let mut chip = Chip::new();
     let mut tracker = Tracker::new(SHAPE);
-    let mut told = 0;
-    let mut tell = |_| told += 1;
+    let mut reported = 0;
+    let mut tell = |_| reported += 1;
     chip.band_flag = true;
     tracker.band_finished(&mut chip, &mut tell);
     tracker.frame_ended(&mut chip, &mut tell);
     tracker.overrun(&mut chip, &mut tell);
     tracker.silence(&mut chip, &mut tell);
-    assert_eq!((told, chip.restarts), (0, 0));
+    assert_eq!((reported, chip.restarts), (0, 0));
 }
 
 #[test]
-fn the_reason_of_a_late_interrupt_is_told() {
+fn the_reason_of_a_late_interrupt_is_reported() {
     let mut chip = Chip::new();
     let mut tracker = Tracker::new(SHAPE);
     tracker.start(&mut chip);
     chip.edge.number = 1;
     // Two bands were finished, but only one interrupt came.
     (chip.band_flag, chip.second) = (true, false);
-    let mut told = Vec::new();
-    tracker.band_finished(&mut chip, &mut |event| told.push(event));
+    let mut reported = Vec::new();
+    tracker.band_finished(&mut chip, &mut |event| reported.push(event));
     let edge = chip.edge;
     let how = Ending::Late;
-    assert_eq!(told, [Event::Ended { edge, how }]);
+    assert_eq!(reported, [Event::Ended { edge, how }]);
 }
 
 fn sent() -> impl Strategy<Value = Sent> {

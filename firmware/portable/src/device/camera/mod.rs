@@ -1,5 +1,5 @@
-//! The facts of each camera on which forces and answers depend. The firmware's drivers have the
-//! registers that bring them about.
+//! The properties of each camera on which forces and answers depend. The firmware's drivers set its
+//! registers accordingly.
 
 pub mod mt9v034;
 pub mod ov5640;
@@ -9,7 +9,7 @@ use hivtac_sensor::motion::Motion;
 use hivtac_terms::camera::{CameraLimits, Rate, RateLimits};
 use hivtac_terms::units::Microseconds;
 
-/// What a camera's settings and its frames' times depend on.
+/// The properties of a camera on which its settings and its frames' times depend.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// Name in the device's hello.

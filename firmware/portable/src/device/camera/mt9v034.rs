@@ -17,7 +17,7 @@ pub const PRESET: Preset = Preset::Mt9v034;
 pub const WIDTH: u16 = 160;
 /// Rows of a frame, px: the markers' reach in the calibrated range.
 pub const HEIGHT: u16 = 152;
-/// What it can send.
+/// Its pixel formats.
 pub const PIXELS: &[PixelFormat] = &[PixelFormat::Mono];
 
 /// Clock that the board supplies, Hz; at most 27 MHz.

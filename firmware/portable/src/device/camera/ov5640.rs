@@ -1,7 +1,7 @@
 //! OmniVision OV5640: 320 × 240, RGB565 or YUV422, rows exposed one after the other.
 //!
-//! Frames and model are those of the OV7725: with a lens of 1.8 mm, the window makes a radian as
-//! many pixels.
+//! Frames and model are those of the OV7725: with a lens of 1.8 mm, the window has as many pixels a
+//! radian.
 
 use super::{Facts, Rolling};
 use hivtac_sensor::motion::Motion;
@@ -19,7 +19,7 @@ pub const PRESET: Preset = Preset::Ov7725;
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
-/// What it can send; the first one if no other is requested.
+/// Its pixel formats; the first is the default.
 pub const PIXELS: &[PixelFormat] = &[PixelFormat::Rgb565, PixelFormat::Yuv422];
 
 /// Clock that the board supplies, Hz.

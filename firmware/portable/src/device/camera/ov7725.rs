@@ -16,7 +16,7 @@ pub const PRESET: Preset = Preset::Ov7725;
 pub const WIDTH: u16 = 320;
 /// Rows of a frame, px.
 pub const HEIGHT: u16 = 240;
-/// What it can send; the first one if no other is requested.
+/// Its pixel formats; the first is the default.
 pub const PIXELS: &[PixelFormat] = &[PixelFormat::Rgb565, PixelFormat::Yuv422];
 
 /// Clock that the board supplies, Hz.
@@ -24,7 +24,7 @@ pub const XCLK_HZ: u32 = 12_500_000;
 
 /// Lines from frame to frame, blank ones included.
 pub const LINES: u16 = 278;
-/// Longest exposure, lines: the camera clamps what is longer (OmniVision OV7675, maximum exposure).
+/// Longest exposure, lines: the camera clamps longer ones (OmniVision OV7675, maximum exposure).
 pub const LONGEST_EXPOSURE: u16 = LINES - 2;
 /// Exposure of its rows: one after the other.
 pub const MOTION: Motion = Motion::rolling(LINES);

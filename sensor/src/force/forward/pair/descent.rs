@@ -14,29 +14,29 @@ use hivtac_terms::contact_shape::ContactShape;
 
 /// Most steps of a descent.
 pub(super) const STEPS: usize = 16;
-/// If a step does not explain more, shorter ones are tried (Marquardt 1963): equations hold each
-/// unknown where it is, with these parts of the strength with which the markers determine it. Near
-/// contacts have nearly the same slopes, so that without them a step may lead anywhere, or nowhere.
+/// If a step does not lower the residual, shorter ones are tried (Marquardt 1963). Equations hold
+/// each unknown at its value, with these parts of the markers' weight for it. Near contacts have
+/// nearly the same slopes, so that without them a step may lead anywhere, or nowhere.
 const HOLDS: [f32; 3] = [0.01, 0.05, 0.2];
 /// The steps have converged if the next one would explain at most this.
 const LEFT_TO_EXPLAIN: f32 = 0.05;
 /// The longest step of a place along an axis, mm, and of a size, relative to the largest. A longer
-/// step would leave what the slopes know.
+/// step would leave the range of the slopes.
 const LONGEST_MM: f32 = 1.5;
 const LARGEST_CHANGE: f32 = 0.25;
 
-/// What the markers of a frame show, and what is known of the unit.
+/// The markers of a frame, and the properties of the unit.
 #[derive(Clone, Copy)]
 pub struct Problem<'a> {
     /// The film.
     pub forward: &'a Forward<'a>,
-    /// What two contacts do together.
+    /// The correction of two contacts.
     pub interaction: &'a Interaction<'a>,
     /// The markers.
     pub observed: &'a Observed<'a>,
     /// How this unit's markers are glued and seen.
     pub mounting: &'a Mounting,
-    /// What is unknown of the unit.
+    /// The uncertainty about the unit.
     pub unknown: Unknown<'a>,
 }
 
@@ -78,7 +78,7 @@ impl Problem<'_> {
         Some((self.forward).estimate(&observed, self.mounting, self.unknown, start))
     }
 
-    /// Returns known contacts with what they leave unexplained of these markers, without a step.
+    /// Returns known contacts with their residual for these markers, without a step.
     #[inline(never)]
     pub(super) fn held(&self, known: &PairEstimate) -> PairEstimate {
         let mut here = Point {
@@ -246,7 +246,7 @@ impl Point {
         point
     }
 
-    /// Puts the covariance of noise, of the tables' errors, and of what the network leaves.
+    /// Puts the covariance of noise, of the tables' errors, and of the network's errors.
     fn put_covariance(&self, problem: &Problem<'_>, covariance: &mut Covariance) {
         let Problem {
             forward,

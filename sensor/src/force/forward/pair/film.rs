@@ -64,9 +64,9 @@ impl Both {
         [self.size, self.part, a, b, c, d, x, y, z, w]
     }
 
-    /// How the variance of what the model leaves grows with both contacts, relative to that of a
-    /// size of 1 at one place. What it leaves grows with the distance, too: chosen on other pairs
-    /// than the network's.
+    /// How the variance of the model's error grows with both contacts, relative to that of a size
+    /// of 1 at one place. It also grows with the distance; chosen on other pairs than the
+    /// network's.
     pub fn left(&self) -> f32 {
         let square = self.size * self.size;
         let [first, second] = &self.poses;

@@ -1,7 +1,7 @@
-//! Knows how two contacts differ from the mean of single ones, as a small network.
+//! Predicts how two contacts differ from the mean of single ones, by a small network.
 //!
-//! Each single contact has the size of both together, and counts by its part of the force. The
-//! mean is exact if both contacts are at one place, or one has no force. What is left is the
+//! Each single contact has the size of both together, and is weighted by its part of the force. The
+//! mean is exact if both contacts are at one place, or one has no force. The difference is the
 //! network's output times a factor that vanishes there.
 
 use super::film::Both;
@@ -132,7 +132,7 @@ impl<'a> Interaction<'a> {
         }
     }
 
-    /// Adds what the network leaves to a covariance.
+    /// Adds the network's error to a covariance.
     pub fn add_uncertainty(&self, both: &Both, covariance: &mut Covariance) {
         let left = both.left();
         let row = |nth: usize| self.left.get(triangle(nth)..triangle(nth + 1));

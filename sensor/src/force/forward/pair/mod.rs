@@ -1,15 +1,15 @@
 //! Finds the two contacts that explain the markers, where one does not.
 //!
 //! Two contacts have ten unknowns, eight markers sixteen coordinates. The motion under both is a
-//! mean of two single ones, and what a small network adds to it (`interaction`). This is for
-//! needles: a wide contact is not two.
+//! mean of two single ones, plus a small network's correction (`interaction`). It is valid for
+//! needles only.
 //!
 //! | file | subject |
 //! |---|---|
-//! | `interaction` | what a network adds to the mean of single contacts |
+//! | `interaction` | a network's correction of the mean of single contacts |
 //! | `network` | the network |
 //! | `film` | the positions of all images, with slopes |
-//! | `descent` | steps downhill from a start |
+//! | `descent` | steps of falling residual from a start |
 //! | `search` | where steps begin; both in parts, for a device with little time |
 
 mod descent;
@@ -36,7 +36,7 @@ use core::f32::consts::FRAC_1_SQRT_2;
 /// Two contacts.
 pub type Pair = [Pose; 2];
 
-/// χ² of six degrees of freedom that 1 of 2,000, and 1 of 6 honest frames exceed.
+/// χ² of six degrees of freedom that 1 of 2,000, and 1 of 6 undisturbed frames exceed.
 const UNEXPLAINED: f32 = 24.1;
 const USUAL: f32 = 9.1;
 /// Where steps begin: so far apart, mm, with this part of the force in the first, along these unit
@@ -55,11 +55,10 @@ const ALONG: [[f32; 2]; 8] = [
 ];
 /// Number of the nearest starts from which steps are taken.
 const DESCENTS: usize = 4;
-/// Two contacts count as told apart if they are so many times further apart than the place of each
-/// is uncertain along an axis.
+/// Two contacts count as resolved if their distance is at least this many times the uncertainty of
+/// each place along an axis.
 const APART_SIGMAS: f32 = 4.0;
-/// Nearer contacts are not told apart, mm: there the motion is no longer linear within what is
-/// uncertain.
+/// Nearer contacts are not resolved, mm: the motion is not linear within their uncertainty.
 const LEAST_APART_MM: f32 = 1.8;
 /// Other contacts are a rival if the residual is greater by at most this, and a place differs by
 /// more than this, mm.
@@ -95,9 +94,8 @@ pub struct Part {
     pub sigma: Option<Sigma>,
 }
 
-/// Returns what `of` makes of the markers that two needles may explain. Returns `None` if the
-/// network of this layout is not known, a marker is lost, the film hangs, or what presses is no
-/// needle.
+/// Calls `of` with the markers that two needles may explain. Returns `None` if this layout has no
+/// network, a marker is lost, the film's weight needs a correction, or the contact is no needle.
 pub fn find<T>(
     forward: &Forward<'_>,
     observed: &Observed<'_>,
@@ -186,7 +184,7 @@ impl PairEstimate {
                 by[3 + way][number] = per_size_n / all_n * of_other * apart_mm;
             }
         }
-        // What is unknown of a unit's strength counts for all of its forces alike.
+        // The uncertainty of a unit's strength is common to all of its forces.
         let of_unit_n = strength.sigma_n(self.size, 0.0) * all_n
             / (sizes_n[0] + sizes_n[1]).max(f32::MIN_POSITIVE);
         Part {

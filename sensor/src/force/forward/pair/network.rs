@@ -1,9 +1,9 @@
 //! The network for two contacts: layers of channels, each with a value for every image of a pair.
 //!
-//! A layout that looks the same if mirrored along x or y moves likewise, and contacts have no
-//! order: a pair has eight images. A channel has a value for each. Sums of these with the signs of
-//! a parity change at most their sign from image to image, as inputs and outputs do. So between the
-//! layers each parity has weights of its own: an eighth of those that all values would have.
+//! A layout that is symmetric about x and y moves symmetrically, and contacts have no order: a pair
+//! has eight images. A channel has a value for each. Sums of these with the signs of a parity
+//! change at most their sign from image to image, as inputs and outputs do. So between the layers
+//! each parity has weights of its own: an eighth of those that all values would have.
 
 use crate::force::kernels::{APART, Number, products};
 
@@ -17,8 +17,8 @@ pub const COORDINATES: usize = 2 * DOTS;
 pub const FIRST: usize = 24;
 pub const SECOND: usize = 128;
 
-/// Images of a pair. Their bits, and those of a parity, tell what is mirrored or changes the sign:
-/// x (1), y (2), the order of the contacts (4).
+/// Images of a pair. Bits of an image and of a parity say what is mirrored or changes the sign: x
+/// (1), y (2), the order of the contacts (4).
 const IMAGES: usize = 8;
 /// Parities of outputs: no order matters there.
 const PARITIES: usize = 4;
@@ -26,7 +26,7 @@ const PARITIES: usize = 4;
 const OUTPUTS: usize = COORDINATES / PARITIES;
 /// The parities of the inputs.
 const OF_INPUTS: [usize; INPUTS] = [0, 4, 1, 2, 5, 6, 1, 2, 5, 6];
-/// For each marker of `8v` its kind, and what mirrors the kind's first marker to it.
+/// For each marker of `8v` its kind, and the mirrors that take the kind's first marker to it.
 const OF_MARKERS: [(Kind, usize); DOTS] = [
     (Kind::Corner, 0),
     (Kind::Corner, 1),
@@ -49,10 +49,10 @@ enum Kind {
 /// The layers, borrowed from a file.
 ///
 /// For each channel of the two hidden layers it has f32 bias and step, and the weights in units of
-/// the step, i16: in the second layer those of each parity after those of the one before. Then come
-/// f32 bias and step of each output, and for each channel the weights of all outputs. Outputs of a
-/// parity are x and y of the first corner, and that coordinate of the first left and of the first
-/// top marker which has the parity.
+/// the step, i16. In the second layer the weights are ordered by parity. Then come f32 bias and
+/// step of each output, and for each channel the weights of all outputs. Outputs of a parity are x
+/// and y of the first corner, and that coordinate of the first left and of the first top marker
+/// which has the parity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Network<'a> {
     first: &'a [[u8; row(INPUTS)]; FIRST],
@@ -73,7 +73,7 @@ const LANES: usize = 12;
 const LARGEST: f32 = 32_767.0;
 /// Bits of a sum of products that are left out, so that 32 are enough: |Σ| ≤ 24 · 2³⁰ < 2³⁵.
 const LEFT_OUT: u32 = 4;
-/// What 1 is worth in a sum of products with values.
+/// The value of 1 in a sum of products.
 const UNIT: f32 = (1 << LEFT_OUT) as f32 / LARGEST;
 const _: () = assert!(2 * APART == row(IMAGES * FIRST) && FIRST <= 1 << (31 + LEFT_OUT - 30));
 

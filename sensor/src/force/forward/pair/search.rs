@@ -22,7 +22,7 @@ pub struct Work(pub u32);
 impl Work {
     /// As many as are of use: for a computer.
     pub const ALL: Work = Work(u32::MAX);
-    /// What a device does in one frame.
+    /// The work of a device in one frame.
     pub const OF_A_FRAME: Work = Work(1);
 
     /// Takes one; returns whether there was one.
@@ -119,8 +119,8 @@ impl Search {
         }
     }
 
-    /// Returns whether one contact of unknown width explains the markers as well as two do that
-    /// are not told apart. A ball is no needle, and moves markers as two near needles do.
+    /// Returns whether one contact of unknown width explains the markers as well as two do that are
+    /// not resolved. A ball is no needle, and moves markers as two near needles do.
     fn is_one_wide(&self, problem: &Problem<'_>) -> bool {
         let (unexplained, [first, second]) = self.best_of_all();
         let wide = || problem.one_wide(self.one);
@@ -142,8 +142,8 @@ impl Search {
         best
     }
 
-    /// Returns the contacts that were found, once the search is over, and what they leave
-    /// unexplained. Returns `None` if two do not explain the markers, or one does as well.
+    /// Returns the contacts and their residual, once the search is over. Returns `None` if two do
+    /// not explain the markers, or one does as well.
     pub fn found(&self) -> Option<Found> {
         let (unexplained, pair) = self.best_of_all();
         let rivals = |other: &(f32, Pair)| has_rival((unexplained, &pair), (other.0, &other.1));
@@ -165,7 +165,7 @@ impl Search {
     }
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Found {
     /// The contacts.

@@ -364,7 +364,7 @@ mod tests {
         );
     }
 
-    /// The interface tells the end of the frame, and nobody has taken its last words yet.
+    /// The interface signals the end of the frame before its last words are taken.
     #[test]
     fn an_early_vsync_comes_with_the_last_byte() {
         let mut bench = Bench::new();

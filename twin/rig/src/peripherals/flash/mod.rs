@@ -3,8 +3,8 @@
 //! operation.
 //!
 //! Registers, keys, write buffer, queue and times are rigless' (RM0433 chapter 4, DS12110 table
-//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits; a change of options takes 20
-//! µs, for want of a figure, and the core does not wait). This module has the operations: blank
+//! 140: 0.1 ms to program a word, 1 s to erase a sector, at 64 bits). A change of options takes 20
+//! µs, for want of a figure, and the core does not wait. This module has the operations: blank
 //! words, words torn by a cut, and the accesses that firmware must not make to them. A torn word
 //! reads as a bus error, which the MDMA reports. A read by the core is not checked, because the
 //! emulator's core reads flash by itself.

@@ -31,7 +31,7 @@ impl Block {
 }
 
 /// Returns the transfer that the registers of a channel describe. `get` reads a register by its
-/// row, `control` is the value written to CR. The error describes what is wrong.
+/// row, `control` is the value written to CR. The error describes the fault.
 pub fn asked_for(get: &dyn Fn(usize) -> u64, control: u64) -> Result<Block, String> {
     let (tcr, tbr) = (get(row::TCR), get(row::TBR));
     let field = |shift: u32, bits: u32| tcr >> shift & ((1 << bits) - 1);
