@@ -29,15 +29,6 @@ pub(super) struct Whitening {
 }
 
 impl Whitening {
-    /// The identity: components are the features.
-    pub fn none() -> Self {
-        let one = identity().map(|row| row.map(|part| part as f32));
-        Self {
-            rows: one,
-            back: one,
-        }
-    }
-
     /// The whitening of these standardized features.
     pub fn of(features: &[[f32; INPUTS]]) -> Self {
         let mut covariance = [[0.0; INPUTS]; INPUTS];
@@ -50,7 +41,11 @@ impl Whitening {
         let whole: f64 = variances.iter().sum();
         if whole <= 0.0 {
             // Features that never vary have no components.
-            return Self::none();
+            let same = identity().map(|row| row.map(|part| part as f32));
+            return Self {
+                rows: same,
+                back: same,
+            };
         }
         let size = |k: usize| (variances[k].clamp(0.0, 1.0) + FLOOR * whole).sqrt();
         let rows = |k: usize| directions[k].map(|part| (part / size(k)) as f32);
@@ -178,23 +173,22 @@ mod tests {
     #[test]
     fn folding_does_not_change_what_the_network_says() {
         let features = features(50);
-        for whitening in [Whitening::of(&features), Whitening::none()] {
-            let mut random = ChaCha8Rng::seed_from_u64(6);
-            let inner = Mlp::random(&[INPUTS, 7, 3], &mut random);
-            let mut outer = inner.clone();
-            whitening.fold(&mut outer);
-            for row in &features {
-                let by_components = inner.forward(whitening.components(row).to_vec(), 1).outputs;
-                let by_features = outer.forward(row.to_vec(), 1).outputs;
-                for (a, b) in by_components.iter().zip(by_features) {
-                    assert!((a - b).abs() < 1e-3, "{a} {b}");
-                }
-            }
-            whitening.unfold(&mut outer);
-            let pairs = inner.layers[0].weights.iter().zip(&outer.layers[0].weights);
-            for (a, b) in pairs {
+        let whitening = Whitening::of(&features);
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let inner = Mlp::random(&[INPUTS, 7, 3], &mut random);
+        let mut outer = inner.clone();
+        whitening.fold(&mut outer);
+        for row in &features {
+            let by_components = inner.forward(whitening.components(row).to_vec(), 1).outputs;
+            let by_features = outer.forward(row.to_vec(), 1).outputs;
+            for (a, b) in by_components.iter().zip(by_features) {
                 assert!((a - b).abs() < 1e-3, "{a} {b}");
             }
+        }
+        whitening.unfold(&mut outer);
+        let pairs = inner.layers[0].weights.iter().zip(&outer.layers[0].weights);
+        for (a, b) in pairs {
+            assert!((a - b).abs() < 1e-3, "{a} {b}");
         }
     }
 
