@@ -43,7 +43,6 @@ pub fn parse(bytes: &[u8]) -> Result<Network> {
         input: scaling(&tensors, "input", INPUTS)?,
         output: scaling(&tensors, "output", meaning.outputs())?,
         activation_max: vec![1.0; layers.len().saturating_sub(1)],
-        saturates: false,
         layers,
     };
     network.validate()?;

@@ -200,9 +200,6 @@ pub struct Network {
     pub output: Standardization,
     /// For each hidden layer, the largest activation that the chip can carry (see `quantize`).
     pub activation_max: Vec<f64>,
-    /// Whether activations also end there in floats, as [split](Network::split) units require.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
-    pub saturates: bool,
     /// The layers, in order.
     pub layers: Vec<Layer>,
 }
@@ -276,12 +273,8 @@ impl Network {
 
     /// The output of a hidden layer.
     fn activations(&self, layer: usize, x: &[f64]) -> Vec<f64> {
-        let limit = match self.saturates {
-            true => self.activation_max[layer],
-            false => f64::INFINITY,
-        };
         let sums = self.layers[layer].apply(x);
-        sums.into_iter().map(|v| v.max(0.0).min(limit)).collect()
+        sums.into_iter().map(|v| v.max(0.0)).collect()
     }
 
     /// The float reference: features (px, px²) to a force (N).
@@ -359,7 +352,6 @@ mod tests {
             input: ones(INPUTS),
             output: ones(OUTPUTS),
             activation_max: vec![1.0],
-            saturates: false,
             layers: vec![hidden, last],
         }
     }

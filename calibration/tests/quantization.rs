@@ -46,7 +46,6 @@ fn network() -> impl Strategy<Value = Network> {
                 sigma: o.1,
             },
             activation_max: Vec::new(),
-            saturates: false,
             layers: vec![a, b, c],
         })
 }
@@ -174,7 +173,6 @@ fn networks_that_the_chip_cannot_hold_are_refused() {
         input: ones(INPUTS),
         output: ones(OUTPUTS),
         activation_max: vec![1.0],
-        saturates: false,
         layers: vec![flat(INPUTS, 513), flat(513, OUTPUTS)],
     };
     let error = export(&weights(wide.clone())).unwrap_err().to_string();

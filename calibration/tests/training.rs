@@ -4,7 +4,7 @@ use hivtac_calibration::data::dataset::{Dataset, Loads, Recipe, generate};
 use hivtac_calibration::data::range::Range;
 use hivtac_calibration::evaluation::{Evaluation, by_place};
 use hivtac_calibration::fit::fit;
-use hivtac_calibration::network::{Arithmetic, INPUTS, Meaning, OUTPUTS};
+use hivtac_calibration::network::{INPUTS, Meaning, OUTPUTS};
 use hivtac_calibration::quantize::export;
 use hivtac_calibration::train::{DirectionWeight, Options, Samples, train};
 
@@ -167,33 +167,6 @@ fn options_that_do_not_fit(refused: &dyn Fn(&Options, &str)) {
         };
         refused(&nothing, "weight of directions");
     }
-    let decaying = Options {
-        weight_decay: -0.1,
-        ..small()
-    };
-    refused(&decaying, "weight decay");
-    let split = Options {
-        hidden: vec![300, 8],
-        unit_parts: 2,
-        rounded_epochs: 1,
-        ..small()
-    };
-    refused(&split, "600 wide");
-    let single = Options {
-        hidden: vec![8],
-        ..split.clone()
-    };
-    refused(&single, "between two hidden layers");
-    let unrounded = Options {
-        rounded_epochs: 0,
-        ..split.clone()
-    };
-    refused(&unrounded, "before passes with rounding");
-    let int16 = Options {
-        arithmetic: Arithmetic::Int16,
-        ..split
-    };
-    refused(&int16, "for int8");
 }
 
 #[test]

@@ -1,9 +1,9 @@
-//! Measures the throughput of the sensing's stages on this computer, to show a regression without
-//! an emulator: `cargo bench --package hivtac-tests`.
+//! Measures the time of the sensing's stages on this computer, to show a regression without an
+//! emulator: `cargo bench --package hivtac-tests`.
 
 use std::hint::black_box;
+use std::time::Instant;
 
-use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use hivtac_sensor::force::model::{Model, OutputKind};
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::markers::scanner::{ScanSettings, Scanner};
@@ -19,6 +19,19 @@ use hivtac_twin::{Preset, Scene};
 
 /// Columns and rows of the frames.
 const SIZES: [[u16; 2]; 2] = [[320, 240], [800, 600]];
+/// Runs of each stage. The fastest is printed, as other programs may use the computer.
+const RUNS: u32 = 2_000;
+
+/// Runs a stage, and prints its fastest time.
+fn measure<T>(stage: &str, mut run: impl FnMut() -> T) {
+    let seconds = (0..RUNS).map(|_| {
+        let begin = Instant::now();
+        black_box(run());
+        begin.elapsed().as_secs_f64()
+    });
+    let fastest = seconds.fold(f64::MAX, f64::min);
+    println!("{stage}: {:.1} µs", 1e6 * fastest);
+}
 
 struct Frame {
     name: String,
@@ -65,7 +78,7 @@ fn table() -> Box<ScreenedTable> {
 }
 
 /// Measures the scanner alone: from pixels, and from masks, that is, without the threshold.
-fn scanner(criterion: &mut Criterion) {
+fn scanner() {
     let (table, mut scanner) = (table(), Box::new(Scanner::<64>::new()));
     for frame in Frame::all() {
         let [width, height] = frame.size;
@@ -78,70 +91,53 @@ fn scanner(criterion: &mut Criterion) {
             max_runs: u32::MAX,
             cleaned: false,
         };
-        let mut group = criterion.benchmark_group("scanner");
-        group.throughput(Throughput::Elements(frame.pixels.len() as u64));
-        group.bench_function(BenchmarkId::new("pixels", &frame.name), |bencher| {
-            bencher.iter(|| {
-                scanner.begin(settings).expect("a size that it takes");
-                frame.rows().for_each(|row| scanner.push_row(&*table, row));
-                scanner.finish(&*table).set_pixels
-            });
+        measure(&format!("scanner, pixels of {}", frame.name), || {
+            scanner.begin(settings).expect("a size that it takes");
+            frame.rows().for_each(|row| scanner.push_row(&*table, row));
+            scanner.finish(&*table).set_pixels
         });
         let masks = frame.masks(&table);
-        group.bench_function(BenchmarkId::new("masks", &frame.name), |bencher| {
-            bencher.iter(|| {
-                scanner.begin(settings).expect("a size that it takes");
-                black_box(&masks)
-                    .iter()
-                    .for_each(|mask| scanner.push_mask_row(mask));
-                scanner.finish(&*table).set_pixels
-            });
+        measure(&format!("scanner, masks of {}", frame.name), || {
+            scanner.begin(settings).expect("a size that it takes");
+            black_box(&masks)
+                .iter()
+                .for_each(|mask| scanner.push_mask_row(mask));
+            scanner.finish(&*table).set_pixels
         });
     }
 }
 
 /// Measures the way from pixels to features.
-fn frame(criterion: &mut Criterion) {
+fn frame() {
     let mut sensor = Box::new(Sensor::<64, ScreenedTable>::new());
-    let mut group = criterion.benchmark_group("frame");
     for frame in Frame::all() {
         let [width, height] = frame.size;
         let geometry = Geometry::preset(Preset::Ov7725, width, height);
         sensor
             .configure(Settings::usual(geometry, ByteOrder::Native), None)
             .expect("usual settings");
-        group.throughput(Throughput::Elements(frame.pixels.len() as u64));
-        group.bench_function(&frame.name, |bencher| {
-            bencher.iter(|| {
-                sensor.begin_frame();
-                frame.rows().for_each(|row| sensor.push_row(row));
-                sensor.finish_frame()
-            });
+        measure(&format!("frame of {}", frame.name), || {
+            sensor.begin_frame();
+            frame.rows().for_each(|row| sensor.push_row(row));
+            sensor.finish_frame()
         });
     }
 }
 
-/// Measures one inference; its elements are multiplications.
-fn network(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("network");
+/// Measures one inference.
+fn network() {
     for widths in [&[11, 64, 64, 3][..], &[11, 512, 512, 512, 3]] {
         let file = models::file(widths, Weights::Random, OutputKind::ForceVector, 1);
         let model = Model::parse(&file).expect("a sound model");
         let (mut network, rest) = (Network::new(), models::rest());
-        let products = widths
-            .windows(2)
-            .map(|pair| u64::from(pair[0]) * u64::from(pair[1]));
-        group.throughput(Throughput::Elements(products.sum()));
-        let name = widths
-            .iter()
-            .map(u16::to_string)
-            .collect::<Vec<_>>()
-            .join("-");
-        group.bench_function(name, |bencher| {
-            bencher.iter(|| network.run(&model, black_box(&rest), &rest));
+        measure(&format!("network {widths:?}"), || {
+            network.run(&model, black_box(&rest), &rest)
         });
     }
 }
 
-criterion_group!(benches, scanner, frame, network);
-criterion_main!(benches);
+fn main() {
+    scanner();
+    frame();
+    network();
+}

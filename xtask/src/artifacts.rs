@@ -244,7 +244,7 @@ pub fn build(command: &mut Command, target: &str) -> Result<PathBuf> {
 }
 
 /// Runs a cargo command that sends messages in JSON; passes each of them to `each`.
-pub fn for_each_message(command: &mut Command, mut each: impl FnMut(&Value)) -> Result<()> {
+fn for_each_message(command: &mut Command, mut each: impl FnMut(&Value)) -> Result<()> {
     process::for_each_line(command, |line| {
         if let Ok(message) = serde_json::from_str(line) {
             each(&message);

@@ -1,4 +1,4 @@
-//! `cargo xtask …`: set-up, demo, tests, benchmarks and sizes of this project.
+//! `cargo xtask …`: set-up, demo, tests and benchmarks of this project.
 
 mod artifacts;
 mod bench;
@@ -13,7 +13,6 @@ mod python;
 mod release;
 mod report;
 mod rig;
-mod size;
 mod test;
 mod toolchain;
 mod web;
@@ -23,7 +22,7 @@ use std::process::ExitCode;
 use anyhow::Result;
 use clap::Parser;
 
-/// Set-up, demo, tests, benchmarks and sizes. Each command installs what it needs.
+/// Set-up, demo, tests and benchmarks. Each command installs what it needs.
 #[derive(Parser)]
 #[command(name = "cargo xtask")]
 enum Task {
@@ -36,8 +35,6 @@ enum Task {
     /// Put small mistakes into the firmware, one at a time, and list those that no test notices:
     /// two to three hours of a core. Run `cargo xtask test rig` before.
     Mutants(mutants::Mutants),
-    /// Show the firmware's use of each memory.
-    Size,
     /// Make the files of a release: programs, Python wheels and firmware, and install them.
     Release(release::Release),
     /// Write the sensor's printed parts: STL, STEP, drawings and pictures (docs/kit.md).
@@ -68,7 +65,6 @@ fn run(task: Task) -> Result<()> {
         Task::Bench(bench) => bench.run(),
         Task::Release(release) => release.run(),
         Task::Mutants(mutants) => mutants.run(),
-        Task::Size => size::run(),
         Task::Kit(kit) => kit.run(),
         Task::Web => web::run(),
     }

@@ -1,10 +1,7 @@
 //! Chooses the loads of a rendered data set.
 
-use std::sync::LazyLock;
-
 use anyhow::Result;
 use hivtac_twin::Load;
-use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -99,20 +96,6 @@ impl PaperPoses {
         (0..Self::COUNT).find(|&pose| Self::angles_deg(pose) == [alpha, beta])
     }
 
-    /// Numbers of the poses on which comparisons train, and of the fifth that they hold out. Each
-    /// list is in order and always the same.
-    pub fn parts() -> &'static [Vec<usize>; 2] {
-        static PARTS: LazyLock<[Vec<usize>; 2]> = LazyLock::new(|| {
-            let mut poses: Vec<usize> = (0..PaperPoses::COUNT).collect();
-            poses.shuffle(&mut ChaCha8Rng::seed_from_u64(2022));
-            let mut training = poses.split_off(PaperPoses::COUNT / 5);
-            training.sort_unstable();
-            poses.sort_unstable();
-            [training, poses]
-        });
-        &PARTS
-    }
-
     /// The load of a row in a pose below [`Self::COUNT`].
     ///
     /// # Errors
@@ -201,15 +184,6 @@ mod tests {
         assert_eq!(PaperPoses::angles_deg(356), [10.0, 8.0]);
         assert_eq!(PaperPoses::numbered([-10.0, -7.0]), Some(1));
         assert_eq!(PaperPoses::numbered([0.5, 0.0]), None);
-    }
-
-    #[test]
-    fn a_fifth_of_the_poses_is_held_out() {
-        let [training, held_out] = PaperPoses::parts();
-        assert_eq!((training.len(), held_out.len()), (286, 71));
-        let mut all = [&training[..], held_out].concat();
-        all.sort_unstable();
-        assert!(all.into_iter().eq(0..PaperPoses::COUNT));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::Judged;
 use super::numbers::errors;
 use crate::data::loads::PaperPoses;
-use crate::evaluation::plot::{Axis, COLOURS, Plot, Scale};
+use crate::evaluation::plot::{Axis, COLOURS, Plot};
 
 /// The most points of a scatter plot.
 const MOST_POINTS: usize = 2500;
@@ -29,7 +29,7 @@ pub(super) fn found_against_true(frames: &[Judged]) -> Vec<String> {
             .collect();
         // Weak forces have wildly varying angles: the axes cover the truth with a small margin.
         let axis = |label: &str| {
-            let mut axis = Axis::over(label, points.iter().map(|p| p.0), Scale::Linear);
+            let mut axis = Axis::over(label, points.iter().map(|p| p.0));
             let margin = 0.1 * (axis.range[1] - axis.range[0]);
             axis.range = [axis.range[0] - margin, axis.range[1] + margin];
             axis
@@ -57,12 +57,10 @@ pub(super) fn pose_maps(averages: &BTreeMap<usize, [f64; 3]>) -> Vec<String> {
         let x = Axis {
             label: "α, °".into(),
             range: [-10.5, 10.5],
-            scale: Scale::Linear,
         };
         let y = Axis {
             label: "β, °".into(),
             range: [-8.5, 8.5],
-            scale: Scale::Linear,
         };
         let title =
             format!("average error of {name}; red +{largest:.3}, blue −{largest:.3} {unit}");
@@ -110,10 +108,9 @@ pub(super) fn histograms(values: &[[f64; 3]], of: &str) -> Vec<String> {
         let x = Axis {
             label: format!("error of {name}, {unit}"),
             range: [-limit, limit],
-            scale: Scale::Linear,
         };
         let tops = counts.iter().map(|&c| share(c)).chain([0.0]);
-        let y = Axis::over(&format!("part of the {of}, %"), tops, Scale::Linear);
+        let y = Axis::over(&format!("part of the {of}, %"), tops);
         let mut plot = Plot::new(&format!("errors of {name}"), x, y);
         for (bar, &count) in counts.iter().enumerate() {
             let edge = |b: usize| limit * (2.0 * b as f64 / BARS as f64 - 1.0);
@@ -153,7 +150,7 @@ pub(super) fn error_against_force(frames: &[Judged]) -> Vec<String> {
 
 fn against_force(title: &str, frames: &[&Judged]) -> String {
     let forces = frames.iter().map(|f| 1e3 * f.truth_polar[2]);
-    let x = Axis::over("|F|, mN", forces.chain([0.0]), Scale::Linear);
+    let x = Axis::over("|F|, mN", forces.chain([0.0]));
     let mut sizes: Vec<f64> = frames
         .iter()
         .flat_map(|f| scaled_errors(f))
@@ -168,7 +165,6 @@ fn against_force(title: &str, frames: &[&Judged]) -> String {
     let y = Axis {
         label: "error".into(),
         range: [-limit, limit],
-        scale: Scale::Linear,
     };
     let mut plot = Plot::new(title, x, y);
     for (i, (name, unit, _)) in QUANTITIES.iter().enumerate() {

@@ -12,15 +12,6 @@ pub const COLOURS: [&str; 6] = [
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
 ];
 
-/// The scale of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scale {
-    /// Linear.
-    Linear,
-    /// By powers of ten; omits numbers that are not above 0.
-    Log,
-}
-
 /// One axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
@@ -28,59 +19,40 @@ pub struct Axis {
     pub label: String,
     /// Its ends.
     pub range: [f64; 2],
-    /// Its scale.
-    pub scale: Scale,
 }
 
 impl Axis {
     /// An axis over all of `values`, with a least width.
-    pub fn over(label: &str, values: impl IntoIterator<Item = f64>, scale: Scale) -> Self {
-        let usable = |v: &f64| v.is_finite() && (scale == Scale::Linear || *v > 0.0);
+    pub fn over(label: &str, values: impl IntoIterator<Item = f64>) -> Self {
         let (low, high) = values
             .into_iter()
-            .filter(usable)
+            .filter(|v| v.is_finite())
             .fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
-        let range = match scale {
-            _ if low > high => [0.1, 1.0],
-            Scale::Linear if high - low <= 0.0 => [low - 0.5, high + 0.5],
-            Scale::Linear => [low, high],
-            Scale::Log => [
-                10_f64.powf(low.log10().floor()),
-                10_f64.powf(high.log10().floor() + 1.0),
-            ],
+        let range = match low < high {
+            true => [low, high],
+            false if low > high => [0.1, 1.0],
+            false => [low - 0.5, high + 0.5],
         };
         Self {
             label: label.into(),
             range,
-            scale,
         }
     }
 
     /// Position of a number between the ends, 0 to 1; `None` outside.
     fn place(&self, value: f64) -> Option<f64> {
         let [low, high] = self.range;
-        let part = match self.scale {
-            Scale::Linear => (value - low) / (high - low),
-            Scale::Log => (value / low).ln() / (high / low).ln(),
-        };
+        let part = (value - low) / (high - low);
         (part.is_finite() && (-1e-9..=1.0 + 1e-9).contains(&part)).then_some(part)
     }
 
     /// Numbers to write along the axis.
     fn ticks(&self) -> Vec<f64> {
         let [low, high] = self.range;
-        match self.scale {
-            Scale::Log => {
-                let (first, last) = (low.log10().round() as i32, high.log10().round() as i32);
-                (first..=last).map(|power| 10_f64.powi(power)).collect()
-            }
-            Scale::Linear => {
-                let step = nice_step((high - low) / 6.0);
-                let first = (low / step - 1e-9).ceil() as i64;
-                let last = (high / step + 1e-9).floor() as i64;
-                (first..=last).map(|i| i as f64 * step).collect()
-            }
-        }
+        let step = nice_step((high - low) / 6.0);
+        let first = (low / step - 1e-9).ceil() as i64;
+        let last = (high / step + 1e-9).floor() as i64;
+        (first..=last).map(|i| i as f64 * step).collect()
     }
 }
 
@@ -264,27 +236,25 @@ pub fn escaped(text: &str) -> String {
 mod tests {
     use super::*;
 
-    fn plot(scale: Scale) -> Plot {
-        let x = Axis::over("x", [0.0, 10.0], Scale::Linear);
-        Plot::new("a < b", x, Axis::over("y & z", [0.02, 3.0], scale))
+    fn plot() -> Plot {
+        Plot::new(
+            "a < b",
+            Axis::over("x", [0.0, 10.0]),
+            Axis::over("y & z", [0.02, 3.0]),
+        )
     }
 
     #[test]
     fn axes_hold_their_values() {
-        let axis = Axis::over("", [0.02, 3.0, f64::NAN, -1.0], Scale::Log);
-        assert!(
-            (axis.range[0] - 0.01).abs() < 1e-12 && (axis.range[1] - 10.0).abs() < 1e-9,
-            "{axis:?}"
-        );
-        assert_eq!(axis.ticks().len(), 4);
-        assert_eq!(Axis::over("", [-0.1, 0.1], Scale::Linear).ticks().len(), 5);
-        assert_eq!(Axis::over("", [5.0], Scale::Linear).range, [4.5, 5.5]);
-        assert_eq!(Axis::over("", [], Scale::Log).range, [0.1, 1.0]);
+        assert_eq!(Axis::over("", [0.02, f64::NAN, 3.0]).range, [0.02, 3.0]);
+        assert_eq!(Axis::over("", [-0.1, 0.1]).ticks().len(), 5);
+        assert_eq!(Axis::over("", [5.0]).range, [4.5, 5.5]);
+        assert_eq!(Axis::over("", []).range, [0.1, 1.0]);
     }
 
     #[test]
     fn lines_stop_at_what_has_no_place() {
-        let mut plot = plot(Scale::Log);
+        let mut plot = plot();
         plot.line(
             &[(0.0, 1.0), (1.0, 1.0), (2.0, 0.0), (3.0, 1.0), (4.0, 2.0)],
             COLOURS[0],
@@ -294,7 +264,7 @@ mod tests {
 
     #[test]
     fn text_is_escaped() {
-        let mut plot = plot(Scale::Linear);
+        let mut plot = plot();
         plot.name("<script>", COLOURS[1]);
         let svg = plot.to_svg();
         assert!(svg.contains("a &lt; b") && svg.contains("y &amp; z") && !svg.contains("<script>"));

@@ -30,8 +30,16 @@ pub fn cholesky(mut matrix: Matrix) -> Matrix {
     matrix
 }
 
-/// Eigenvalues and eigenvectors of a symmetric matrix by Jacobi's rotations; the largest first.
-pub fn principal(mut matrix: Matrix) -> Vec<(f64, Vec<f64>)> {
+/// Eigenvalues and eigenvectors of a symmetric matrix; the largest first.
+pub fn principal(matrix: Matrix) -> Vec<(f64, Vec<f64>)> {
+    let mut all = eigenvectors(matrix);
+    all.sort_by(|a, b| b.0.total_cmp(&a.0));
+    all
+}
+
+/// Eigenvalues and eigenvectors of a symmetric matrix by Jacobi's rotations, in the order of its
+/// rows.
+pub fn eigenvectors(mut matrix: Matrix) -> Vec<(f64, Vec<f64>)> {
     let count = matrix.len();
     let one = |i: usize| (0..count).map(|j| f64::from(u8::from(i == j))).collect();
     let mut directions: Matrix = (0..count).map(one).collect();
@@ -54,9 +62,7 @@ pub fn principal(mut matrix: Matrix) -> Vec<(f64, Vec<f64>)> {
         }
     }
     let values = (0..count).map(|k| matrix[k][k]);
-    let mut all: Vec<_> = values.zip(directions).collect();
-    all.sort_by(|a, b| b.0.total_cmp(&a.0));
-    all
+    values.zip(directions).collect()
 }
 
 fn turned([cos, sin]: [f64; 2], a: f64, b: f64) -> (f64, f64) {

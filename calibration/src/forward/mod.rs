@@ -42,6 +42,7 @@ pub use functions::{Sampled, compressed};
 use layout_model::UNMEASURED_PX;
 pub use layout_model::{layout_model, layout_scene, layout_weights, rest_of, untared};
 pub(crate) use least_squares::{LeastSquares, dot};
+pub(crate) use matrix::eigenvectors;
 pub use matrix::{Matrix, cholesky};
 pub use motions::MotionsSpec;
 pub use noise::Noise;

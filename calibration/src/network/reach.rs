@@ -4,9 +4,6 @@ use super::{Arithmetic, INPUTS, Network};
 
 /// The largest factor by which a weakly active unit is scaled up.
 const MOST_STRETCHED: f64 = 32.0;
-/// Part by which split units extend beyond the data's largest activation, for rows that go a little
-/// further; it costs hardly any steps.
-const HEADROOM: f64 = 1.0 / 32.0;
 
 impl Network {
     /// Whether the chip holds a hidden layer's activations in seven bits: those followed by int8
@@ -37,32 +34,6 @@ impl Network {
         }
     }
 
-    /// Replaces each unit of the layers with seven-bit activations by `parts` units, one for each
-    /// part of its range: 0 below its part, saturated above it. Their sum is the unit, so the
-    /// network stays the same within `activation_max`. But a step of an activation is finer by the
-    /// factor `parts`, and only one part of each unit is rounded at a time. With one part nothing
-    /// changes.
-    pub fn split(&mut self, parts: usize) {
-        if parts <= 1 {
-            return;
-        }
-        for i in 0..self.layers.len() {
-            if !self.is_coarse(i) {
-                continue;
-            }
-            let reach = self.activation_max[i] * (1.0 + HEADROOM) / parts as f64;
-            let layer = &mut self.layers[i];
-            layer.weights = repeated(&layer.weights, parts);
-            let biases = layer.bias.iter().map(|&b| f64::from(b));
-            let part = |b: f64| (0..parts).map(move |part| (b - part as f64 * reach) as f32);
-            layer.bias = biases.flat_map(part).collect();
-            let next = self.layers[i + 1].weights.iter_mut();
-            next.for_each(|row| *row = repeated(row, parts));
-            self.activation_max[i] = reach;
-        }
-        self.saturates = true;
-    }
-
     /// The largest output over `rows` of each unit of the first `few` layers, all hidden ones.
     fn unit_maxima(&self, few: usize, rows: &[[f64; INPUTS]]) -> Vec<Vec<f64>> {
         let layers = &self.layers[..few];
@@ -89,16 +60,9 @@ impl Network {
     }
 }
 
-/// Each item `times` times in a row.
-fn repeated<T: Clone>(items: &[T], times: usize) -> Vec<T> {
-    let copies = |item: &T| vec![item.clone(); times];
-    items.iter().flat_map(copies).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::tests::tiny;
-    use super::super::{Layer, OUTPUTS};
     use super::*;
 
     fn rows() -> Vec<[f64; INPUTS]> {
@@ -129,57 +93,5 @@ mod tests {
         let silent = network.clone();
         network.equalize(&rows);
         assert_eq!(network, silent);
-    }
-
-    /// Two hidden layers: the first is coarse in int8.
-    fn deep() -> Network {
-        let mut network = tiny();
-        let middle = Layer {
-            weights: vec![vec![0.5, -0.25], vec![-0.125, 0.5], vec![0.25, 0.25]],
-            bias: vec![0.1, 0.2, -1.0],
-        };
-        network.layers[1].weights = vec![vec![1.0, -0.5, 0.25]; OUTPUTS];
-        network.layers.insert(1, middle);
-        network.activation_max = network.activation_maxima(&rows());
-        network
-    }
-
-    #[test]
-    fn split_units_say_the_same_in_smaller_steps() {
-        let before = deep();
-        let mut network = before.clone();
-        network.split(4);
-        network.validate().unwrap();
-        let widths = network.layers.iter().map(Layer::outputs);
-        assert_eq!(widths.collect::<Vec<_>>(), [8, 3, OUTPUTS]);
-        same(&network, &before, &rows());
-        let finer = before.activation_max[0] / network.activation_max[0];
-        assert!((3.8..4.0).contains(&finer), "{finer}");
-        assert_eq!(network.activation_max[1], before.activation_max[1]);
-        // At most one part of each unit is neither 0 nor saturated, and further training keeps
-        // saturation.
-        let limit = network.activation_max[0];
-        for row in rows() {
-            let parts = network.activations(0, &network.input.forward(&row));
-            for parts in parts.chunks(4) {
-                let between = parts.iter().filter(|&&x| x > 0.0 && x < limit);
-                assert!(between.count() <= 1, "{parts:?}");
-            }
-        }
-        let split = network.clone();
-        network.equalize(&rows());
-        same(&network, &split, &rows());
-    }
-
-    #[test]
-    fn one_part_and_activations_of_twelve_bits_are_not_split() {
-        let before = deep();
-        let mut network = before.clone();
-        network.split(1);
-        assert_eq!(network, before);
-        network.arithmetic = Arithmetic::Int16;
-        network.split(4);
-        assert_eq!(network.layers, before.layers);
-        assert_eq!(network.activation_max, before.activation_max);
     }
 }

@@ -1,5 +1,4 @@
-//! The optimizer: Adam (Kingma and Ba 2014), with the constants of its paper, and decoupled weight
-//! decay (Loshchilov and Hutter 2017).
+//! The optimizer: Adam (Kingma and Ba 2014), with the constants of its paper.
 
 use super::mlp::{Dense, Mlp};
 
@@ -9,8 +8,6 @@ const EPSILON: f32 = 1e-8;
 
 /// Moving averages of every parameter's gradient and of its square.
 pub(super) struct Adam {
-    /// The part of each weight that a step of size 1 removes.
-    decay: f64,
     averages: Vec<[Averages; 2]>,
     /// β₁ᵗ and β₂ᵗ after t steps.
     powers: [f64; 2],
@@ -43,7 +40,7 @@ impl Averages {
 }
 
 impl Adam {
-    pub fn new(mlp: &Mlp, decay: f64) -> Self {
+    pub fn new(mlp: &Mlp) -> Self {
         let averages = |layer: &Dense| {
             [
                 Averages::of(layer.weights.len()),
@@ -51,7 +48,6 @@ impl Adam {
             ]
         };
         Self {
-            decay,
             averages: mlp.layers.iter().map(averages).collect(),
             powers: [1.0; 2],
         }
@@ -59,7 +55,6 @@ impl Adam {
 
     /// One step down the gradient.
     pub fn step(&mut self, mlp: &mut Mlp, gradients: &[Dense], rate: f64) {
-        let kept = (1.0 - rate * self.decay) as f32;
         self.powers[0] *= f64::from(BETA_1);
         self.powers[1] *= f64::from(BETA_2);
         let root = (1.0 - self.powers[1]).sqrt();
@@ -69,7 +64,6 @@ impl Adam {
         for ((layer, gradient), [weights, bias]) in
             mlp.layers.iter_mut().zip(gradients).zip(&mut self.averages)
         {
-            layer.weights.iter_mut().for_each(|w| *w *= kept);
             arch.dispatch(|| weights.step(&mut layer.weights, &gradient.weights, rate, epsilon));
             bias.step(&mut layer.bias, &gradient.bias, rate, epsilon);
         }
@@ -89,7 +83,7 @@ mod tests {
                 bias: vec![0.5],
             }],
         };
-        let mut adam = Adam::new(&mlp, 0.0);
+        let mut adam = Adam::new(&mlp);
         let gradient = vec![Dense {
             weights: vec![100.0, -0.01],
             bias: vec![0.0],

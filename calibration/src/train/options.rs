@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 use clap::Args;
 
 use crate::import;
-use crate::network::{Arithmetic, Layer, Meaning, Network};
+use crate::network::{Arithmetic, Meaning, Network};
 use crate::weights::Weights;
 
 /// The widest layer that a model file can hold.
@@ -39,24 +39,10 @@ pub struct Options {
     /// Adam's step size at the beginning; it falls linearly to nothing.
     #[arg(skip = Options::default().learning_rate)]
     pub learning_rate: f64,
-    /// Whether the first layer is trained on the features' principal components, weak ones made
-    /// larger; the network is then folded back to features.
-    #[arg(skip = Options::default().whitened)]
-    pub whitened: bool,
     /// Weights errors by their effect on the direction. `None` for no weights; outputs of angles
     /// are never weighted.
     #[arg(skip = Options::default().direction_weight)]
     pub direction_weight: Option<DirectionWeight>,
-    /// Each step takes this times the step size off every weight (AdamW), biases excepted. Weights
-    /// that no data determine vanish, such as those of components that never vary, which would make
-    /// the chip's rounding of inputs larger.
-    #[arg(skip)]
-    pub weight_decay: f64,
-    /// Before training with rounding, each unit whose activation would have seven bits is split
-    /// into this many, one for each part of its reach ([`Network::split`]): the layer is as many
-    /// times wider on the chip, and its steps as many times finer. For int8.
-    #[arg(skip = Options::default().unit_parts)]
-    pub unit_parts: usize,
     /// Decides first weights and shuffling.
     #[arg(skip = Options::default().seed)]
     pub seed: u64,
@@ -88,13 +74,10 @@ impl Default for Options {
             rounded_epochs: 450,
             batch: 256,
             learning_rate: 5e-3,
-            whitened: true,
             direction_weight: Some(DirectionWeight {
                 mean: 40.0,
                 floor_n: 0.15,
             }),
-            weight_decay: 0.0,
-            unit_parts: 1,
             seed: 1,
             start: None,
         }
@@ -138,16 +121,10 @@ impl Options {
             "the learning rate must be above zero"
         );
         self.start.as_ref().map_or(Ok(()), Network::validate)?;
-        self.check_weighing()?;
-        self.check_parts()
+        self.check_weighing()
     }
 
     fn check_weighing(&self) -> Result<()> {
-        let usable = |part: f64| part.is_finite() && part >= 0.0;
-        ensure!(
-            usable(self.weight_decay),
-            "the weight decay must be zero or above"
-        );
         let Some(weight) = self.direction_weight else {
             return Ok(());
         };
@@ -156,47 +133,6 @@ impl Options {
                 .iter()
                 .all(|part| part.is_finite() && *part > 0.0),
             "the weight of directions, and its floor, must be above zero"
-        );
-        Ok(())
-    }
-
-    fn check_parts(&self) -> Result<()> {
-        let start = self.start.as_ref();
-        ensure!(
-            self.epochs == 0 || !start.is_some_and(|it| it.saturates),
-            "the network to go on from has units in parts: it can go on with rounding only, \
-             without passes in floats"
-        );
-        if self.unit_parts == 1 {
-            return Ok(());
-        }
-        ensure!(self.unit_parts > 1, "a unit has at least one part");
-        ensure!(
-            self.arithmetic != Arithmetic::Int16 && self.rounded_epochs > 0,
-            "units are split for int8, and before passes with rounding: ask for these, or leave \
-             the units whole"
-        );
-        let hidden = start.map_or_else(
-            || self.hidden.clone(),
-            |it| {
-                it.layers
-                    .iter()
-                    .map(Layer::outputs)
-                    .take(it.activation_max.len())
-                    .collect()
-            },
-        );
-        let (_, coarse) = hidden.split_last().unwrap_or((&0, &[]));
-        ensure!(
-            !coarse.is_empty(),
-            "units are split between two hidden layers: this network has fewer, and no activation \
-             of seven bits"
-        );
-        let widest = coarse.iter().max().unwrap_or(&0) * self.unit_parts;
-        ensure!(
-            widest <= WIDEST,
-            "units in {} parts make a layer {widest} wide: the most is {WIDEST}",
-            self.unit_parts
         );
         Ok(())
     }

@@ -35,8 +35,6 @@ pub(super) struct State {
     adam: Adam,
     random: ChaCha8Rng,
     batch: usize,
-    decay: f64,
-    parts: usize,
     order: Vec<usize>,
     training: Rows,
     held_out: Rows,
@@ -131,10 +129,7 @@ impl State {
             arithmetic: options.arithmetic,
             ..network
         };
-        let whitening = match options.whitened {
-            true => Whitening::of(&standardized(&training.features, &network.input)),
-            false => Whitening::none(),
-        };
+        let whitening = Whitening::of(&standardized(&training.features, &network.input));
         if options.start.is_none() {
             whitening.fold(&mut mlp);
         }
@@ -144,9 +139,7 @@ impl State {
             Rows::new(samples, &network, &whitening, across)
         };
         Ok(Self {
-            adam: Adam::new(&mlp, options.weight_decay),
-            decay: options.weight_decay,
-            parts: options.unit_parts,
+            adam: Adam::new(&mlp),
             mlp,
             random,
             batch: options.batch,
@@ -170,18 +163,15 @@ impl State {
             if phase.epochs > 0 && self.network.arithmetic != Arithmetic::Int16 {
                 self.network.equalize(&training.features);
             }
-            if !self.network.saturates {
-                self.network.activation_max = self.network.activation_maxima(&training.features);
-            }
+            self.network.activation_max = self.network.activation_maxima(&training.features);
             if phase.epochs > 0 {
-                self.network.split(self.parts);
                 self.mlp = Mlp::of_layers(&self.network.layers);
             }
         }
         if phase.epochs > 0 {
             self.whitening.unfold(&mut self.mlp);
         }
-        self.adam = Adam::new(&self.mlp, self.decay);
+        self.adam = Adam::new(&self.mlp);
         Ok(())
     }
 
@@ -297,7 +287,6 @@ fn blank(training: &Samples, options: &Options) -> Result<Network> {
         input,
         output,
         activation_max: Vec::new(),
-        saturates: false,
         layers: Vec::new(),
     })
 }

@@ -75,7 +75,6 @@ fn same_integers(meaning: Meaning, arithmetic: Arithmetic) {
         input,
         output,
         activation_max: Vec::new(),
-        saturates: false,
         layers: mlp.to_layers(),
     };
     // Slightly below the largest, so that some saturate.
@@ -143,109 +142,6 @@ fn rounding_costs_little_after_training_with_it() {
     train(&training, &held_out, &options, |p| losses.push(p)).unwrap();
     let [float, rounded] = [losses[59].held_out, losses[89].held_out];
     assert!(float < 0.1 && rounded < 1.5 * float, "{float} {rounded}");
-}
-
-/// Two hidden layers trained with rounding, in one part and in four.
-#[test]
-#[ignore = "8 s: a second training"]
-fn parts_of_units_make_rounding_cost_less() {
-    let (training, held_out) = (easy(1500, 1), easy(300, 2));
-    let float = Options {
-        hidden: vec![16, 16],
-        batch: 64,
-        epochs: 60,
-        rounded_epochs: 0,
-        ..plain()
-    };
-    let start = train(&training, &held_out, &float, |_| ()).unwrap();
-    let rounded = |unit_parts| {
-        let options = Options {
-            epochs: 0,
-            rounded_epochs: 1,
-            // A negligible step: shows the cost of rounding alone.
-            learning_rate: 1e-6,
-            unit_parts,
-            start: Some(start.clone()),
-            ..float.clone()
-        };
-        train(&training, &held_out, &options, |_| ()).unwrap()
-    };
-    let [one, four] = [1, 4].map(rounded);
-    let widths = |network: &Network| -> Vec<usize> {
-        let layers = network.layers.iter();
-        layers.map(|layer| layer.outputs()).collect()
-    };
-    assert_eq!(widths(&one), [16, 16, OUTPUTS]);
-    assert_eq!(widths(&four), [64, 16, OUTPUTS]);
-    let [off_one, off_four] = [&one, &four].map(|network| apart(network, &start, &held_out));
-    // The rounding of weights remains.
-    assert!(off_four < 0.9 * off_one, "{off_one} {off_four}");
-
-    // Such a network saturates in floats as well, so that it can be measured and trained further
-    // with rounding.
-    let again = Options {
-        epochs: 0,
-        rounded_epochs: 2,
-        start: Some(four.clone()),
-        ..float.clone()
-    };
-    let again = train(&training, &held_out, &again, |_| ()).unwrap();
-    assert!(again.saturates && widths(&again) == widths(&four));
-    let in_floats = Options {
-        start: Some(four),
-        ..float
-    };
-    let error = train(&training, &held_out, &in_floats, |_| ()).unwrap_err();
-    assert!(error.to_string().contains("rounding only"), "{error}");
-}
-
-/// Root mean square difference between a network on the chip and one in floats, in the latter's
-/// standard deviations.
-fn apart(chip: &Network, float: &Network, samples: &Samples) -> f64 {
-    let state = State::new(
-        samples,
-        &Samples::default(),
-        &Options {
-            start: Some(chip.clone()),
-            ..plain()
-        },
-    );
-    let seen =
-        rounded::forward(chip, state.unwrap().chip_inputs(), samples.features.len()).unwrap();
-    let rows = samples.features.len();
-    let square = |(row, features)| -> f64 {
-        let expected = float.output.forward(&float.predict(features));
-        let off =
-            |(o, y): (usize, f64)| (f64::from(seen.trace.outputs[o * rows + row]) - y).powi(2);
-        expected.into_iter().enumerate().map(off).sum()
-    };
-    let sum: f64 = samples.features.iter().enumerate().map(square).sum();
-    (sum / (rows * OUTPUTS) as f64).sqrt()
-}
-
-/// The weights of a component that never varies decay.
-#[test]
-fn what_no_data_ask_for_decays() {
-    let mut training = easy(500, 1);
-    for row in &mut training.features {
-        row[10] = 100.0;
-    }
-    let largest = |weight_decay| {
-        let options = Options {
-            hidden: vec![16],
-            epochs: 40,
-            rounded_epochs: 0,
-            batch: 50,
-            weight_decay,
-            whitened: false,
-            ..plain()
-        };
-        let network = train(&training, &Samples::default(), &options, |_| ()).unwrap();
-        let weights = network.layers[0].weights.iter();
-        weights.map(|row| row[10].abs()).fold(0.0, f32::max)
-    };
-    let [kept, decayed] = [0.0, 5.0].map(largest);
-    assert!(kept > 0.1 && decayed < 0.02 * kept, "{kept} {decayed}");
 }
 
 #[test]

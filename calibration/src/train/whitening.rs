@@ -9,15 +9,12 @@
 //! be learnt late.
 
 use super::mlp::Mlp;
+use crate::forward::eigenvectors;
 use crate::network::INPUTS;
 
 /// Part of the whole variance that is added to each component's variance, so that noise is not
 /// amplified.
 const FLOOR: f64 = 1e-4;
-/// Sweeps of Jacobi's rotations; six reach the last bit.
-const SWEEPS: usize = 12;
-
-type Matrix = [[f64; INPUTS]; INPUTS];
 
 /// Maps standardized features to components of variance 1 or more: row k holds the weights of
 /// component k.
@@ -29,32 +26,28 @@ pub(super) struct Whitening {
 }
 
 impl Whitening {
-    /// The identity: components are the features.
-    pub fn none() -> Self {
-        let one = identity().map(|row| row.map(|part| part as f32));
-        Self {
-            rows: one,
-            back: one,
-        }
-    }
-
     /// The whitening of these standardized features.
     pub fn of(features: &[[f32; INPUTS]]) -> Self {
-        let mut covariance = [[0.0; INPUTS]; INPUTS];
+        let mut covariance = vec![vec![0.0; INPUTS]; INPUTS];
         for row in features {
             for (i, j) in pairs() {
                 covariance[i][j] += f64::from(row[i]) * f64::from(row[j]) / features.len() as f64;
             }
         }
-        let (variances, directions) = principal(covariance);
-        let whole: f64 = variances.iter().sum();
+        let all = eigenvectors(covariance);
+        let whole: f64 = all.iter().map(|(variance, _)| variance).sum();
         if whole <= 0.0 {
             // Features that never vary have no components.
-            return Self::none();
+            let one = |i| std::array::from_fn(|j| f32::from(u8::from(i == j)));
+            let same = std::array::from_fn(one);
+            return Self {
+                rows: same,
+                back: same,
+            };
         }
-        let size = |k: usize| (variances[k].clamp(0.0, 1.0) + FLOOR * whole).sqrt();
-        let rows = |k: usize| directions[k].map(|part| (part / size(k)) as f32);
-        let back = |k: usize| directions[k].map(|part| (part * size(k)) as f32);
+        let size = |k: usize| (all[k].0.clamp(0.0, 1.0) + FLOOR * whole).sqrt();
+        let rows = |k: usize| std::array::from_fn(|i| (all[k].1[i] / size(k)) as f32);
+        let back = |k: usize| std::array::from_fn(|i| (all[k].1[i] * size(k)) as f32);
         Self {
             rows: std::array::from_fn(rows),
             back: std::array::from_fn(back),
@@ -96,39 +89,6 @@ fn dot(a: &[f32], b: &[f32]) -> f32 {
 
 fn pairs() -> impl Iterator<Item = (usize, usize)> {
     (0..INPUTS).flat_map(|i| (0..INPUTS).map(move |j| (i, j)))
-}
-
-/// Eigenvalues and eigenvectors (as rows) of a symmetric matrix, by Jacobi's rotations.
-fn principal(mut matrix: Matrix) -> ([f64; INPUTS], Matrix) {
-    let mut directions = identity();
-    for _ in 0..SWEEPS {
-        for (i, j) in pairs().filter(|(i, j)| i < j) {
-            if matrix[i][j] == 0.0 {
-                continue;
-            }
-            let theta = (matrix[j][j] - matrix[i][i]) / (2.0 * matrix[i][j]);
-            let tan = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-            let cos = 1.0 / (tan * tan + 1.0).sqrt();
-            let sin = tan * cos;
-            for row in &mut matrix {
-                (row[i], row[j]) = (cos * row[i] - sin * row[j], sin * row[i] + cos * row[j]);
-            }
-            rotate(&mut matrix, [i, j], [cos, sin]);
-            rotate(&mut directions, [i, j], [cos, sin]);
-        }
-    }
-    (std::array::from_fn(|k| matrix[k][k]), directions)
-}
-
-fn identity() -> Matrix {
-    std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))))
-}
-
-/// Rotates two rows of a matrix.
-fn rotate(matrix: &mut Matrix, [i, j]: [usize; 2], [cos, sin]: [f64; 2]) {
-    let (a, b) = (matrix[i], matrix[j]);
-    matrix[i] = std::array::from_fn(|k| cos * a[k] - sin * b[k]);
-    matrix[j] = std::array::from_fn(|k| sin * a[k] + cos * b[k]);
 }
 
 #[cfg(test)]
@@ -178,23 +138,22 @@ mod tests {
     #[test]
     fn folding_does_not_change_what_the_network_says() {
         let features = features(50);
-        for whitening in [Whitening::of(&features), Whitening::none()] {
-            let mut random = ChaCha8Rng::seed_from_u64(6);
-            let inner = Mlp::random(&[INPUTS, 7, 3], &mut random);
-            let mut outer = inner.clone();
-            whitening.fold(&mut outer);
-            for row in &features {
-                let by_components = inner.forward(whitening.components(row).to_vec(), 1).outputs;
-                let by_features = outer.forward(row.to_vec(), 1).outputs;
-                for (a, b) in by_components.iter().zip(by_features) {
-                    assert!((a - b).abs() < 1e-3, "{a} {b}");
-                }
-            }
-            whitening.unfold(&mut outer);
-            let pairs = inner.layers[0].weights.iter().zip(&outer.layers[0].weights);
-            for (a, b) in pairs {
+        let whitening = Whitening::of(&features);
+        let mut random = ChaCha8Rng::seed_from_u64(6);
+        let inner = Mlp::random(&[INPUTS, 7, 3], &mut random);
+        let mut outer = inner.clone();
+        whitening.fold(&mut outer);
+        for row in &features {
+            let by_components = inner.forward(whitening.components(row).to_vec(), 1).outputs;
+            let by_features = outer.forward(row.to_vec(), 1).outputs;
+            for (a, b) in by_components.iter().zip(by_features) {
                 assert!((a - b).abs() < 1e-3, "{a} {b}");
             }
+        }
+        whitening.unfold(&mut outer);
+        let pairs = inner.layers[0].weights.iter().zip(&outer.layers[0].weights);
+        for (a, b) in pairs {
+            assert!((a - b).abs() < 1e-3, "{a} {b}");
         }
     }
 

@@ -2,33 +2,20 @@
 
 use anyhow::{Result, ensure};
 
-pub(crate) use crate::forward::dot;
-
-/// A symmetric matrix by rows.
-pub type Matrix = Vec<Vec<f64>>;
+use crate::forward;
+pub(crate) use crate::forward::{Matrix, dot};
 
 /// The factor L of a symmetric matrix L·Lᵀ; 0 above its diagonal.
 ///
 /// # Errors
 /// When the matrix is not positive definite.
-pub fn cholesky(mut matrix: Matrix) -> Result<Matrix> {
-    let count = matrix.len();
-    for i in 0..count {
-        for j in 0..=i {
-            let left = matrix[i][j] - dot(&matrix[i][..j], &matrix[j][..j]);
-            matrix[i][j] = if i == j {
-                left.sqrt()
-            } else {
-                left / matrix[j][j]
-            };
-        }
-        ensure!(
-            matrix[i][i] > 0.0,
-            "the loads do not tell the unit's numbers"
-        );
-        matrix[i][i + 1..].fill(0.0);
-    }
-    Ok(matrix)
+pub fn cholesky(matrix: Matrix) -> Result<Matrix> {
+    let factor = forward::cholesky(matrix);
+    ensure!(
+        (factor.iter().enumerate()).all(|(i, row)| row[i] > 0.0),
+        "the loads do not tell the unit's numbers"
+    );
+    Ok(factor)
 }
 
 /// The inverse of a symmetric matrix.

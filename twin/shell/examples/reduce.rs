@@ -6,10 +6,10 @@ use std::error::Error;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
+use clap::Parser;
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::{Solved, octant, solve_place};
 use hivtac_shell::{
@@ -19,11 +19,18 @@ use hivtac_twin::film::reduced::{
     Kind, LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit,
 };
 
-const USAGE: &str = "reduce FOLDER [--weight|--check]
-Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are \
-incomplete.
---weight: makes FOLDER/weight.bin, what the film's own weight does, instead
---check: hold the film that is built in against the full solution instead";
+/// Makes FOLDER/film.bin from solutions in target/film-RADIUS.bin, which it adds to where they are
+/// incomplete.
+#[derive(Parser)]
+struct Request {
+    folder: PathBuf,
+    /// Make FOLDER/weight.bin, what the film's own weight does, instead
+    #[arg(long, conflicts_with = "check")]
+    weight: bool,
+    /// Hold the film that is built in against the full solution instead
+    #[arg(long)]
+    check: bool,
+}
 
 /// Number of loads of a check.
 const LOADS: usize = 100;
@@ -41,23 +48,14 @@ const WEIGHT_N: [[f64; 2]; 2] = [[0.002, 0.02], [0.02, 0.2]];
 const WEIGHT_RATIO: f64 = 0.4;
 const DOWN: [[f64; 3]; 3] = [[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [0.8, 0.0, 0.6]];
 
-fn main() -> ExitCode {
+fn main() -> Result<(), Box<dyn Error>> {
     // The reader of the output may close it early.
     sigpipe::reset();
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    let done = match words.as_slice() {
-        [folder] => reduce(Path::new(folder)),
-        [folder, "--weight"] => weigh(Path::new(folder)),
-        [_, "--check"] => look(),
-        _ => Err(USAGE.into()),
-    };
-    match done {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(why) => {
-            eprintln!("{why}");
-            ExitCode::FAILURE
-        }
+    let request = Request::parse();
+    match (request.weight, request.check) {
+        (true, _) => weigh(&request.folder),
+        (_, true) => look(),
+        _ => reduce(&request.folder),
     }
 }
 

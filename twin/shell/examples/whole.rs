@@ -6,10 +6,10 @@ use std::error::Error;
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 use std::sync::Mutex;
 use std::time::Instant;
 
+use clap::Parser;
 use hivtac_shell::ShellError;
 use hivtac_shell::parallel::in_parallel;
 use hivtac_shell::sweep::octant;
@@ -17,14 +17,8 @@ use hivtac_shell::whole::{self, Errors, Sampled, Samples, WholeCheck, WholeDomai
 use hivtac_twin::film::reduced::{LARGEST_RADIUS_MM, NOMINAL_RADIUS_MM, SMALLEST_RADIUS_MM, Unit};
 use hivtac_twin::film::whole::{Difference, WholeFilm};
 
-const USAGE: &str = "whole FOLDER [--check [--loads N]] [--threads N] [--functions N]
-Makes FOLDER/whole.bin and FOLDER/whole-differences.bin from solutions in \
-target/whole-RADIUS.bin, which it adds to where they are incomplete.
---check: hold FOLDER/whole.bin against the full solution instead
---functions: how many functions of the load it has at most, 1 to 255";
-
 /// Number of functions of the load.
-const FUNCTIONS: usize = 16;
+const FUNCTIONS: u8 = 16;
 /// The same for the motion by a film's own differences and another tip.
 const OF_DIFFERENCES: usize = 8;
 /// Distances of the tip from the middle within which the tables are checked, mm.
@@ -34,59 +28,37 @@ const TIPS_MM: [[f64; 2]; 2] = [[SMALLEST_RADIUS_MM, 1.0], [1.0, LARGEST_RADIUS_
 /// Number of loads of a check.
 const LOADS: usize = 40;
 
-fn main() -> ExitCode {
-    // The reader of the output may close it early.
-    sigpipe::reset();
-    match Request::parse(std::env::args().skip(1)).and_then(|request| request.run()) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(why) => {
-            eprintln!("{why}");
-            ExitCode::FAILURE
-        }
-    }
-}
-
-/// The arguments of the command line.
+/// Makes FOLDER/whole.bin and FOLDER/whole-differences.bin from solutions in
+/// target/whole-RADIUS.bin, which it adds to where they are incomplete.
+#[derive(Parser)]
 struct Request {
     folder: PathBuf,
+    /// Hold FOLDER/whole.bin against the full solution instead
+    #[arg(long)]
     check: bool,
+    #[arg(long, default_value_t = LOADS)]
     loads: usize,
+    #[arg(long, default_value_t = 1)]
     threads: usize,
-    functions: usize,
+    /// How many functions of the load it has at most
+    #[arg(long, default_value_t = FUNCTIONS, value_parser = clap::value_parser!(u8).range(1..))]
+    functions: u8,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    // The reader of the output may close it early.
+    sigpipe::reset();
+    Request::parse().run()
 }
 
 impl Request {
-    fn parse(mut words: impl Iterator<Item = String>) -> Result<Request, Box<dyn Error>> {
-        let mut request = Request {
-            folder: words.next().ok_or(USAGE)?.into(),
-            check: false,
-            loads: LOADS,
-            threads: 1,
-            functions: FUNCTIONS,
-        };
-        while let Some(word) = words.next() {
-            let mut number = || words.next().and_then(|word| word.parse().ok()).ok_or(USAGE);
-            match word.as_str() {
-                "--check" => request.check = true,
-                "--loads" => request.loads = number()?,
-                "--threads" => request.threads = number()?,
-                "--functions" => request.functions = number()?,
-                _ => return Err(USAGE.into()),
-            }
-        }
-        match request.functions {
-            1..=255 => Ok(request),
-            _ => Err(USAGE.into()),
-        }
-    }
-
     fn run(&self) -> Result<(), Box<dyn Error>> {
         let path = self.folder.join("whole.bin");
         if self.check {
             return self.look(&path);
         }
         let nominal = sampled(NOMINAL_RADIUS_MM, WholeFilm::NODES.places_mm, self.threads)?;
-        let bytes = whole::whole(&nominal, self.functions)?;
+        let bytes = whole::whole(&nominal, self.functions.into())?;
         write(&path, &bytes)?;
         let places_mm = Difference::Radius(0).nodes().places_mm;
         let samples = Samples {

@@ -1,10 +1,8 @@
-//! Detectors of markers in rendered frames: the sensing, or a method with which it is compared.
+//! Finds markers in rendered frames by the sensing.
 
 use std::sync::Mutex;
 
 use anyhow::{Result, anyhow};
-use hivtac_sensor::force::forward::Drift;
-use hivtac_sensor::force::model::Model;
 use hivtac_sensor::markers::settings::Settings;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_terms::geometry::Geometry;
@@ -15,61 +13,31 @@ use hivtac_twin::Frame;
 use super::{Observation, Recipe};
 use crate::data::rest::features_to_q16;
 
-/// The markers found in a frame, or the reason for a refusal.
-pub type Detection = Result<Observation, String>;
-
-/// Finds markers in frames.
-pub trait MarkerDetector: Send {
-    /// Finds the markers of a frame; an inner `Err` when it has none.
-    ///
-    /// # Errors
-    /// When the detector itself fails.
-    fn detect(&mut self, frame: &Frame) -> Result<Detection>;
+/// The sensing without a model, which refuses only what cannot be markers. One for each running
+/// thread, opened when needed.
+pub(super) struct Detectors<'r> {
+    recipe: &'r Recipe,
+    idle: Mutex<Vec<Box<Sensor<'static>>>>,
 }
 
-/// Detectors for the same frames; each produces its own data set.
-pub type Detectors<'a> = Vec<Box<dyn MarkerDetector + 'a>>;
+impl<'r> Detectors<'r> {
+    pub fn new(recipe: &'r Recipe) -> Self {
+        Self {
+            recipe,
+            idle: Mutex::default(),
+        }
+    }
 
-/// The sensing as a detector.
-pub struct Sensing<'m>(Box<Sensor<'m>>);
-
-impl Sensing<'static> {
-    /// Finds markers and features without a model: refuses only images that cannot be markers.
+    /// Finds the markers of a frame; an inner `Err` with the reason when it has none.
     ///
     /// # Errors
     /// When the recipe's frames do not exist.
-    pub fn unmodelled(recipe: &Recipe) -> Result<Self> {
-        let geometry = Geometry::preset(recipe.preset, recipe.width, recipe.height);
-        let mut sensor = Box::new(Sensor::new());
-        let settings = Settings {
-            threshold: Threshold::red(recipe.format),
-            centroid: recipe.centroid,
-            ..Settings::usual(geometry, ByteOrder::Native)
-        };
-        let configured = sensor.configure(settings, None);
-        configured.map_err(|error| anyhow!("{error}"))?;
-        Ok(Self(sensor))
-    }
-}
-
-impl<'m> Sensing<'m> {
-    /// With a model, tared at the model's own rest position: refuses the same frames as the chip.
-    ///
-    /// # Errors
-    /// When the model's frames cannot be read.
-    pub fn tared(model: &Model<'m>) -> Result<Self> {
-        let mut sensor = Box::new(Sensor::new());
-        let settings = model.conditions.settings(ByteOrder::Native);
-        let configured = sensor.configure(settings, Some(*model));
-        configured.map_err(|error| anyhow!("{error}"))?;
-        sensor.set_tare(Some(model.rest), Drift::NONE);
-        Ok(Self(sensor))
-    }
-}
-
-impl MarkerDetector for Sensing<'_> {
-    fn detect(&mut self, frame: &Frame) -> Result<Detection> {
-        let measurement = measure(&mut self.0, frame);
+    pub fn detect(&self, frame: &Frame) -> Result<Result<Observation, String>> {
+        let idle = || self.idle.lock().map_err(|error| anyhow!("{error}"));
+        let ready = idle()?.pop();
+        let mut sensor = ready.map_or_else(|| self.open(), Ok)?;
+        let measurement = measure(&mut sensor, frame);
+        idle()?.push(sensor);
         let refused = reasons(measurement.status);
         Ok(match (measurement.markers, measurement.features) {
             (Some(markers), Some(features)) if refused.is_empty() => Ok(Observation {
@@ -78,6 +46,24 @@ impl MarkerDetector for Sensing<'_> {
             }),
             _ => Err(refused),
         })
+    }
+
+    fn open(&self) -> Result<Box<Sensor<'static>>> {
+        let Recipe {
+            preset,
+            width,
+            height,
+            ..
+        } = *self.recipe;
+        let mut sensor = Box::new(Sensor::new());
+        let settings = Settings {
+            threshold: Threshold::red(self.recipe.format),
+            centroid: self.recipe.centroid,
+            ..Settings::usual(Geometry::preset(preset, width, height), ByteOrder::Native)
+        };
+        let configured = sensor.configure(settings, None);
+        configured.map_err(|error| anyhow!("{error}"))?;
+        Ok(sensor)
     }
 }
 
@@ -96,37 +82,6 @@ pub fn reasons(status: Status) -> String {
         Status::NO_FORCE.contains(bit) && bit != Status::MODEL_MISSING
     };
     status.names().filter(forbids).collect::<Vec<_>>().join(" ")
-}
-
-/// Opens detectors.
-type Open<'a> = dyn Fn() -> Result<Detectors<'a>> + Sync + 'a;
-
-/// One set of detectors per running thread, opened when needed.
-pub(super) struct Pool<'a> {
-    open: Box<Open<'a>>,
-    idle: Mutex<Vec<Detectors<'a>>>,
-}
-
-impl<'a> Pool<'a> {
-    pub fn new(open: impl Fn() -> Result<Detectors<'a>> + Sync + 'a) -> Self {
-        Self {
-            open: Box::new(open),
-            idle: Mutex::default(),
-        }
-    }
-
-    /// Runs all detectors of a set on a frame.
-    pub fn detect(&self, frame: &Frame) -> Result<Vec<Detection>> {
-        let idle = || self.idle.lock().map_err(|error| anyhow!("{error}"));
-        let ready = idle()?.pop();
-        let mut detectors = ready.map_or_else(&self.open, Ok)?;
-        let detections = detectors
-            .iter_mut()
-            .map(|detector| detector.detect(frame))
-            .collect();
-        idle()?.push(detectors);
-        detections
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::ops::Range;
 use anyhow::Result;
 use hivtac_twin::Scene;
 
-use super::detector::{Pool, Sensing};
+use super::detector::Detectors;
 use super::{Dataset, Recipe, Row};
 
 /// Renders the frames of a recipe on all cores and measures each with the pipeline. Calls
@@ -15,23 +15,17 @@ use super::{Dataset, Recipe, Row};
 /// # Errors
 /// When the scene or the pipeline does not support the recipe.
 pub fn generate(recipe: &Recipe, progress: impl Fn() + Sync) -> Result<Dataset> {
-    let pool = sensing(recipe);
-    let rows = Renderer::new(recipe)?.rows(0..recipe.rows(), &pool, progress)?;
     Ok(Dataset {
-        rows: rows.into_iter().flatten().collect(),
+        rows: Renderer::new(recipe)?.rows(0..recipe.rows(), progress)?,
         about: recipe.about()?,
     })
-}
-
-/// The pipeline without a model.
-pub(super) fn sensing(recipe: &Recipe) -> Pool<'_> {
-    Pool::new(|| Ok(vec![Box::new(Sensing::unmodelled(recipe)?)]))
 }
 
 /// Renders single rows of a recipe.
 pub(super) struct Renderer<'a> {
     recipe: &'a Recipe,
     scenes: Vec<Scene>,
+    detectors: Detectors<'a>,
 }
 
 impl<'a> Renderer<'a> {
@@ -41,32 +35,27 @@ impl<'a> Renderer<'a> {
         Ok(Self {
             recipe,
             scenes: scenes.collect::<Result<_>>()?,
+            detectors: Detectors::new(recipe),
         })
     }
 
-    /// These rows in order, each as all detectors of the pool see it.
-    pub fn rows(
-        &self,
-        rows: Range<usize>,
-        pool: &Pool<'_>,
-        progress: impl Fn() + Sync,
-    ) -> Result<Vec<Vec<Row>>> {
+    /// These rows in order.
+    pub fn rows(&self, rows: Range<usize>, progress: impl Fn() + Sync) -> Result<Vec<Row>> {
         parallel::try_map(rows.len(), |number| {
             let row = rows.start + number;
             let place = self.recipe.place(row);
             let scene = &self.scenes[place.session];
             let frame = scene.render_load(&self.recipe.load(row)?, row as u64)?;
-            let seen = pool.detect(&frame)?;
+            let seen = self.detectors.detect(&frame)?;
             progress();
             let known = self.recipe.range.knows_places();
-            let row = |seen| Row {
+            Ok(Row {
                 place,
                 force_n: frame.truth.force.vector_n(),
                 tip_mm: frame.truth.touches_mm.filter(|_| known),
                 clock_n: None,
                 seen,
-            };
-            Ok(seen.into_iter().map(row).collect())
+            })
         })
     }
 }

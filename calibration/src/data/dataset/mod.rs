@@ -20,11 +20,11 @@ use crate::data::conditions::Conditions;
 use crate::data::range::Range;
 use crate::data::rest::{AFTER_COORDINATES, FeatureList, Rest, features_px, places_px};
 
-pub use detector::{Detection, Detectors, MarkerDetector, Sensing, measure, reasons};
+pub use detector::{measure, reasons};
 pub use file::{LARGEST_AREA, LARGEST_N};
 pub use generate::generate;
 pub use recipe::{Loads, Recipe};
-pub use resume::{generate_file, generate_files};
+pub use resume::generate_file;
 
 /// Rows, and their meaning.
 #[derive(Clone, Debug, PartialEq)]

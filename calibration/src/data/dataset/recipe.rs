@@ -22,10 +22,6 @@ pub enum Loads {
     Random(usize),
     /// This many for each of the paper's 357 poses, with the force uniform within the range.
     PaperPoses(usize),
-    /// This many for each of the 286 of them on which comparisons train.
-    TrainingPoses(usize),
-    /// This many for each of the 71 that comparisons hold out.
-    HeldOutPoses(usize),
     /// Measured with a unit, in this many poses; cannot be rendered.
     Measured(usize),
 }
@@ -114,49 +110,13 @@ impl Default for Recipe {
     }
 }
 
-impl Loads {
-    /// Its poses among the paper's, and the number of loads of each; `None` without such poses.
-    fn poses(self) -> Option<(Poses, usize)> {
-        let [training, held_out] = PaperPoses::parts();
-        match self {
-            Loads::PaperPoses(each) => Some((Poses::All, each)),
-            Loads::TrainingPoses(each) => Some((Poses::Some(training), each)),
-            Loads::HeldOutPoses(each) => Some((Poses::Some(held_out), each)),
-            Loads::Random(_) | Loads::Measured(_) => None,
-        }
-    }
-}
-
-/// A selection of the paper's poses, by number.
-enum Poses {
-    All,
-    Some(&'static [usize]),
-}
-
-impl Poses {
-    fn count(&self) -> usize {
-        match self {
-            Poses::All => PaperPoses::COUNT,
-            Poses::Some(poses) => poses.len(),
-        }
-    }
-
-    fn at(&self, index: usize) -> usize {
-        match self {
-            Poses::All => index,
-            Poses::Some(poses) => poses[index],
-        }
-    }
-}
-
 impl Recipe {
     /// Frames of each session.
     pub fn session_rows(&self) -> usize {
         let loads = match self.loads {
             Loads::Random(count) => count,
-            loads => loads
-                .poses()
-                .map_or(0, |(poses, each)| each.saturating_mul(poses.count())),
+            Loads::PaperPoses(each) => each.saturating_mul(PaperPoses::COUNT),
+            Loads::Measured(_) => 0,
         };
         loads.saturating_add(self.rest)
     }
@@ -214,12 +174,11 @@ impl Recipe {
     /// A row's position: its session and, among the paper's poses, its pose.
     pub fn place(&self, row: usize) -> Place {
         let (session, within) = (row / self.session_rows(), row % self.session_rows());
-        let loaded = within.checked_sub(self.rest);
-        let pose = self.loads.poses().zip(loaded);
-        Place {
-            session,
-            pose: pose.map(|((poses, each), row)| poses.at(row / each)),
-        }
+        let pose = match self.loads {
+            Loads::PaperPoses(each) => within.checked_sub(self.rest).map(|row| row / each),
+            Loads::Random(_) | Loads::Measured(_) => None,
+        };
+        Place { session, pose }
     }
 
     /// The load of a row.

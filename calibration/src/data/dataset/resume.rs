@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 
-use super::detector::{Detectors, Pool};
 use super::file::{lines, opening};
-use super::generate::{Renderer, sensing};
+use super::generate::Renderer;
 use super::{About, Dataset, Recipe};
 
 /// Rows that are rendered before each write.
@@ -44,58 +43,19 @@ pub fn generate_file(
     progress: impl Fn(u64) + Sync,
 ) -> Result<Dataset> {
     let target = Target::of(path.into(), recipe.about()?)?;
-    write(recipe, &[target], &sensing(recipe), progress)?;
-    Dataset::load(path)
-}
-
-/// Like [`generate_file`] with several detectors for the same frames. Each has its own file, and
-/// `files` holds the header of each.
-///
-/// # Errors
-/// As [`generate_file`]; and when detectors cannot be opened, or their number differs from the
-/// files'.
-pub fn generate_files<'a>(
-    recipe: &Recipe,
-    files: Vec<(PathBuf, About)>,
-    open: impl Fn() -> Result<Detectors<'a>> + Sync + 'a,
-    progress: impl Fn(u64) + Sync,
-) -> Result<Vec<Dataset>> {
-    let files = files.into_iter();
-    let targets = files.map(|(path, about)| Target::of(path, about));
-    let targets: Vec<Target> = targets.collect::<Result<_>>()?;
-    write(recipe, &targets, &Pool::new(open), progress)?;
-    targets.iter().map(|t| Dataset::load(&t.path)).collect()
-}
-
-fn write(
-    recipe: &Recipe,
-    targets: &[Target],
-    pool: &Pool<'_>,
-    progress: impl Fn(u64) + Sync,
-) -> Result<()> {
     let renderer = Renderer::new(recipe)?;
-    let mut done = recipe.rows();
-    for target in targets {
-        let rows = target.begin(recipe.rows());
-        done = rows.with_context(|| target.stuck())?.min(done);
-    }
-    for target in targets {
-        target.cut(done).with_context(|| target.stuck())?;
-    }
+    let done = target.begin(recipe.rows());
+    let done = done.with_context(|| target.stuck())?;
+    target.cut(done).with_context(|| target.stuck())?;
     progress(done as u64);
     for first in (done..recipe.rows()).step_by(BLOCK) {
         let range = first..(first + BLOCK).min(recipe.rows());
-        let rows = renderer.rows(range, pool, || progress(1))?;
-        for (i, target) in targets.iter().enumerate() {
-            let seen = rows.iter().map(|row| row.get(i).cloned());
-            let rows: Option<Vec<_>> = seen.collect();
-            let rows = rows.context("there are fewer detectors than files")?;
-            let mut file = OpenOptions::new().append(true).open(&target.path)?;
-            file.write_all(&lines(&target.about, &rows)?)
-                .with_context(|| format!("cannot write {}", target.path.display()))?;
-        }
+        let rows = renderer.rows(range, || progress(1))?;
+        let mut file = OpenOptions::new().append(true).open(path)?;
+        file.write_all(&lines(&target.about, &rows)?)
+            .with_context(|| format!("cannot write {}", path.display()))?;
     }
-    Ok(())
+    Dataset::load(path)
 }
 
 impl Target {
@@ -147,8 +107,7 @@ fn ends(bytes: &[u8]) -> impl Iterator<Item = usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::detector::Sensing;
-    use super::super::{Loads, generate};
+    use super::super::Loads;
     use super::*;
     use crate::data::range::Range;
 
@@ -177,32 +136,6 @@ mod tests {
                 "cut after {length} bytes"
             );
         }
-    }
-
-    /// Two detectors on the same frames: files that were cut at different rows end up the same.
-    #[test]
-    fn files_of_several_eyes_go_on_together() {
-        let directory = tempfile::tempdir().unwrap();
-        let recipe = recipe();
-        let path = |name: &str| directory.path().join(name);
-        let make = || {
-            let about = recipe.about().unwrap();
-            let mut other = about.clone();
-            other.scene.push_str(", seen otherwise");
-            let files = vec![(path("a.csv"), about), (path("b.csv"), other)];
-            let open = || -> Result<Detectors<'_>> {
-                let detector = || Sensing::unmodelled(&recipe);
-                Ok(vec![Box::new(detector()?), Box::new(detector()?)])
-            };
-            generate_files(&recipe, files, open, |_| ()).unwrap()
-        };
-        let whole = make();
-        assert_eq!(whole[0].rows, generate(&recipe, || ()).unwrap().rows);
-        assert_eq!(whole[0].rows, whole[1].rows);
-        let bytes = fs::read(path("a.csv")).unwrap();
-        fs::write(path("a.csv"), &bytes[..bytes.len() / 2]).unwrap();
-        assert_eq!(make(), whole);
-        assert!(fs::read(path("a.csv")).unwrap() == bytes);
     }
 
     #[test]

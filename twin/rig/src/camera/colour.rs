@@ -4,7 +4,7 @@
 //! matrix of OmniVision's application note, levels in proportion to light, well exposed. Other
 //! settings change the pixels relative to these. Gains act before the matrix, which gives Cr and Cb
 //! from red, green and blue; luma follows from them by BT.601. Not simulated: the sensor's own
-//! filters and noise, automatic white balance, lens correction, edges, hue and special effects.
+//! filters and noise, automatic white balance, lens correction, edges, gamma and special effects.
 
 use super::registers::{self as reg, Registers};
 use crate::frame_source::{Coding, Picture};
@@ -22,13 +22,9 @@ const APPLICATION_NOTE: [f64; 6] = [176.0, -157.0, -19.0, -22.0, -123.0, 145.0];
 
 /// DSP_CTRL1 bits.
 const SPECIAL_EFFECTS: u8 = 0x20;
-const COLOUR_MATRIX: u8 = 0x10;
 const GAMMA: u8 = 0x04;
 /// MTX_CTRL bit 7: coefficients count twice.
 const DOUBLED: u8 = 0x80;
-/// SDE bits.
-const CONTRAST_AND_BRIGHTNESS: u8 = 0x04;
-const SATURATION: u8 = 0x02;
 /// AWB_CTRL0 bit 7: the gains are applied. AWB_CTRL1 bit 1: 0x40 is a gain of one, instead of 0x80.
 const GAINS_APPLIED: u8 = 0x80;
 const UNITY_IS_0X40: u8 = 0x02;
@@ -38,10 +34,6 @@ const UNITY_IS_0X40: u8 = 0x02;
 pub struct Colour {
     /// Red, green, blue to red, green, blue.
     linear: Matrix,
-    /// Added to luma after that.
-    brightness: f64,
-    /// Output of each level, when the sensor's curve is on.
-    curve: Option<Vec<u8>>,
 }
 
 impl Colour {
@@ -56,36 +48,20 @@ impl Colour {
         for (row, gain) in raw.iter_mut().zip(gains) {
             *row = row.map(|term| term * gain * exposed);
         }
-        let seen = if control & COLOUR_MATRIX != 0 {
+        let seen = if control & reg::COLOUR_MATRIX != 0 {
             product(&from_raw(&coefficients(registers)), &raw)
         } else {
             product(&BT601, &raw)
         };
-        let (contrast, brightness) = contrast(registers, control);
-        let saturation = saturation(registers, control);
-        let mut scaled = seen;
-        for (row, factor) in scaled
-            .iter_mut()
-            .zip([contrast, saturation[0], saturation[1]])
-        {
-            *row = row.map(|term| term * factor);
-        }
         Self {
-            linear: product(&inverse(&BT601), &scaled),
-            brightness,
-            curve: (control & GAMMA != 0).then(|| curve(registers)),
+            linear: product(&inverse(&BT601), &seen),
         }
     }
 
     /// Returns the map of an OV5640 with `matrix`, whose rows give luma, Cb and Cr in any unit, for
     /// scenes that are meant for `reference`. `gains` are those of red, green and blue over the
-    /// ones that make white light white and well exposed; `gamma` is the exponent of a curve.
-    pub fn between(
-        reference: &[f64; 9],
-        matrix: &[f64; 9],
-        gains: [f64; 3],
-        gamma: Option<f64>,
-    ) -> Self {
+    /// ones that make white light white and well exposed.
+    pub fn between(reference: &[f64; 9], matrix: &[f64; 9], gains: [f64; 3]) -> Self {
         let rows =
             |all: &[f64; 9]| std::array::from_fn(|i| std::array::from_fn(|j| all[3 * i + j]));
         let reference: Matrix = rows(reference);
@@ -94,14 +70,8 @@ impl Colour {
             *row = row.map(|term| term * gain);
         }
         let seen = product(&rows(matrix), &raw);
-        let curved = |gamma: f64| {
-            let level = |level: u8| byte(255.0 * (f64::from(level) / 255.0).powf(gamma));
-            (0..=255).map(level).collect()
-        };
         Self {
             linear: product(&inverse(&BT601), &seen),
-            brightness: 0.0,
-            curve: gamma.map(curved),
         }
     }
 
@@ -115,7 +85,7 @@ impl Colour {
         };
         let off = self.linear.iter().enumerate().map(unit);
         // The coefficients are whole numbers; those of their inverse are not.
-        off.fold(0.0, f64::max) < 1e-6 && self.brightness == 0.0 && self.curve.is_none()
+        off.fold(0.0, f64::max) < 1e-6
     }
 
     /// Returns the picture that is sent.
@@ -160,12 +130,13 @@ impl Colour {
     }
 
     fn seen(&self, rgb: [f64; 3]) -> [f64; 3] {
-        let levels = times(&self.linear, rgb).map(|level| level + self.brightness);
-        match &self.curve {
-            Some(curve) => levels.map(|level| f64::from(curve[usize::from(byte(level))])),
-            None => levels.map(|level| level.clamp(0.0, 255.0)),
-        }
+        times(&self.linear, rgb).map(|level| level.clamp(0.0, 255.0))
     }
+}
+
+/// Whether the gamma curve or the special effects are on, which are not simulated.
+pub fn is_bent(registers: &Registers) -> bool {
+    registers.get(reg::DSP_CTRL1) & (GAMMA | SPECIAL_EFFECTS) != 0
 }
 
 /// Returns the gains of red, green and blue.
@@ -204,42 +175,6 @@ fn coefficients(registers: &Registers) -> [f64; 6] {
 fn from_raw(coefficients: &[f64; 6]) -> Matrix {
     let [r1, g1, b1, r2, g2, b2] = coefficients.map(|coefficient| coefficient / 256.0);
     [BT601[0], [r2, g2, b2], [r1, g1, b1]]
-}
-
-/// Returns the factor of luma, and the value added to it.
-fn contrast(registers: &Registers, control: u8) -> (f64, f64) {
-    let effects = registers.get(reg::SDE);
-    if control & SPECIAL_EFFECTS == 0 || effects & CONTRAST_AND_BRIGHTNESS == 0 {
-        return (1.0, 0.0);
-    }
-    let contrast = f64::from(registers.get(reg::CNST)) / 32.0;
-    (contrast, f64::from(registers.get(reg::BRIGHT)))
-}
-
-/// Returns the factors of Cb and Cr.
-fn saturation(registers: &Registers, control: u8) -> [f64; 2] {
-    let effects = registers.get(reg::SDE);
-    if control & SPECIAL_EFFECTS == 0 || effects & SATURATION == 0 {
-        return [1.0; 2];
-    }
-    [reg::USAT, reg::VSAT].map(|address| f64::from(registers.get(address)) / 64.0)
-}
-
-/// Returns the output of each level, by fifteen points in between.
-fn curve(registers: &Registers) -> Vec<u8> {
-    const INPUTS: [u16; 15] = [4, 8, 16, 32, 40, 48, 56, 64, 72, 80, 96, 112, 144, 176, 208];
-    let outputs = (reg::GAM1..).map(|address| u16::from(registers.get(address)));
-    let mut points = vec![(0, 0)];
-    points.extend(INPUTS.into_iter().zip(outputs));
-    points.push((255, 255));
-    let level = |level: u16| {
-        let above = points.partition_point(|(input, _)| *input <= level);
-        let above = above.min(points.len() - 1);
-        let ((x0, y0), (x1, y1)) = (points[above - 1], points[above]);
-        let share = f64::from(level - x0) / f64::from(x1 - x0);
-        byte(f64::from(y0) + share * (f64::from(y1) - f64::from(y0)))
-    };
-    (0..256).map(level).collect()
 }
 
 fn rgb(pixel: u16) -> [f64; 3] {
@@ -372,19 +307,5 @@ mod tests {
         let mut pair = [u16::from_le_bytes([120, 128]); 2];
         Colour::of(&application_note(), LIGHT, 0.5).apply_to_pair(&mut pair);
         assert_eq!(pair, [u16::from_le_bytes([60, 128]); 2]);
-    }
-
-    #[test]
-    fn a_curve_bends_what_is_between_black_and_white() {
-        let mut registers = application_note();
-        registers.write(reg::DSP_CTRL1, 0x9C);
-        for address in reg::GAM1..reg::GAM1 + 15 {
-            registers.write(address, 0xF0);
-        }
-        let [black, grey, white] = [0, GREY, 0xFFFF].map(|p| rgb(sent(&registers, 1.0, p))[0]);
-        assert!(
-            black < 1.0 && grey > 200.0 && white > 250.0,
-            "{black} {grey} {white}"
-        );
     }
 }

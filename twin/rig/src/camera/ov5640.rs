@@ -3,8 +3,8 @@
 //! The picture is that of the window for which the sensor's lens is meant, 2352 × 1764 of the
 //! array, at 320 × 240; outside it is black. Of the PLL's tree only the branches to lines and PCLK
 //! are simulated. After a reset the pins are no outputs, so nothing is sent. Not simulated:
-//! banding, night mode, lens correction, sharpening and smoothing, automatic white balance (a
-//! captured frame with it breaks a rule), the microcontroller, the focus motor.
+//! banding, night mode, lens correction, sharpening and smoothing, gamma and automatic white
+//! balance (a captured frame with one of these breaks a rule), the microcontroller, the focus motor.
 
 use super::colour::Colour;
 use super::output::{Format, Output, Window};
@@ -46,8 +46,8 @@ const CLOSE: f64 = 0.03;
 /// Factor of a small step of the automatic control, and the frames from one to the next.
 const SMALL_STEP: f64 = 17.0 / 16.0;
 const FRAMES_PER_STEP: u32 = 4;
-/// Exponent of the curve while gamma is on.
-const GAMMA: f64 = 0.45;
+/// [`reg::ISP`]: the gamma curve is on.
+const GAMMA: u8 = 0x20;
 /// The matrix for which the scene's colours are meant, those of Linux' driver.
 const MATRIX: [f64; 9] = [30.0, 91.0, 8.0, -10.0, -126.0, 136.0, 124.0, -108.0, -16.0];
 /// COM3 of the OV7725, in whose bits [`Output`] has these.
@@ -316,8 +316,7 @@ impl Ov5640 {
             let gain = f64::from(self.registers.wide(registers[i]) & 0xFFF) / 1024.0;
             gain * response[i] * self.light
         });
-        let curved = self.registers.get(reg::ISP) & 0x20 != 0;
-        Colour::between(&MATRIX, &self.matrix(), gains, curved.then_some(GAMMA))
+        Colour::between(&MATRIX, &self.matrix(), gains)
     }
 }
 
@@ -410,6 +409,12 @@ impl Part for Ov5640 {
         if white && self.registers.get(reg::MANUAL_WHITE) & 1 == 0 {
             rules.broken(|| {
                 "OV5640: a frame was captured with automatic white balance, which is not simulated"
+                    .to_owned()
+            });
+        }
+        if self.registers.get(reg::ISP) & GAMMA != 0 {
+            rules.broken(|| {
+                "OV5640: a frame was captured with its gamma curve (0x5000), which is not simulated"
                     .to_owned()
             });
         }
@@ -589,9 +594,7 @@ mod tests {
         ];
         let mut also: Vec<(u16, u8)> = white.chain((reg::MATRIX..).zip(matrix)).collect();
         assert!(set(&also).colour().is_plain());
-        also.push((reg::ISP, 0x27));
-        assert!(!set(&also).colour().is_plain());
-        also.extend([(reg::ISP, 0x07), (reg::GREEN, 0x02)]);
+        also.push((reg::GREEN, 0x02));
         assert!(!set(&also).colour().is_plain());
     }
 }

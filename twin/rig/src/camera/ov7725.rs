@@ -1,6 +1,6 @@
 //! The OV7725: turns a scene into its output by its registers.
 
-use super::colour::Colour;
+use super::colour::{self, Colour};
 use super::exposure::Exposure;
 use super::output::{Format, Output};
 use super::part::{Part, Timing};
@@ -64,6 +64,13 @@ impl Part for Ov7725 {
                      was never written and has no value after a reset that its data sheets agree \
                      about"
                 )
+            });
+        }
+        if colour::is_bent(&self.registers) {
+            rules.broken(|| {
+                "OV7725: a frame was captured with its gamma curve or special effects (0x64), \
+                 which are not simulated"
+                    .to_owned()
             });
         }
         let wanted = match super::output::format(self.registers.get(registers::COM7)) {

@@ -38,24 +38,14 @@ pub const LC_CTR: u8 = 0x46;
 pub const AWB_CTRL0: u8 = 0x63;
 /// FIFO, special effects, colour matrix, gamma.
 pub const DSP_CTRL1: u8 = 0x64;
+/// DSP_CTRL1 bit 4: the colour matrix is applied.
+pub const COLOUR_MATRIX: u8 = 0x10;
 /// White balance: the unit of a gain.
 pub const AWB_CTRL1: u8 = 0x69;
-/// Gamma curve, fifteen points.
-pub const GAM1: u8 = 0x7E;
 /// Colour matrix, six coefficients.
 pub const MTX1: u8 = 0x94;
 /// Signs of the colour matrix's coefficients, and whether they count twice.
 pub const MTX_CTRL: u8 = 0x9A;
-/// Brightness.
-pub const BRIGHT: u8 = 0x9B;
-/// Contrast.
-pub const CNST: u8 = 0x9C;
-/// Switches of the special effects.
-pub const SDE: u8 = 0xA6;
-/// Saturation of Cb.
-pub const USAT: u8 = 0xA7;
-/// Saturation of Cr.
-pub const VSAT: u8 = 0xA8;
 /// Product id, high byte; read-only.
 pub const PID: u8 = 0x0A;
 /// Product id, low byte; read-only.
@@ -154,15 +144,15 @@ const POWER_UP: [(u8, u8); 56] = [
     (0x98, 0x24),
     (0x99, 0x38),
     (MTX_CTRL, 0x9E),
-    (CNST, 0x20),
-    (USAT, 0x40),
-    (VSAT, 0x40),
+    (0x9C, 0x20),
+    (0xA7, 0x40),
+    (0xA8, 0x40),
     (0xAC, 0xFF),
 ];
 
 /// Registers whose value after a reset differs between sources or is missing: first and last of
 /// each range.
-const DISPUTED: [(u8, u8); 13] = [
+const DISPUTED: [(u8, u8); 10] = [
     (0x0F, 0x0F),
     (0x24, 0x26),
     (0x3D, 0x3D),
@@ -170,22 +160,10 @@ const DISPUTED: [(u8, u8); 13] = [
     (LC_CTR, LC_CTR),
     (AWB_CTRL0, DSP_CTRL3),
     (AWB_CTRL1, AWB_CTRL1),
-    (GAM1, 0x8D),
     (0x8E, 0x8F),
     (MTX1, MTX_CTRL),
-    (CNST, CNST),
-    (SDE, SDE),
     (0xAC, 0xAC),
 ];
-/// Disputed registers that affect a picture only if a bit of another register is set: range, that
-/// register, the bit.
-const CONDITIONAL: [(u8, u8, u8, u8); 4] = [
-    (GAM1, 0x8D, DSP_CTRL1, 0x04),
-    (MTX1, MTX_CTRL, DSP_CTRL1, 0x10),
-    (CNST, CNST, DSP_CTRL1, 0x20),
-    (SDE, SDE, DSP_CTRL1, 0x20),
-];
-
 /// Reserved bits. Their values after a reset differ between revisions of the part, and some
 /// revisions keep them.
 const RESERVED: [(u8, u8); 8] = [
@@ -287,9 +265,8 @@ impl Registers {
     }
 
     fn matters(&self, address: u8) -> bool {
-        let mut conditions = CONDITIONAL.into_iter();
-        let condition = conditions.find(|(first, last, ..)| (*first..=*last).contains(&address));
-        condition.is_none_or(|(.., control, bit)| self.get(control) & bit != 0)
+        let is_of_matrix = (MTX1..=MTX_CTRL).contains(&address);
+        !is_of_matrix || self.get(DSP_CTRL1) & COLOUR_MATRIX != 0
     }
 
     /// Returns a value of `HIGH:low bits`: the register at `high` shifted up, joined with bits of
@@ -382,10 +359,6 @@ mod tests {
         }
         assert!(
             missing.contains(&AWB_CTRL0) && missing.contains(&MTX1),
-            "{missing:02X?}"
-        );
-        assert!(
-            !missing.contains(&GAM1) && !missing.contains(&CNST),
             "{missing:02X?}"
         );
     }
