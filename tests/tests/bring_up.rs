@@ -200,7 +200,7 @@ fn a_good_board_is_right_up_to_the_press() {
         .spawn()
         .unwrap();
     let asked = || std::fs::read_to_string(folder.path().join("asked")).unwrap();
-    wait_for(&mut child, asked, "on the right");
+    wait_for(&mut child, asked, "right of its middle");
     interrupt(child);
     rig.finish().unwrap();
     let report = report(&file);
