@@ -25,6 +25,8 @@ pub struct Resting {
     pub(super) is_own: bool,
     px: Markers,
     areas: List<f32, MOST_DOTS>,
+    /// [`RestImage::grain`] of each marker.
+    grain: Markers,
     /// How far the film may rest from this; `None` if there is no difference.
     drift: Option<Drift>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
@@ -129,6 +131,7 @@ impl Resting {
             is_own,
             px: List::of(px),
             areas: List::of(rest.areas.iter().map(|area| *area as f32)),
+            grain: forward.rest_image.grain(),
             drift: None,
             hanging: None,
             shape: ContactShape::Needle,
@@ -200,9 +203,9 @@ impl Resting {
         let scale = self.mounting.scale();
         let parts = [frame.blur, frame.motion, frame.beside].map(|px| scale * px.to_f32());
         let blurred: f32 = parts.iter().map(|part| part * part).sum();
-        let at_rest = self.px.iter().zip(self.areas.iter());
+        let at_rest = self.px.iter().zip(self.areas.iter().zip(self.grain.iter()));
         let pairs = markers.iter().zip(at_rest).zip(moved.as_chunks_mut().0);
-        for (k, ((marker, ([x, y], area)), moved)) in pairs.enumerate() {
+        for (k, ((marker, ([x, y], (area, grain))), moved)) in pairs.enumerate() {
             let [x, y] = [marker.x.to_f32() - x, marker.y.to_f32() - y];
             *moved = self.mounting.moved([x, y]);
             let larger = (marker.area as f32 / area).clamp(AREAS[0], AREAS[1]);
@@ -211,7 +214,7 @@ impl Resting {
                 at_four_areas,
                 ..
             } = &forward.noise;
-            let [away, across] = *at_rest_px;
+            let [away, across] = [0, 1].map(|i| at_rest_px[i] * grain[i]);
             let [more_away, more_across] = *at_four_areas;
             let variances = [(away, more_away), (across, more_across)].map(|(at_rest, more)| {
                 let growth = 1.0 + (more - 1.0) * (larger - 1.0) / 3.0;
