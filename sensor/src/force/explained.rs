@@ -1,5 +1,6 @@
 //! Computes the force that explains the markers best, with the film run forwards.
 
+use super::noise::beside_px2;
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
     Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
@@ -9,6 +10,7 @@ use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_
 use crate::force::network::Output;
 use crate::force::rest::Rest;
 use crate::markers::lost::Lost;
+use crate::markers::rules::Placed;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
@@ -280,12 +282,17 @@ impl Resting {
     pub fn estimate_without(
         &self,
         forward: &Forward<'_>,
-        markers: &[Marker],
+        placed: &Placed,
         lost: Lost,
         noise: FrameNoise,
         start: Start,
     ) -> Estimate {
-        let mut observed = self.observed(forward, markers, noise);
+        let mut observed = self.observed(forward, &placed.markers, noise);
+        let scale = self.mounting.scale();
+        for ([xx, _, yy], shift_px2) in observed.noise.iter_mut().zip(placed.shifts_px2.iter()) {
+            let beside = scale * scale * beside_px2(*shift_px2);
+            (*xx, *yy) = (*xx + beside, *yy + beside);
+        }
         observed.lost = lost;
         lost.clear(&mut observed.moved);
         forward.estimate(

@@ -162,7 +162,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let prepared = self.prepared.as_ref();
         let mut status = prepared.map_or(Status::OK, |prepared| prepared.standing);
         let rows = self.settings.geometry.height;
-        self.noise.set_beside(placed.shift_px2);
+        self.noise.set_beside(placed.largest_shift_px2());
         let moved = at_the_middle(
             &self.motion,
             &mut self.noise,
@@ -202,7 +202,15 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             return None;
         };
         let is_again = matches!(self.look, Look::Again);
-        let noise = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
+        let frame = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
+        // What shows through beside a marker counts for that marker alone: others check it.
+        let noise = FrameNoise {
+            beside: Px(0),
+            ..frame
+        };
+        if frame.is_disturbed() {
+            *status |= Status::FRAME_DISTURBED;
+        }
         let seen = Seen {
             forward,
             resting,
@@ -222,7 +230,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
         let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
         if !is_again && lost == Lost::NONE && is_a_press(found) {
-            self.noise.saw_press(noise, &estimate, &placed.markers);
+            self.noise.saw_press(frame, &estimate, &placed.markers);
         }
         *status |= found;
         if lost != Lost::NONE {
@@ -339,10 +347,9 @@ impl Seen<'_> {
     }
 
     fn estimate(&self, left_out: Option<usize>, start: Start) -> Estimate {
-        let markers = &self.placed.markers;
         let lost = self.placed.without(left_out);
         self.resting
-            .estimate_without(self.forward, markers, lost, self.noise, start)
+            .estimate_without(self.forward, self.placed, lost, self.noise, start)
     }
 }
 
