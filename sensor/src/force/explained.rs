@@ -27,7 +27,7 @@ pub struct Resting {
     pub(super) is_own: bool,
     px: Markers,
     areas: List<f32, MOST_DOTS>,
-    /// [`RestImage::grain`] of each marker.
+    /// The [grain](crate::force::forward::RestImage::grain) of each marker.
     grain: Markers,
     /// How far the film may rest from this; `None` if there is no difference.
     drift: Option<Drift>,
