@@ -7,6 +7,7 @@ use hivtac_sensor::force::model::Model;
 use hivtac_sensor::force::network::Network;
 use hivtac_sensor::force::{self, Force, FrameNoise, Resting};
 use hivtac_sensor::markers::lost::Lost;
+use hivtac_sensor::markers::rules::Placed;
 use hivtac_terms::marker::Marker;
 use hivtac_terms::status::Status;
 use hivtac_twin::film::Dots;
@@ -63,7 +64,8 @@ impl<'m> Chip<'m> {
         let estimate = match self.model.layers().is_empty() {
             true => {
                 let start = Start::Anywhere;
-                resting.estimate_without(forward, (&markers, Lost::NONE), noise, (start, true))
+                let placed = (&Placed::of(&markers), Lost::NONE);
+                resting.estimate_without(forward, placed, noise, (start, true))
             }
             false => {
                 let output = self.network.run(&self.model, &features, &self.tare);

@@ -13,11 +13,18 @@ use hivtac_twin::film::{Film, Layout};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::tables::{Dot, STEEP_COUNTS_LESS, UnitSetup, tables};
+use super::tables::{Dot, UnitSetup, tables};
 use super::{limits, rest_image};
 
-/// Nodes of a dot's table along each axis.
-const NODES: usize = 16;
+/// Nodes of a dot's table along each axis, and the distance from the dot, mm, at which they are
+/// twice as far apart as there. A tip of 0.5 mm moves a dot of 1 mm sharply when it is near.
+const NODES: usize = 19;
+const TWICE_MM: f64 = 0.6;
+/// The most functions of a load. Nodes need the room: fewer functions of more nodes are more exact.
+const FUNCTIONS: usize = 12;
+/// Loads of the largest tilt weigh less than those without by this factor plus one: they are far
+/// beyond the calibrated range.
+const STEEP_COUNTS_LESS: f64 = 60.0;
 /// Knots along the size, y and x of the tables' own error.
 const KNOTS: [usize; 3] = [4, 4, 4];
 /// Loads by which that error is measured, and their largest tilt along each axis, rad.
@@ -45,10 +52,10 @@ pub fn of_layout(
     let (places_mm, last_mm) = (film.markers_mm(), film.most_place_mm());
     let dots = places_mm
         .iter()
-        .map(|place| Dot::within(*place, NODES, last_mm));
+        .map(|place| Dot::within(*place, NODES, last_mm, TWICE_MM));
     let dots: Vec<Dot> = dots.collect();
     let moved = |pose: &Pose, dot| setup.moved(&film, pose, dot);
-    let (tables, left) = tables(&dots, moved, STEEP_COUNTS_LESS)?;
+    let (tables, left) = tables(&dots, moved, FUNCTIONS, STEEP_COUNTS_LESS)?;
     let [linear_n, cubic_n] = setup.stiffness_n().map(|part| part as f32);
     let mut spec = ForwardSpec {
         steps,

@@ -18,7 +18,7 @@ const RINGS: [(f64, u8); 4] = [(0.0, 1), (0.4, 6), (0.7, 10), (0.95, 16)];
 /// A marker's motion at the nodes of its table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampled {
-    /// The nodes along x and along y, mm of the tip's place, ascending; 6 to 16 each.
+    /// The nodes along x and along y, mm of the tip's place, ascending; 6 to 20 each.
     pub nodes_mm: [Vec<f64>; 2],
     /// Unit vector along which the first component of the terms' tilt is; the second is across it,
     /// from x towards y. Markers to which the load looks the same, each from its own side, need few

@@ -219,7 +219,7 @@ fn seen_at_rest(spec: ModelSpec, scene: &Scene) -> Result<ModelSpec> {
     if let Some(forward) = &mut forward {
         forward.noise = Noise {
             rest_px: Markers::of(off),
-            ..noise(&mut sensor, &rest, scene)?
+            ..noise(&mut sensor, &rest, scene, &forward.rest_image.grain())?
         };
     }
     Ok(ModelSpec {
@@ -230,8 +230,8 @@ fn seen_at_rest(spec: ModelSpec, scene: &Scene) -> Result<ModelSpec> {
 }
 
 /// How exactly the dots are seen under presses: away from the axis and across, at rest and with
-/// four times the area.
-fn noise(sensor: &mut Sensor<'_>, rest: &Rest, scene: &Scene) -> Result<Noise> {
+/// four times the area. Of each dot that is relative to its `grain`.
+fn noise(sensor: &mut Sensor<'_>, rest: &Rest, scene: &Scene, grain: &Markers) -> Result<Noise> {
     let at_rest = scene.truth_under(&Load::REST)?;
     let middle =
         [scene.camera().width(), scene.camera().height()].map(|side| (f64::from(side) - 1.0) / 2.0);
@@ -253,7 +253,9 @@ fn noise(sensor: &mut Sensor<'_>, rest: &Rest, scene: &Scene) -> Result<Noise> {
             continue;
         };
         let truths = truth.markers.iter().zip(at_rest.markers.iter());
-        for ((marker, before), truths) in markers.iter().zip(&rest.markers()).zip(truths) {
+        let seen = markers.iter().zip(grain.iter());
+        for (((marker, grain), before), truths) in seen.zip(&rest.markers()).zip(truths) {
+            let size = grain.map(|grain| MEAN_SIZE * f64::from(grain));
             let (Some(now), Some(then)) = truths else {
                 continue;
             };
@@ -263,11 +265,9 @@ fn noise(sensor: &mut Sensor<'_>, rest: &Rest, scene: &Scene) -> Result<Noise> {
             let far = at[0].hypot(at[1]);
             let more = (f64::from(marker.area) / f64::from(before.area.max(1)) - 1.0) / 3.0;
             let along = (off[0] * at[0] + off[1] * at[1]) / far;
-            away.add(more, along.abs() / MEAN_SIZE);
-            across.add(
-                more,
-                (off[1] * at[0] - off[0] * at[1]).abs() / far / MEAN_SIZE,
-            );
+            let beside = (off[1] * at[0] - off[0] * at[1]) / far;
+            away.add(more, along.abs() / size[0]);
+            across.add(more, beside.abs() / size[1]);
         }
     }
     let [(away, away_grows), (across, across_grows)] = [away.through(), across.through()];

@@ -2,7 +2,7 @@
 
 use crate::parallel;
 use anyhow::Result;
-use hivtac_sensor::force::forward::MOST_TILTS;
+use hivtac_sensor::force::forward::{MOST_FUNCTIONS, MOST_TILTS};
 use hivtac_sensor::force::model::TablesSpec;
 use hivtac_twin::film::reduced::{LARGEST_SIZE, LARGEST_TILT, LINEAR_N, Pose, Terms, Unit};
 use hivtac_twin::film::{Film, MAX_PLACE_MM};
@@ -19,17 +19,13 @@ const FILM_NODES_MM: [f64; 16] = [
 /// Distance from the marker, mm, at which the spacing of other nodes is twice that at the marker.
 /// The spacing grows with the distance.
 const TWICE_MM: f64 = 2.0;
-/// The same for tables that reach to the film's edge.
-const TWICE_WIDE_MM: f64 = 0.8;
 /// Number of powers of size in the terms without tilt, of its first degree, and higher degrees.
 const TERMS: [u8; MOST_TILTS] = [8, 6, 5, 4, 3];
 /// The error allowed to functions of size and tilt, root mean square, focal lengths: 0.0022 px at
 /// 320×240.
 const LEFT: f64 = 0.0022 / 175.0;
-/// The most functions, for files that fit into a device.
-const FUNCTIONS: usize = 16;
 /// Samples of the largest tilt weigh less than those without tilt by this factor plus one.
-pub(super) const STEEP_COUNTS_LESS: f64 = 12.0;
+const STEEP_COUNTS_LESS: f64 = 12.0;
 /// Keeps loads within the film's own limits, in spite of rounding.
 const WITHIN: f64 = 1.0 - 1e-6;
 
@@ -102,7 +98,8 @@ impl UnitSetup<'_> {
     pub fn tables(&self) -> Result<(TablesSpec, f64)> {
         let film = Film::of(self.unit)?;
         let dots = film.markers_mm().array::<4>().map(Dot::of_film);
-        tables(&dots, |pose, dot| self.moved(&film, pose, dot), 0.0)
+        let moved = |pose: &Pose, dot| self.moved(&film, pose, dot);
+        tables(&dots, moved, MOST_FUNCTIONS, 0.0)
     }
 }
 
@@ -118,7 +115,7 @@ pub struct Dot {
 }
 
 impl Dot {
-    /// At a place, with `count` nodes (6 to 16) along each axis, closer together near it.
+    /// At a place, with `count` nodes (6 to 20) along each axis, closer together near it.
     pub fn new(place_mm: [f64; 2], count: usize) -> Dot {
         Dot {
             place_mm,
@@ -127,12 +124,13 @@ impl Dot {
         }
     }
 
-    /// As [`Dot::new`], for tips within ±`last_mm` along each axis. All such dots see tilts along
-    /// the film's axes, so that a chip computes the functions of a load once for all.
-    pub fn within(place_mm: [f64; 2], count: usize, last_mm: f64) -> Dot {
+    /// As [`Dot::new`], for tips within ±`last_mm` along each axis. At `twice_mm` from the place,
+    /// nodes are twice as far apart as there. All such dots see tilts along the film's axes, so
+    /// that a chip computes the functions of a load once for all.
+    pub fn within(place_mm: [f64; 2], count: usize, last_mm: f64, twice_mm: f64) -> Dot {
         Dot {
             place_mm,
-            nodes_mm: place_mm.map(|part| nodes_near(part, count, last_mm, TWICE_WIDE_MM)),
+            nodes_mm: place_mm.map(|part| nodes_near(part, count, last_mm, twice_mm)),
             away: [1.0, 0.0],
         }
     }
@@ -184,18 +182,20 @@ fn nodes_near(place_mm: f64, count: usize, last_mm: f64, twice_mm: f64) -> Vec<f
 }
 
 /// The tables of markers whose image motion under a load is `moved`, by marker number, focal
-/// lengths. Also their error, root mean square over loads and places, focal lengths. Among those,
-/// loads of the largest tilt weigh less than those without by a factor of 1 + `steep`.
+/// lengths. They have at most `most` functions. Also their error, root mean square over loads and
+/// places, focal lengths. Among those, loads of the largest tilt weigh less than those without by a
+/// factor of 1 + `steep`.
 ///
 /// # Errors
 /// When a sample cannot be computed, or the tables cannot hold the motion.
 pub fn tables(
     dots: &[Dot],
     moved: impl Fn(&Pose, usize) -> Result<[f64; 2]> + Sync,
+    most: usize,
     steep: f64,
 ) -> Result<(TablesSpec, f64)> {
     let samples = samples(dots, moved, TERMS)?;
-    compressed(TERMS, &samples, LEFT, FUNCTIONS, steep)
+    compressed(TERMS, &samples, LEFT, most, steep)
 }
 
 /// The coefficients of terms at the nodes of each marker.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Mutex;
 
 use anyhow::{Context, Result, ensure};
-use hivtac_sensor::force::forward::{MOST_TILTS, Noise, Stiffness};
+use hivtac_sensor::force::forward::{MOST_FUNCTIONS, MOST_TILTS, Noise, Stiffness};
 use hivtac_sensor::force::model::{CovarianceSpec, ForwardSpec, TableSpec, TablesSpec};
 use hivtac_shell::Equilibrium;
 use hivtac_terms::marker::{LEAST_MARKERS, MOST_MARKERS};
@@ -28,6 +28,8 @@ use crate::parallel;
 /// the tip.
 const NODES: usize = 13;
 const MORE_NODES: usize = 14;
+/// Distance from one of those dots, mm, at which its nodes are twice as far apart as there.
+const TWICE_MM: f64 = 0.8;
 /// The number of dots of the square layout.
 const SQUARE: usize = LEAST_MARKERS;
 
@@ -240,7 +242,7 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
         .iter()
         .map(|place| match dots_mm.len() {
             SQUARE => Dot::new(*place, NODES),
-            _ => Dot::within(*place, MORE_NODES, MAX_PLACE_MM),
+            _ => Dot::within(*place, MORE_NODES, MAX_PLACE_MM, TWICE_MM),
         })
         .collect();
     // A node's coefficients give all its loads, which are queried one after the other.
@@ -261,7 +263,7 @@ fn tables_of(field: &Field<'_>, dots_mm: &[[f64; 2]]) -> Result<(TablesSpec, f64
         let [values, ..] = field.terms().rows(pose);
         Ok(coefficients.each_ref().map(|row| dot(row, &values)))
     };
-    tables(&dots, moved, 0.0)
+    tables(&dots, moved, MOST_FUNCTIONS, 0.0)
 }
 
 /// Covariances of the motion of the unit's dots that the loads leave. `beside` is an independent

@@ -1,5 +1,6 @@
 //! Computes the force that explains the markers best, by the forward model.
 
+use super::noise::beside_px2;
 use super::{Force, FrameNoise, Place, Polar, trust};
 use crate::force::forward::{
     Column, Drift, Estimate, Forward, Hanging, MOST_DOTS, Markers, Mounting, Noise, Observed, Pose,
@@ -9,6 +10,7 @@ use crate::force::model::{CalibratedRange, LARGEST_PLACE_UNCERTAINTY, Model, NO_
 use crate::force::network::Output;
 use crate::force::rest::Rest;
 use crate::markers::lost::Lost;
+use crate::markers::rules::Placed;
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::list::List;
 use hivtac_terms::marker::Marker;
@@ -25,6 +27,8 @@ pub struct Resting {
     pub(super) is_own: bool,
     px: Markers,
     areas: List<f32, MOST_DOTS>,
+    /// The [grain](crate::force::forward::RestImage::grain) of each marker.
+    grain: Markers,
     /// How far the film may rest from this; `None` if there is no difference.
     drift: Option<Drift>,
     /// The effect of the film's own weight; `None` if the tables and the rest position include it.
@@ -129,6 +133,7 @@ impl Resting {
             is_own,
             px: List::of(px),
             areas: List::of(rest.areas.iter().map(|area| *area as f32)),
+            grain: forward.rest_image.grain(),
             drift: None,
             hanging: None,
             shape: ContactShape::Needle,
@@ -200,9 +205,9 @@ impl Resting {
         let scale = self.mounting.scale();
         let parts = [frame.blur, frame.motion, frame.beside].map(|px| scale * px.to_f32());
         let blurred: f32 = parts.iter().map(|part| part * part).sum();
-        let at_rest = self.px.iter().zip(self.areas.iter());
+        let at_rest = self.px.iter().zip(self.areas.iter().zip(self.grain.iter()));
         let pairs = markers.iter().zip(at_rest).zip(moved.as_chunks_mut().0);
-        for (k, ((marker, ([x, y], area)), moved)) in pairs.enumerate() {
+        for (k, ((marker, ([x, y], (area, grain))), moved)) in pairs.enumerate() {
             let [x, y] = [marker.x.to_f32() - x, marker.y.to_f32() - y];
             *moved = self.mounting.moved([x, y]);
             let larger = (marker.area as f32 / area).clamp(AREAS[0], AREAS[1]);
@@ -211,7 +216,7 @@ impl Resting {
                 at_four_areas,
                 ..
             } = &forward.noise;
-            let [away, across] = *at_rest_px;
+            let [away, across] = [0, 1].map(|i| at_rest_px[i] * grain[i]);
             let [more_away, more_across] = *at_four_areas;
             let variances = [(away, more_away), (across, more_across)].map(|(at_rest, more)| {
                 let growth = 1.0 + (more - 1.0) * (larger - 1.0) / 3.0;
@@ -278,11 +283,16 @@ impl Resting {
     pub fn estimate_without(
         &self,
         forward: &Forward<'_>,
-        (markers, lost): (&[Marker], Lost),
+        (placed, lost): (&Placed, Lost),
         noise: FrameNoise,
         (start, may_turn): (Start, bool),
     ) -> Estimate {
-        let mut observed = self.observed(forward, markers, noise);
+        let mut observed = self.observed(forward, &placed.markers, noise);
+        let scale = self.mounting.scale();
+        for ([xx, _, yy], shift_px2) in observed.noise.iter_mut().zip(placed.shifts_px2.iter()) {
+            let beside = scale * scale * beside_px2(*shift_px2);
+            (*xx, *yy) = (*xx + beside, *yy + beside);
+        }
         let turning = observed.turning;
         observed.turning = turning.filter(|turning| may_turn || !turning.is_last_resort);
         observed.lost = lost;

@@ -33,6 +33,13 @@ const DISTURBED: Px = Px(1_966);
 /// longer separates good frames from bad. A camera with 4 times the noise reaches 7.
 const LARGEST: f32 = 10.0;
 
+/// The variance, px², of a marker's coordinate by what shows through the film beside it and shifts
+/// the marker by the root of this.
+pub(super) fn beside_px2(shift_px2: f32) -> f32 {
+    let more = shift_px2 - EVEN_PX * EVEN_PX;
+    UNKNOWN_COLOUR * UNKNOWN_COLOUR * more.max(0.0)
+}
+
 /// How a frame's noise differs from the model's.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameNoise {
@@ -113,8 +120,7 @@ impl NoiseLevel {
     /// the film next to it. Not inlined, so that it stays out of the near memory.
     #[inline(never)]
     pub fn set_beside(&mut self, shift_px2: f32) {
-        let more = shift_px2 - EVEN_PX * EVEN_PX;
-        self.beside = Px::of_f32(UNKNOWN_COLOUR * sqrt(more.max(0.0)));
+        self.beside = Px::of_f32(sqrt(beside_px2(shift_px2)));
     }
 
     /// Returns the noise to expect of a frame, at least the model's, with this additional blur.

@@ -165,7 +165,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         let prepared = self.prepared.as_ref();
         let mut status = prepared.map_or(Status::OK, |prepared| prepared.standing);
         let rows = self.settings.geometry.height;
-        self.noise.set_beside(placed.shift_px2);
+        self.noise.set_beside(placed.largest_shift_px2());
         let moved = at_the_middle(
             &self.motion,
             &mut self.noise,
@@ -205,7 +205,15 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             return None;
         };
         let is_again = matches!(self.look, Look::Again);
-        let noise = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
+        let frame = self.noise.of_frame(if is_again { BLUR } else { Px(0) });
+        // What shows through beside a marker counts for that marker alone: others check it.
+        let noise = FrameNoise {
+            beside: Px(0),
+            ..frame
+        };
+        if frame.is_disturbed() {
+            *status |= Status::FRAME_DISTURBED;
+        }
         let seen = Seen {
             forward,
             resting,
@@ -225,7 +233,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
         }
         let (force, found) = resting.force_and_status(forward, &model.range, noise, &estimate);
         if !is_again && lost == Lost::NONE && is_a_press(found) {
-            self.noise.saw_press(noise, &estimate, &placed.markers);
+            self.noise.saw_press(frame, &estimate, &placed.markers);
         }
         *status |= found;
         if lost != Lost::NONE {
@@ -345,9 +353,9 @@ impl Seen<'_> {
     /// Returns the load that explains the markers best without one. `may_turn` allows a torque
     /// where nothing else does.
     fn estimate(&self, left_out: Option<usize>, start: Start, may_turn: bool) -> Estimate {
-        let markers = (self.placed.markers.as_ref(), self.placed.without(left_out));
+        let placed = (self.placed, self.placed.without(left_out));
         self.resting
-            .estimate_without(self.forward, markers, self.noise, (start, may_turn))
+            .estimate_without(self.forward, placed, self.noise, (start, may_turn))
     }
 }
 

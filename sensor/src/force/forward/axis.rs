@@ -5,7 +5,7 @@ use hivtac_terms::fixed::Q;
 /// Number of coefficients that make a spline's value at a point.
 pub const SPAN: usize = 4;
 /// Allowed number of nodes.
-pub const NODES: core::ops::RangeInclusive<usize> = 6..=16;
+pub const NODES: core::ops::RangeInclusive<usize> = 6..=20;
 /// The sum of a value's weights, in steps of 2⁻¹⁵: the largest i16, as 2¹⁵ itself does not fit.
 pub const ONE: f32 = 32_767.0;
 /// 3·2²². A number added to it is rounded to an integer, because f32 has no smaller steps there.
@@ -202,7 +202,7 @@ mod tests {
     proptest! {
         #[test]
         fn parts_add_up_to_at_most_one(
-            steps in prop::collection::vec(0.011f32..3.0, 6..=16),
+            steps in prop::collection::vec(0.011f32..3.0, 6..=20),
             x in 0.0f32..1.0,
         ) {
             let mut at = -20.0;

@@ -27,6 +27,8 @@ pub struct RestImage {
     pub film_mm: Markers,
 }
 
+/// The number of markers of the square.
+const SQUARE: usize = 4;
 /// Largest motion of a unit's own camera that was mounted anew: shift as a fraction of the
 /// pattern's radius, turn as its sine, relative change of scale.
 const LARGEST_SHIFT: f32 = 0.125;
@@ -75,6 +77,23 @@ impl RestImage {
         markers.map(move |([x, y], [_, across_mm])| {
             let (right, below) = (right - across_mm * x, below - across_mm * y);
             right * right + below * below
+        })
+    }
+
+    /// How much less exactly each marker is seen than the one whose image is largest, away from the
+    /// axis and across that; 1 for the four of the square, which are alike. Noise is in a marker's
+    /// edge. Beside the axis its image is an ellipse of half axes a across and b away: a mean over
+    /// the edge is known to √(a + b) / a away and √(a + b) / b across.
+    pub fn grain(&self) -> Markers {
+        if self.film_mm.len() == SQUARE {
+            return Markers::filled(SQUARE, [1.0; 2]);
+        }
+        let across_mm = self.film_mm.iter().map(|[_, across]| *across);
+        let nearest_mm = across_mm.fold(f32::INFINITY, f32::min);
+        self.film_mm.map(|[away_mm, across_mm]| {
+            let narrow = across_mm / away_mm;
+            let away = sqrt(0.5 * (1.0 + narrow) * across_mm / nearest_mm);
+            [away, away / narrow]
         })
     }
 
@@ -279,6 +298,28 @@ mod tests {
             },
             areas: [200; 4].into(),
         }
+    }
+
+    /// A marker at 40° beside the axis is an ellipse of 0.83 by 0.59, one at 14° nearly round. The
+    /// square's are alike.
+    #[test]
+    fn a_marker_beside_the_axis_is_seen_less_exactly() {
+        assert_eq!(rest_image().grain(), Markers::filled(4, [1.0; 2]));
+        let mut others = RestImage {
+            at: Markers::defaults(5),
+            film_mm: Markers::filled(5, [10.63, 10.2]),
+        };
+        others.film_mm[4] = [16.94, 12.0];
+        let grain = others.grain();
+        let near = |found: [f32; 2], expected: [f32; 2]| {
+            let pairs = found.iter().zip(expected);
+            assert!(
+                pairs.into_iter().all(|(a, b)| (a - b).abs() < 0.01),
+                "{found:?} {expected:?}"
+            );
+        };
+        near(grain[0], [0.99, 1.03]);
+        near(grain[4], [1.00, 1.41]);
     }
 
     #[test]

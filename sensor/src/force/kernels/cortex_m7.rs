@@ -252,7 +252,7 @@ pub fn spline(
     parts: &Parts,
     factors: &[Factors],
 ) -> Option<[f32; 6]> {
-    // What files may hold is far below 32 bits: `Table` has at most 24 terms and 16 nodes along
+    // What files may hold is far below 32 bits: `Table` has at most 24 terms and 20 nodes along
     // each axis.
     let last = factors.len().checked_sub(1)? * node + 3 * line + 8;
     if last > steps.len() || line < factors.len() * node {

@@ -165,12 +165,12 @@ fn table<'a>(reader: &mut Reader<'a>, functions: usize) -> Result<Table<'a>, Mod
     reader.zero("reserved byte")?;
     let mut axis = |count: u8| {
         if !NODES.contains(&usize::from(count)) {
-            return Err(wrong("table", "6 to 16 nodes"));
+            return Err(wrong("table", "6 to 20 nodes"));
         }
         let (nodes, _) = reader.take(4 * usize::from(count))?.as_chunks();
         Axis::new(nodes).ok_or(wrong(
             "table's nodes",
-            "6 to 16, growing from -100 to 100 mm",
+            "6 to 20, growing from -100 to 100 mm",
         ))
     };
     let axes = [axis(counts[0])?, axis(counts[1])?];

@@ -33,8 +33,8 @@ pub struct Placed {
     pub markers: MarkerList,
     /// Markers without an image.
     pub lost: Lost,
-    /// The largest [`Shape::shift_px2`] of an image.
-    pub shift_px2: f32,
+    /// [`Shape::shift_px2`] of each image; 0 of a lost marker.
+    pub shifts_px2: List<f32, MOST_MARKERS>,
 }
 
 impl Finder {
@@ -50,7 +50,7 @@ impl Finder {
         may_be_shifted: bool,
     ) -> Result<Placed, Status> {
         let mut markers = MarkerList::of(rest.iter().copied());
-        let mut shift_px2 = 0.0;
+        let mut shifts_px2 = List::defaults(rest.len());
         let mut images = List::<u32, MOST_MARKERS>::defaults(rest.len());
         let (dx, dy) = match may_be_shifted {
             true => self.shift(blobs, rest),
@@ -59,24 +59,24 @@ impl Finder {
         for shape in self.whole(blobs) {
             let identity = nearest((shape.x - dx, shape.y - dy), rest);
             let place = images.get_mut(identity).zip(markers.get_mut(identity));
-            if let Some((images, marker)) = place {
+            if let Some(((images, marker), shift)) = place.zip(shifts_px2.get_mut(identity)) {
                 *images += 1;
-                shift_px2 = larger(shift_px2, shape.shift_px2);
                 *marker = shape.marker();
+                *shift = shape.shift_px2;
             }
         }
         let mut lost = Lost::NONE;
-        let counted = images.iter().zip(markers.iter_mut().zip(rest)).enumerate();
-        for (identity, (images, (marker, rest))) in counted {
+        let places = markers.iter_mut().zip(rest).zip(shifts_px2.iter_mut());
+        for (identity, (images, ((marker, rest), shift))) in images.iter().zip(places).enumerate() {
             if *images != 1 {
                 lost = lost.and(identity);
-                *marker = *rest;
+                (*marker, *shift) = (*rest, 0.0);
             }
         }
         let placed = Placed {
             markers,
             lost,
-            shift_px2,
+            shifts_px2,
         };
         match placed.may_lose(0) {
             true => Ok(placed),
@@ -129,6 +129,15 @@ impl Finder {
 }
 
 impl Placed {
+    /// All markers of a film, with nothing that shows through it beside them.
+    pub fn of(markers: &[Marker]) -> Placed {
+        Placed {
+            markers: MarkerList::of(markers.iter().copied()),
+            lost: Lost::NONE,
+            shifts_px2: List::defaults(markers.len()),
+        }
+    }
+
     /// Whether this many more markers may be lost.
     pub fn may_lose(&self, more: usize) -> bool {
         let lost = self.lost.count() + more;
@@ -138,6 +147,11 @@ impl Placed {
     /// The markers without weight: those that are lost, and this one.
     pub fn without(&self, left_out: Option<usize>) -> Lost {
         left_out.map_or(self.lost, |identity| self.lost.and(identity))
+    }
+
+    /// The largest of [`Placed::shifts_px2`].
+    pub fn largest_shift_px2(&self) -> f32 {
+        self.shifts_px2.iter().copied().fold(0.0, larger)
     }
 
     /// Whether these are whole markers of a film at rest, as the film of another rest picture has
