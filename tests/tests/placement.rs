@@ -68,8 +68,9 @@ fn the_sensing_runs_from_itcm() {
     };
     // Code that rarely runs: for a model, a setting, a tare, a message or a self-test; after a
     // force, or in place of one without a film; for second looks, lost markers, contacts other than
-    // needles, torques, and two contacts. It has no loop over pixels; two contacts have one over
-    // weights, for which there is no room.
+    // needles, torques, steep steps, and two contacts; and what moves markers to one time, once a
+    // frame. It has no loop over pixels; two contacts have one over weights, for which there is no
+    // room.
     let seldom = [
         "hivtac_sensor5force5model",
         "hivtac_sensor..force..model",
@@ -96,6 +97,8 @@ fn the_sensing_runs_from_itcm() {
         "7forward6weight",
         "7forward6shapes",
         "7forward6widths",
+        "8pipeline13at_the_middle",
+        "9held_back",
         "7forward7motions",
         "7forward7torsion",
         "8pipeline7hanging",
