@@ -75,9 +75,9 @@ pub struct Fit {
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Held {
     /// Nothing.
-    Untold,
+    Unstated,
     /// Its direction, as stated.
-    AsTold,
+    AsStated,
     /// It is not as stated, in parts of g: only without that, one film explains the loads.
     Otherwise([f64; 3]),
 }
@@ -94,14 +94,14 @@ pub fn fit(
     stage_mm: f64,
     from: Option<&OwnFilm>,
 ) -> Result<Fit> {
-    let untold = Bench {
+    let unstated = Bench {
         down: None,
         ..bench.clone()
     };
     let (mut problem, mut found) = unit_of(bench, loads, stage_mm, from)?;
-    let mut held = bench.down.map_or(Held::Untold, |_| Held::AsTold);
+    let mut held = bench.down.map_or(Held::Unstated, |_| Held::AsStated);
     if let Some(down) = bench.down.filter(|_| found.chi_square() >= EXPLAINED) {
-        let without = unit_of(&untold, loads, stage_mm, from)?;
+        let without = unit_of(&unstated, loads, stage_mm, from)?;
         if without.1.chi_square() < EXPLAINED.min(found.chi_square() - LESS) {
             (problem, found) = without;
             held = Held::Otherwise(down);
@@ -165,19 +165,19 @@ impl fmt::Display for Fit {
         if let Held::Otherwise([x, y, z]) = self.held {
             writeln!(
                 f,
-                "The sensor was not held as it was told: gravity along {x:.2}, {y:.2}, {z:.2} \
+                "The sensor was not held as was stated: gravity along {x:.2}, {y:.2}, {z:.2} \
                  contradicts the loads, and without it one film explains them. So the fit leaves \
                  it out. Correct `hivtac settings set down`."
             )?;
         }
         let turned = match (self.own.knows_weight(), self.held) {
             (true, _) => "The model holds when the sensor is turned.",
-            (false, Held::AsTold) => {
+            (false, Held::AsStated) => {
                 "The film finds no equilibrium when it is turned: then the sensor says \
                  `weight_unknown`."
             }
             (false, Held::Otherwise(_)) => "When it is turned, it says `weight_unknown`.",
-            (false, Held::Untold) => {
+            (false, Held::Unstated) => {
                 "Nobody said which way the sensor was held (`hivtac settings set down`): when it \
                  is turned, it says `weight_unknown`."
             }

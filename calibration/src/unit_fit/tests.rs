@@ -326,7 +326,7 @@ fn a_mounted_film_is_known_turned() {
     }
 }
 
-/// The sensor was told that gravity pulls at its film, which weighs nothing.
+/// It is stated that gravity pulls at the film, which weighs nothing.
 #[test]
 #[ignore = "slow: three fits"]
 fn a_direction_of_gravity_that_contradicts_the_loads_is_left_out() {
