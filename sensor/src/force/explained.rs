@@ -358,7 +358,8 @@ impl Resting {
         (force, status)
     }
 
-    /// [`Self::estimate`] and [`Self::force_and_status`] in one, for a frame whose noise is as modelled.
+    /// [`Self::estimate`] and [`Self::force_and_status`] in one, for a frame whose noise is as
+    /// modelled.
     pub fn force(
         &self,
         forward: &Forward<'_>,
