@@ -4,7 +4,8 @@
 //! array, at 320 × 240; outside it is black. Of the PLL's tree only the branches to lines and PCLK
 //! are simulated. After a reset the pins are no outputs, so nothing is sent. Not simulated:
 //! banding, night mode, lens correction, sharpening and smoothing, gamma and automatic white
-//! balance (a captured frame with one of these breaks a rule), the microcontroller, the focus motor.
+//! balance (a captured frame with one of these breaks a rule), the microcontroller, the focus
+//! motor.
 
 use super::colour::Colour;
 use super::output::{Format, Output, Window};
