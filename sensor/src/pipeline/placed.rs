@@ -35,6 +35,8 @@ pub(super) struct Before {
     load: Option<Pose>,
     /// The marker that it left out.
     left_out: Option<usize>,
+    /// Whether that load turned.
+    is_turned: bool,
     /// The frame, if no load explained it.
     refused: Option<Refused>,
     /// Whether the last second look showed that the frame was disturbed.
@@ -248,6 +250,7 @@ impl<const BLOBS: usize, T: Table> Sensor<'_, BLOBS, T> {
             prepared.now = Some(Before {
                 load: is_explained.then_some(estimate.pose),
                 left_out,
+                is_turned: estimate.is_turned(),
                 refused: (!is_explained).then_some(Refused {
                     load: estimate.pose,
                     count,
@@ -321,10 +324,11 @@ impl Seen<'_> {
     }
 
     /// Tries the load of the frame before, then without the marker that it left out, then all
-    /// places, then without each marker that is explained least.
+    /// places, then without each marker that is explained least, and at last with a torque: it
+    /// would explain a part of what a marker in a wrong place shows.
     fn usual(&self, before: &Before, may_leave_out: bool) -> (Estimate, Option<usize>) {
         if let Some(load) = before.load {
-            let found = self.estimate(None, Start::At(load), true);
+            let found = self.estimate(None, Start::At(load), before.is_turned);
             if found.is_explained() {
                 return (found, None);
             }
@@ -336,18 +340,23 @@ impl Seen<'_> {
                 }
             }
         }
-        let all = self.estimate(None, Start::Anywhere, true);
-        if all.is_explained() || !may_leave_out {
+        let all = self.estimate(None, Start::Anywhere, false);
+        if all.is_explained() {
             return (all, None);
         }
-        for nth in 0..SUSPECTS {
+        let suspects = if may_leave_out { SUSPECTS } else { 0 };
+        for nth in 0..suspects {
             let suspect = least_explained(&all.left, self.placed.lost, nth);
             let others = self.estimate(Some(suspect), Start::At(all.pose), false);
             if others.is_explained() {
                 return (others, Some(suspect));
             }
         }
-        (all, None)
+        let turned = self.estimate(None, Start::At(all.pose), true);
+        match turned.is_explained() {
+            true => (turned, None),
+            false => (all, None),
+        }
     }
 
     /// Returns the load that explains the markers best without one. `may_turn` allows a torque

@@ -113,6 +113,11 @@ impl Forward<'_> {
 }
 
 impl Estimate {
+    /// Whether a torque counted.
+    pub fn is_turned(&self) -> bool {
+        self.arm.is_some()
+    }
+
     /// Whether the load explains the markers with a torque that friction can bring. A marker that
     /// is seen in a wrong place asks for one, too: few markers leave little to tell.
     fn is_explained_by_a_torque(&self) -> bool {
