@@ -1,13 +1,12 @@
-//! Knows how a torque about the film's normal moves the images, as friction under a turning contact
-//! brings it.
+//! Finds the torque about the film's normal that friction under a turning contact brings.
 //!
-//! A torque is small beside what |F| moves, so its motion is linear in it. It is no unknown of the
-//! steps: its covariance is added to that of the markers, and what the residual says of it is found
-//! where the steps end (the best linear unbiased prediction: Henderson 1975). That is the same
-//! least-squares solution.
+//! The images' motion by a torque is small, so it is linear in the torque. The steps do not have it
+//! as an unknown: its covariance is added to that of the markers, and where the steps end the
+//! residual gives the torque (best linear unbiased prediction: Henderson 1975). That is the
+//! least-squares solution for all unknowns at once.
 //!
-//! Friction limits a torque by |F| times an arm. So the arm is what is found: torque = |F| · arm.
-//! A stiffer film under a larger force then has the same motion.
+//! Friction limits a torque to |F| times an arm. So the arm is computed, torque = |F| · arm, and a
+//! stiffer film under a larger force has the same motion.
 
 use super::covariance::{Covariance, Unknown, Whitening, add_square};
 use super::estimate::{Estimate, Observed, Start};
@@ -32,7 +31,7 @@ const NEEDLE_MM: f32 = 0.5;
 const OTHER_MM: f32 = 1.0;
 /// Coordinates of four markers.
 const FEW: usize = 8;
-/// The largest arm that is believed where it is a last resort, mm.
+/// The largest arm that counts as a last resort, mm.
 const MOST_MM: f32 = 0.7;
 
 /// The tables of nominal films, as the example `torques` of `calibration/` writes them.
@@ -53,7 +52,7 @@ pub struct Turning<'a> {
     pub is_last_resort: bool,
 }
 
-/// What a load leaves of the arm, mm, and its standard uncertainty.
+/// The arm of a torque, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arm {
     /// The likeliest arm.
@@ -63,22 +62,18 @@ pub struct Arm {
 }
 
 impl Torques<'_> {
-    /// Those of the nominal film, which stands for all films with its markers; `None` if there are
-    /// none for these.
+    /// Those of the nominal film, used for all films with its markers; `None` for other markers.
     pub fn nominal(rest_image: &RestImage) -> Option<Torques<'static>> {
+        let tables: [(&[_], _); 2] = [(&SQUARE, OF_SQUARE), (&EIGHT_V, OF_EIGHT_V)];
         let is_near = |layout: &[_]| rest_image.is_layout(layout, NEAR_MM);
-        let bytes = match () {
-            () if is_near(&EIGHT_V) => OF_EIGHT_V,
-            () if is_near(&SQUARE) => OF_SQUARE,
-            () => return None,
-        };
-        Motions::new(bytes).map(Torques)
+        let own = tables.into_iter().find(|(layout, _)| is_near(layout));
+        own.and_then(|(_, table)| Motions::new(table)).map(Torques)
     }
 }
 
 impl<'a> Torques<'a> {
-    /// Returns what is known of the torque of a shape. More than four markers tell it beside the
-    /// width of a contact; else it counts only where a contact without it explains too little.
+    /// Returns the prior of a shape's torque. It always counts if more than four markers also show
+    /// the contact's width; else only where no contact without a torque explains the markers.
     pub fn of(&self, shape: ContactShape) -> Turning<'a> {
         let is_needle = shape == ContactShape::Needle;
         Turning {
@@ -90,8 +85,7 @@ impl<'a> Torques<'a> {
 }
 
 impl Forward<'_> {
-    /// Returns the load that explains the markers best if a torque may act, or `found`, which does
-    /// not explain them, if that explains them no better.
+    /// Returns the load that explains the markers with a torque; `found` if none does.
     #[inline(never)]
     pub(super) fn under_a_torque(
         &self,
@@ -118,8 +112,8 @@ impl Estimate {
         self.arm.is_some()
     }
 
-    /// Whether the load explains the markers with a torque that friction can bring. A marker that
-    /// is seen in a wrong place asks for one, too: few markers leave little to tell.
+    /// Whether the load explains the markers with a torque that friction can bring. The limits are
+    /// strict: a marker in a wrong place looks like a torque, too.
     fn is_explained_by_a_torque(&self) -> bool {
         let is_likely = self.arm.is_some_and(|arm| arm.mm.abs() <= MOST_MM);
         let most = match self.coordinates {
@@ -161,8 +155,8 @@ impl Turning<'_> {
         add_square(covariance, motion, self.sigma_mm);
     }
 
-    /// Returns what the residual `left` says of the arm. `units` are the white equations' columns,
-    /// orthogonal, each of norm 1; the whitening includes [`Self::add_to`].
+    /// Returns the arm that the residual `left` shows. `units` are the white equations' orthogonal
+    /// columns, each of norm 1; the whitening includes [`Self::add_to`].
     #[inline(never)]
     pub fn arm(
         &self,
