@@ -12,6 +12,7 @@ use hivtac_sensor::force::rest::Rest;
 use hivtac_sensor::markers::lost::Lost;
 use hivtac_sensor::pipeline::{Measurement, Sensor};
 use hivtac_sensor::tare::{Refusal, TareBuilder};
+use hivtac_shell::{Design, Film};
 use hivtac_terms::contact_shape::ContactShape;
 use hivtac_terms::status::Status;
 use hivtac_terms::threshold::ByteOrder;
@@ -295,4 +296,41 @@ fn a_tare_of_another_layout_gives_no_force() {
     let settings = of_four.conditions.settings(ByteOrder::Native);
     sensor.reconfigure(settings, Some(of_four)).unwrap();
     assert_eq!(sensor.tare(), None);
+}
+
+/// A needle that turns, by the full solver: the force has its torque, whether or not the sensor
+/// knows that it is a needle.
+#[test]
+fn a_needle_that_turns_has_a_torque() {
+    let scene = nominal();
+    let film = Film::new(&Design::default()).unwrap();
+    let load = Load::from_angles(0.12, 4.0, -3.0).unwrap();
+    let load = load.with_offset_mm([2.0, -1.5]).unwrap();
+    let tip = hivtac_shell::Patch::tip(load.offset_mm(), film.design().tip_radius_mm).unwrap();
+    for torque_nmm in [-0.04, 0.04] {
+        let state = film.press_twisted(&tip, load.vector_n(), torque_nmm, &film.rest());
+        let state = state.unwrap();
+        let moved = |rest_mm| film.displacement(&state, rest_mm);
+        let frame = scene.render_film(moved, &Load::REST, 7);
+        for shape in [ContactShape::Unknown, ContactShape::Needle] {
+            let mut sensor = tared(&scene);
+            sensor.set_contact_shape(shape);
+            let seen = sensor.measure_frame(&frame.to_rgb565());
+            let force = seen.force.unwrap_or_else(|| panic!("{shape:?}: {seen:?}"));
+            let (errors, limits) = errors_and_limits(&force, &load);
+            assert!(
+                errors[0] < 1.5 * limits[0],
+                "{shape:?}: {errors:?} {limits:?}"
+            );
+            let torque = force
+                .torque
+                .unwrap_or_else(|| panic!("{shape:?}: {seen:?}"));
+            let off_nmm = f64::from(torque.z.0) * 1e-6 - torque_nmm;
+            let sigma_nmm = f64::from(torque.sigma.0) * 1e-6;
+            assert!(
+                sigma_nmm < 0.006 && off_nmm.abs() < 3.0 * sigma_nmm,
+                "{torque:?}"
+            );
+        }
+    }
 }
