@@ -95,6 +95,19 @@ class Alone(unittest.TestCase):
             np.testing.assert_allclose(sample.place, place, atol=5e-5)
             self.assertTrue(sample.contact)
 
+    def test_eight_dots_show_that_nothing_turns(self):
+        twin = Twin(contact="unknown", unit=MODELS / "8v/default.hvtm")
+        twin.press([0.004, -0.006, -0.09], [0.0015, -0.001])
+        last = twin.advance(0.2)[-1]
+        self.assertEqual(last.markers.shape, (8, 2))
+        # N·m: of the order of 0.003 N·mm.
+        self.assertTrue(0 < last.torque_sigma < 2e-5)
+        self.assertLess(abs(last.torque_z), 4 * last.torque_sigma)
+        self.assertEqual(last.contacts[0].torque_z, last.torque_z)
+        of_four = Twin(contact="unknown")
+        of_four.press([0, 0, -0.1], [0, 0])
+        self.assertIsNone(of_four.advance(0.1)[-1].torque_z)
+
     def test_what_cannot_be_is_refused_and_the_press_before_stays(self):
         for words, options in [
             ("from 1 to 1000000", {"unit": 0}),
