@@ -73,7 +73,7 @@ struct Point {
     prediction: Prediction,
     /// The part of the markers' motion that the load does not explain, focal lengths.
     left: Column,
-    /// The motion by a torque, if that counts.
+    /// The motion by a torque, if that counts, where the equations were solved.
     by_arm: Column,
 }
 
@@ -182,6 +182,9 @@ impl<'a> Descent<'a> {
             here,
             ..
         } = self;
+        if let Some(turning) = markers.turning {
+            turning.put(&here.pose, &forward.limits, &mut here.by_arm);
+        }
         let put = |covariance: &mut Covariance| here.put_covariance(forward, markers, covariance);
         let wide = markers.observed.wide.as_ref();
         let turning = markers.turning;
@@ -325,17 +328,11 @@ impl Point {
     #[inline(never)]
     fn put(&mut self, forward: &Forward<'_>, markers: &Markers<'_>, pose: Pose) {
         let Markers {
-            observed,
-            mounting,
-            turning,
-            ..
+            observed, mounting, ..
         } = markers;
         let limits = &forward.limits;
         let Point {
-            prediction,
-            left,
-            by_arm,
-            ..
+            prediction, left, ..
         } = self;
         (forward.tables).put(&pose, limits, &mounting.beside_mm, prediction);
         if let Some(hanging) = observed.hanging {
@@ -346,9 +343,6 @@ impl Point {
         }
         if let Some(wide) = &observed.wide {
             wide.add_to(&pose, limits, prediction);
-        }
-        if let Some(turning) = turning {
-            turning.put(&pose, limits, by_arm);
         }
         left.reset(observed.moved.len(), 0.0);
         let pairs = observed.moved.iter().zip(prediction.moved.iter());

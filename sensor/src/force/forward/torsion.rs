@@ -186,30 +186,16 @@ impl Turning<'_> {
 mod tests {
     use super::*;
     use crate::force::forward::solve::{norm, solve};
-    use crate::force::forward::{Markers, RestImage};
+    use crate::force::forward::widths::tests::{LIMITS, image, places_mm};
     use hivtac_terms::units::Micrometres;
     use proptest::prelude::*;
 
-    const LIMITS: Limits = Limits {
-        size: 0.6288,
-        tilt: 0.67,
-    };
-
-    fn image(places_mm: &[[f32; 2]]) -> RestImage {
-        RestImage {
-            at: Markers::of(places_mm.iter().map(|place| place.map(|part| part / 10.0))),
-            film_mm: Markers::filled(places_mm.len(), [10.0; 2]),
-        }
-    }
-
     fn eight_v() -> Torques<'static> {
-        let places_mm = EIGHT_V.map(|place| place.map(|part| 1e-3 * part.0 as f32));
-        Torques::nominal(&image(&places_mm)).unwrap()
+        Torques::nominal(&image(&places_mm(EIGHT_V))).unwrap()
     }
 
     fn square() -> Torques<'static> {
-        let places_mm = SQUARE.map(|place| place.map(|part| 1e-3 * part.0 as f32));
-        Torques::nominal(&image(&places_mm)).unwrap()
+        Torques::nominal(&image(&places_mm(SQUARE))).unwrap()
     }
 
     fn motion(turning: &Turning<'_>, pose: &Pose) -> Column {

@@ -333,31 +333,32 @@ pub fn centre_mm(pose: &Pose, limits: &Limits) -> [f32; 2] {
 }
 
 #[cfg(test)]
-mod tests {
+pub mod tests {
     use super::*;
     use crate::force::forward::Markers;
     use crate::force::forward::solve::solve;
-    use hivtac_terms::units::Micrometres;
+    use hivtac_terms::units::{Micrometres, SignedMicrometres};
     use proptest::prelude::*;
 
-    const LIMITS: Limits = Limits {
+    pub const LIMITS: Limits = Limits {
         size: 0.6288,
         tilt: 0.67,
     };
 
-    fn image(places_mm: &[[f32; 2]]) -> RestImage {
+    pub fn image(places_mm: &[[f32; 2]]) -> RestImage {
         RestImage {
             at: Markers::of(places_mm.iter().map(|place| place.map(|part| part / 10.0))),
             film_mm: Markers::filled(places_mm.len(), [10.0; 2]),
         }
     }
 
-    fn eight_v() -> [[f32; 2]; 8] {
-        EIGHT_V.map(|place| place.map(|part| 1e-3 * part.0 as f32))
+    /// The places of a layout, mm.
+    pub fn places_mm<const N: usize>(layout: [[SignedMicrometres; 2]; N]) -> [[f32; 2]; N] {
+        layout.map(|place| place.map(|part| 1e-3 * part.0 as f32))
     }
 
     fn nominal() -> Widths<'static> {
-        Widths::nominal(&image(&eight_v())).unwrap()
+        Widths::nominal(&image(&places_mm(EIGHT_V))).unwrap()
     }
 
     fn moved(wide: &Wide<'_>, pose: &Pose) -> Prediction {
@@ -368,9 +369,9 @@ mod tests {
 
     #[test]
     fn there_is_a_table_for_the_dots_of_8v_alone() {
-        let mut places_mm = eight_v();
-        places_mm.swap(4, 5);
-        assert_eq!(Widths::nominal(&image(&places_mm)), None);
+        let mut swapped_mm = places_mm(EIGHT_V);
+        swapped_mm.swap(4, 5);
+        assert_eq!(Widths::nominal(&image(&swapped_mm)), None);
         assert_eq!(Widths::nominal(&image(&[[3.7; 2]; 4])), None);
         assert_eq!(nominal().pressing(ContactShape::Needle), None);
     }
