@@ -116,14 +116,7 @@ pub fn contact_widths(layout: Layout) -> Result<MotionsSpec> {
                 shifts.push(Moved::of(shift.map(|part| counts * part)));
             }
         }
-        let mut columns = vec![Moved::defaults(2 * discs.len()); COLUMNS.len()];
-        for c in 0..2 * discs.len() {
-            let samples: Vec<f64> = shifts.iter().map(|shift| shift[c]).collect();
-            for (column, part) in columns.iter_mut().zip(through.coefficients(&samples)) {
-                column[c] = part;
-            }
-        }
-        columns
+        MotionsSpec::columns(&through, &shifts)
     });
     Ok(MotionsSpec {
         columns: COLUMNS.to_vec(),

@@ -1,6 +1,7 @@
 //! The table of how the images of a layout's dots move, at knots of the place that is pressed, as
 //! `sensor/src/force/forward/motions.rs` reads it.
 
+use super::LeastSquares;
 use super::covariances::Moved;
 use super::presses::{END_MM, KNOTS};
 
@@ -18,6 +19,18 @@ impl MotionsSpec {
         let along = |k: u8| END_MM * f64::from(k) / f64::from(KNOTS - 1);
         let line = |y: u8| (0..KNOTS).map(move |x| [along(x), along(y)]);
         (0..KNOTS).flat_map(line).collect()
+    }
+
+    /// The columns that fit the motions under some loads, the samples of `through`, best.
+    pub fn columns(through: &LeastSquares, samples: &[Moved]) -> Vec<Moved> {
+        let coordinates = samples[0].len();
+        let fitted = (0..coordinates).map(|c| {
+            let samples: Vec<f64> = samples.iter().map(|moved| moved[c]).collect();
+            through.coefficients(&samples)
+        });
+        let fitted: Vec<_> = fitted.collect();
+        let column = |k: usize| Moved::from_fn(coordinates, |c| fitted[c][k]);
+        (0..fitted[0].len()).map(column).collect()
     }
 
     /// The bytes of the table. A column's step is the largest of its entries over 32,767.

@@ -45,24 +45,16 @@ pub fn torques(layout: Layout) -> Result<MotionsSpec> {
     let places_mm = MotionsSpec::places_mm();
     let knots = parallel::map(places_mm.len(), |knot| {
         let place_mm = places_mm[knot];
-        let mut samples = vec![Vec::new(); 2 * discs.len()];
-        for (number, root) in ROOTS.into_iter().enumerate() {
+        let sample = |(number, root): (usize, f64)| {
             let seen = |contact| presses.seen(place_mm, (number, contact), &discs, &camera);
             let (back, forth) = (seen(BACK), seen(FORTH));
             // The motion by |F| · 1 mm, over the size.
             let arm = forces_n[number][2].abs() / (2.0 * STEP_NMM) / size(root);
             let moved = back.iter().zip(&forth).flat_map(|(from, to)| from.to(to));
-            for (samples, moved) in samples.iter_mut().zip(moved) {
-                samples.push(arm * moved);
-            }
-        }
-        let mut columns = vec![Moved::defaults(samples.len()); POWERS.len()];
-        for (c, samples) in samples.iter().enumerate() {
-            for (column, part) in columns.iter_mut().zip(through.coefficients(samples)) {
-                column[c] = part;
-            }
-        }
-        columns
+            Moved::of(moved.map(|part| arm * part))
+        };
+        let samples: Vec<Moved> = ROOTS.into_iter().enumerate().map(sample).collect();
+        MotionsSpec::columns(&through, &samples)
     });
     Ok(MotionsSpec {
         columns: POWERS.map(|power| [0, power, 1]).to_vec(),
